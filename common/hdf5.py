@@ -23,9 +23,8 @@ MOST_COMPRESSED = 1100  # gzip makes 1032 bytes of one at best
 def open_checked(path: Path) -> h5py.File:
     """The HDF5 file at `path`, its checksum and its links checked.
 
-    Raises:
-        InputError: the checksum does not fit or is missing, or a link leads out of the file.
-        OSError: there is no such file, or it is not HDF5.
+    Raises `InputError` for a checksum that does not fit or is missing, and for links that lead out of the file;
+    `OSError` where there is no such file, or it is not HDF5.
     """
     check_regular(path)
     state = checksum.state(path)

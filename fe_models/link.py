@@ -115,11 +115,8 @@ def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> L
     """The modal body of a link: from an up-to-date LINK.h5 beside it, else from the user's cache, else computed.
 
     Cache entries are named by content: hashes of its modes and of all of it, under `ffrobot/links` in the XDG cache
-    folder. A damaged entry is computed again.
-
-    Raises:
-        InputError: the link file is wrong.
-        SolveError: the modes cannot be computed, or the cache cannot be written.
+    folder. A damaged entry is computed again. Raises `InputError` for a wrong link file, `SolveError` where the modes
+    cannot be computed, or the cache cannot be written.
     """
     start = time.perf_counter()
     link = read_link(source)
@@ -133,9 +130,7 @@ def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> L
 def computed_modal_body(source: LinkSource) -> ModalBody:
     """The modal body of a link by its finite element model alone, whatever was measured; kept nowhere.
 
-    Raises:
-        InputError: the link file is wrong.
-        SolveError: the modes cannot be computed.
+    Raises `InputError` for a wrong link file, `SolveError` where the modes cannot be computed.
     """
     link, path = read_link(source), link_path(source)
     compute = _computation(link, path, remesh=False)

@@ -21,11 +21,7 @@ from .solid.constitutive import is_stable
 
 
 def read_link(source: LinkSource) -> Link:
-    """Read and check a link file.
-
-    Raises:
-        InputError: the file cannot be read, a key is unknown or missing, or a value is wrong; names file and key.
-    """
+    """Read and check a link file. Raises `InputError`, with file and key, for what is wrong in it."""
     data, path = link_keys(source), link_path(source)
     geometry = data.get("geometry")
     kind = geometry.get("kind", "beam") if isinstance(geometry, dict) else "beam"

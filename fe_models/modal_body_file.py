@@ -60,8 +60,7 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
     """Write `body` to `path`, replacing what is there only once the new file is complete; `make_folder` in the cache.
 
-    Raises:
-        SolveError: the file cannot be written; names file and reason.
+    Raises `SolveError`, with file and reason, where it cannot be written.
     """
     write_atomically(path, sealed(_image(body)), "modal body file", make_folder=make_folder, ours=make_folder)
 

@@ -37,10 +37,7 @@ def read_abaqus(path: Path, where: str) -> RawMesh:
     """The mesh of an Abaqus or CalculiX deck; `where` (file and key) begins the message of an error.
 
     Sets of elements name regions and, where they are shells, faces; so do surfaces and sets of nodes. Sets of a part
-    mean all its instances.
-
-    Raises:
-        InputError: something is not as it should be, or cannot be read; names keyword and line.
+    mean all its instances. Raises `InputError`, with keyword and line, for what is wrong or cannot be read.
     """
     try:
         return _Assembled(Deck(path)).mesh()

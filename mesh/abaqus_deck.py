@@ -45,11 +45,7 @@ class Keyword:
 
 
 def keywords(path: Path) -> Iterator[Keyword]:
-    """The keywords of a deck, of included files too; comments and empty lines left out.
-
-    Raises:
-        InputError: an included file is not there.
-    """
+    """The keywords of a deck, of included files too; comments and empty lines left out. Raises `InputError`."""
     current: Keyword | None = None
     lines = lines_of(path, _included)
     for line in lines:
@@ -147,8 +143,7 @@ class Sets:
     def numbers(self, name: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
         """(instance, number, place) of the members of a set, those of sets in it too.
 
-        Raises:
-            InputError: a set in it is not there, or contains itself.
+        Raises `InputError` for a set in it that is not there, or contains itself.
         """
         for instance, entry, place in self.members[name]:
             if isinstance(entry, int):

@@ -33,11 +33,7 @@ _LENGTHS = (0.2, 5.0)
 
 
 def check_size(size: float, volume: float, where: str) -> float:
-    """How many tetrahedra of so many m about fill a `volume` in m³.
-
-    Raises:
-        InputError: there would be more than `MOST_CELLS`.
-    """
+    """How many tetrahedra of about `size` (m) fill a `volume` (m³). Raises `InputError` for more than `MOST_CELLS`."""
     cubes = volume / size**3
     side = cubes ** (1 / 3) * size
     count = 6 * 2**0.5 * cubes  # regular tetrahedra
@@ -60,11 +56,7 @@ def check_count(count: float, found: str, where: str, hint: str = "") -> None:
 
 
 def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
-    """Check the extent of a placed part.
-
-    Raises:
-        InputError: it has no thickness, or its length is so wrong that the unit must be.
-    """
+    """Raise `InputError` for a placed part without thickness, or of a length so wrong that the unit must be."""
     extent = np.ptp(part.points[part.corners.ravel()], axis=0)
     if extent.min() <= 1e-9 * extent.max():
         axis = "xyz"[int(np.argmin(extent))]
@@ -81,10 +73,9 @@ def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
 
 
 def check_neighbours(part: PartMesh, where: str) -> None:
-    """Check that cells, right-handed as they are, lie on either side of the facets that they share.
+    """Raise `InputError` unless cells, right-handed as they are, lie on either side of the facets that they share.
 
-    Raises:
-        InputError: three cells or more have a facet, or two on the same side of it: some lie in one another.
+    Else three cells or more have a facet, or two on the same side of it: some lie in one another.
     """
     facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
     smallest = np.argmin(facets, axis=1)[:, None]
@@ -102,11 +93,7 @@ def check_neighbours(part: PartMesh, where: str) -> None:
 
 
 def check_connected(part: PartMesh, where: str) -> None:
-    """Check that the cells are connected by their faces.
-
-    Raises:
-        InputError: they do not.
-    """
+    """Raise `InputError` unless the cells are connected by their faces."""
     facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
     _, number = np.unique(facet_keys(facets, len(part.points)), return_inverse=True)
     cell = np.repeat(np.arange(len(part.cells)), len(part.shape.facets))
@@ -126,10 +113,9 @@ def check_connected(part: PartMesh, where: str) -> None:
 
 
 def check_boundary(part: PartMesh, where: str) -> None:
-    """Check that what lies just outside the facets that only one cell has is outside the part.
+    """Raise `InputError` unless what lies just outside the facets that only one cell has is outside the part.
 
-    Raises:
-        InputError: it is not: elements overlap, or nodes at one place are not one, which is a crack.
+    Else elements overlap, or nodes at one place are not one, which is a crack.
     """
     facets, owner = boundary_facets(part)
     _, normal, area = facet_geometry(part.points, facets)
@@ -173,11 +159,7 @@ def oriented(part: PartMesh) -> PartMesh:
 
 
 def check_quality(part: PartMesh, where: str) -> None:
-    """Check every cell's shape.
-
-    Raises:
-        InputError: some are inverted or flat; says how many and where.
-    """
+    """Raise `InputError`, with how many and where, for cells that are inverted or flat."""
     determinants = _determinants(part)
     largest = np.abs(determinants).max(axis=1)
     inverted = determinants.min(axis=1) <= 1e-6 * largest
@@ -212,10 +194,9 @@ def straightened(part: PartMesh) -> PartMesh:
 
 
 def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
-    """Check that `straightened` has left `part` the volume that it had as `curved` by gmsh.
+    """Raise `InputError` unless `straightened` has left `part` the volume that it had as `curved` by gmsh.
 
-    Raises:
-        InputError: cells are too long for a thin curved wall, and the link would not have its mass.
+    Else cells are too long for a thin curved wall, and the link would not have its mass.
     """
     if curved.degree == 1:
         return

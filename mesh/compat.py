@@ -37,14 +37,9 @@ else:
 
 
 def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Array) -> Mesh:
-    """Mesh of tetrahedra or hexahedra, distributed over `comm` without ghost cells.
+    """Mesh of tetrahedra or hexahedra, distributed over `comm` without ghost cells; every rank calls with its share.
 
-    Args:
-        comm: every rank calls, each with its share of the input.
-        cell: "tetrahedron" or "hexahedron".
-        degree: 1 or 2, of the geometry.
-        cells: (c, v) points of each cell, in gmsh's order of nodes.
-        points: (p, 3) in m.
+    `degree` 1 or 2 of the geometry, `cells` (c, v) points of each cell in gmsh's order of nodes, `points` (p, 3) in m.
     """
     # dolfinx's own order of nodes: dolfinx[i] = gmsh[order[i]].
     order = dolfinx.cpp.io.perm_gmsh(getattr(CellType, cell), cells.shape[1])

@@ -120,8 +120,7 @@ def named_faces(
 ) -> PartMesh:
     """The part of `source`, placed, with its faces named and tagged.
 
-    Raises:
-        InputError: a face is not there, or two overlap; says which faces the part has.
+    Raises `InputError`, with the faces that the part has, where a face is not there, or two overlap.
     """
     part = source.part
     boundary = Boundary.of(part)

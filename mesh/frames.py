@@ -27,10 +27,7 @@ class Frame:
     def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> Frame:
         """From `points` (3, 3): the origin, one on the axis `axes[0]` from there, one on the side of `axes[1]`.
 
-        `axes` are in cyclic order: "xy", "yz" or "zx".
-
-        Raises:
-            ValueError: the three points lie on one line.
+        `axes` are in cyclic order: "xy", "yz" or "zx". Raises `ValueError` for three points on one line.
         """
         origin = points[0]
         a, b = points[1:] - origin

@@ -74,14 +74,8 @@ def volume_and_surface() -> tuple[float, float]:
 def mesh_model(size: float, metres: float, where: str, around: int = CIRCLE) -> None:
     """Fill the model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
 
-    Args:
-        size: in the model's unit.
-        metres: of that unit.
-        where: beginning of the error's message: file and key.
-        around: elements on a full circle of a curved face.
-
-    Raises:
-        InputError: gmsh cannot mesh the shape.
+    `size` is in the model's unit, which has so many `metres`; `around`: elements on a full circle of a curved face.
+    Raises `InputError`, which begins with `where` (file and key), for a shape that gmsh cannot mesh.
     """
     problem: object = None
     for finer, smaller in _ATTEMPTS:

@@ -74,12 +74,8 @@ def included(name: str, file: Path, first: Path) -> Path | None:
 def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -> Iterator[Line]:
     """The lines of a deck, those of included files in place of the line that includes them.
 
-    Args:
-        first: file of the deck.
-        include: gets the lines that follow, and a line; the name of the file that this includes, None if it does not.
-
-    Raises:
-        InputError: an included file is not there, includes itself, or inclusions are nested too deeply.
+    `include` gets the lines that follow, and a line: the name of the file that this includes, None if it does not.
+    Raises `InputError` for a file that is not there, includes itself, or is nested too deeply.
     """
 
     def of(file: Path, within: tuple[Path, ...]) -> Iterator[Line]:
@@ -110,11 +106,7 @@ def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -
 
 
 def number_of(token: str, place: str) -> float:
-    """A number as Fortran writes it: 1.5, 1.D-3, and Nastran's 1.5-3.
-
-    Raises:
-        InputError: it is none.
-    """
+    """A number as Fortran writes it: 1.5, 1.D-3, and Nastran's 1.5-3. Raises `InputError` where `token` is none."""
     try:
         value = float(token)
     except ValueError:

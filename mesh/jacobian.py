@@ -49,14 +49,10 @@ def volume_of_tetrahedra(nodes: Array, degree: int) -> float:
 
 
 def cell_quality(corners: Array, cell: CellName) -> Array:
-    """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells.
+    """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells; `corners` (c, v, 3).
 
     Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
     a hexahedron's Jacobian relative to the product of its edges.
-
-    Args:
-        corners: (c, v, 3) of each cell.
-        cell: their shape.
     """
     J = jacobians(corners, cell, 1, CELLS[cell].corners)
     determinants = np.abs(np.linalg.det(J))

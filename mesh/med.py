@@ -34,9 +34,8 @@ _WHOLE = "MED_NO_PROFILE_INTERNAL"
 def read_med(path: Path, where: str) -> RawMesh:
     """The mesh in a MED file; `where` (file and key) begins the message of an error. Groups name regions and faces.
 
-    Raises:
-        InputError: it is none, damaged, or has what cannot be read: several meshes or steps, grids, polyhedra, other
-            coordinates than Cartesian ones.
+    Raises `InputError` for none, a damaged one, and what cannot be read: several meshes or steps, grids, polyhedra,
+    other coordinates than Cartesian ones.
     """
     try:
         with h5py.File(path) as file:

@@ -41,11 +41,7 @@ _MOST_GROUPS = 1000
 
 
 def read_mesh(path: Path, where: str) -> RawMesh:
-    """The mesh in `path`, whose ending tells the format; `where` (file and key) begins the message of an error.
-
-    Raises:
-        InputError: it cannot be read.
-    """
+    """The mesh in `path`, whose ending tells the format; `where` (file and key) begins the messages of `InputError`."""
     ending = path.suffix.lower()
     try:
         if ending == ".inp":
@@ -70,12 +66,9 @@ def read_mesh(path: Path, where: str) -> RawMesh:
 
 
 def read_foreign(path: Path, where: str) -> RawMesh:
-    """The mesh in `path` by meshio.
+    """The mesh in `path` by meshio; `InputError` where it cannot read it.
 
     Integer data of cells, groups and sets of the format name regions and faces; so do sets of nodes.
-
-    Raises:
-        InputError: meshio cannot read it.
     """
     import meshio
 

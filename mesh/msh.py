@@ -24,11 +24,7 @@ _HEADER = b"$MeshFormat"
 
 
 def read_msh(path: Path, where: str) -> RawMesh:
-    """A mesh in gmsh's format of version 2 or 4; `where` (file and key) begins the message of an error.
-
-    Raises:
-        InputError: it is none, or damaged.
-    """
+    """A mesh in gmsh's format of version 2 or 4; `where` (file and key) begins the messages of `InputError`."""
     content = path.read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
     while content.startswith(b"$Comments"):
         content = content.partition(b"$EndComments")[2].lstrip()

@@ -74,8 +74,7 @@ class _Row:
 def cards(path: Path) -> Iterator[Card]:
     """The cards of a deck's bulk data, of included files too.
 
-    Raises:
-        InputError: an included file is not there, a line goes on with none, or cards are replicated (=).
+    Raises `InputError` for an included file that is not there, a line that goes on with none, and replicated cards (=).
     """
     rows = [_row(line) for line in _bulk(path)]
     ends: dict[str, int] = {}
@@ -197,10 +196,8 @@ _OF_THE_LINK = (
 def read_nastran(path: Path, where: str) -> RawMesh:
     """The mesh in Nastran's bulk data; `where` (file and key) begins the message of an error.
 
-    Properties name regions, and faces where they are those of shells.
-
-    Raises:
-        InputError: something is not as it should be, or cannot be read; names card and line.
+    Properties name regions, and faces where they are those of shells. Raises `InputError`, with card and line, for what
+    is wrong or cannot be read.
     """
     try:
         return _Deck(path).mesh()

@@ -77,18 +77,10 @@ def part_mesh(
     path: Path,
     progress: Progress,
 ) -> PartMesh:
-    """Make or read the part, put it into the link's frame, check it, name its faces.
+    """Make or read the part of a link file, put it into the link's frame, check it, name its faces.
 
-    Args:
-        geometry: of the link file.
-        record: its table `mesh`.
-        places: its tables `interface`.
-        outlines: of its patches.
-        path: the link file, named in errors.
-        progress: is called with what is being done.
-
-    Raises:
-        InputError: the part cannot be read or meshed, its mesh is unsound, or a face is not there.
+    `record` is its table `mesh`, `places` are its tables `interface`. Raises `InputError`, which names `path`, where
+    the part cannot be read or meshed, its mesh is unsound, or a face is not there.
     """
     where = f"{path}: geometry" if geometry.file is None else f"{path}: geometry.file: {geometry.file.name}"
     progress("meshing" if geometry.file is None or is_step(geometry.file) else f"reading {geometry.file.name}")

@@ -58,11 +58,7 @@ def facet_keys(facets: Integers, points: int) -> Integers:
 
 
 def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
-    """The facets that only one cell has.
-
-    Returns:
-        (b, 3 or 4) corners, counter-clockwise seen from outside, and (b,) the cell of each.
-    """
+    """Of facets that only one cell has: (b, 3 or 4) corners, counter-clockwise from outside, and (b,) their cells."""
     facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
     _, first, count = np.unique(facet_keys(facets, len(part.points)), return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])

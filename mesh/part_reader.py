@@ -33,16 +33,11 @@ _is_apart = False  # whether this is such a process
 
 
 def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: object) -> Found:
-    """`read(*arguments)` in a process of its own.
+    """`read(*arguments)` in a process of its own: a function of a module; what it takes and returns can be pickled.
 
-    Args:
-        read: a function of a module; what it takes and returns can be pickled.
-        size: of the file, bytes.
-        where: file and key, the beginning of the message of an error.
-        arguments: of `read`.
-
-    Raises:
-        InputError: `read` has raised it, or its process has crashed, or has not ended in the processor time allowed.
+    `size` (bytes) is that of the file, by which the time allowed grows. Raises `InputError`, which begins with `where`
+    (file and key), where `read` has raised it, or its process has crashed, or has not ended in the processor time
+    allowed.
     """
     request = pickle.dumps((read, arguments, READING + READING_MB * size / 1e6, where))
     environment = environment_without_mpi() | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

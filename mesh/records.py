@@ -191,14 +191,9 @@ def default_order(cell: CellName) -> int:
 
 
 def default_size(volume: float, surface: float, order: int) -> float:
-    """Edge length for a part of so much volume and surface.
+    """Edge length for a part of so much `volume` (m³) and `surface` (m²), by the order of the displacements.
 
     Measured by the hydraulic diameter 4 V/A, which is about the smaller side of a solid bar's section, and twice the
     thickness of a wall.
-
-    Args:
-        volume: in m³.
-        surface: in m².
-        order: of the displacements.
     """
     return _SIZE[order] * 4 * volume / surface

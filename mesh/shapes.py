@@ -39,8 +39,7 @@ Lengths = TypeVar("Lengths")
 def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outlines | None, path: Path) -> Source:
     """Tetrahedra in the shape that `geometry` describes, the `outlines` along edges of elements.
 
-    Raises:
-        InputError: a hole leaves the section, or the shape cannot be meshed.
+    Raises `InputError` where a hole leaves the section, or the shape cannot be meshed.
     """
     _check_holes(geometry, path)
     unit, where = 10.0 ** round(log10(geometry.length)), f"{path}: geometry"

@@ -45,12 +45,7 @@ def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQu
     """Quadrature on each cross section at `x` (k,), m, exact for polynomials of `degree` in the coordinates.
 
     Where faces of cells lie in the plane, the section is that of the material towards larger x; at the end of the part
-    that towards smaller x. All processes of the mesh must call.
-
-    Args:
-        mesh: of tetrahedra or hexahedra, of degree 1 or 2.
-        x: where planes cut; beyond the part the section is empty.
-        degree: of the rule on each triangle that the section consists of.
+    that towards smaller x; beyond it, it is empty. All processes of the mesh, of degree 1 or 2, must call.
     """
     nodes, coordinates = geometry_nodes(mesh), mesh.geometry.x
     begin, end = _extent(mesh)

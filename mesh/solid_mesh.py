@@ -50,11 +50,7 @@ class Surface:
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
-    """The boundary facets of this process.
-
-    Returns:
-        (b,) facets ascending, (b,) the cell of each, and (b,) which facet of the reference cell it is.
-    """
+    """The boundary facets of this process (b,), ascending, the cell of each (b,), and which facet of it it is (b,)."""
     mesh.topology.create_connectivity(2, 3)
     mesh.topology.create_connectivity(3, 2)
     facets = np.sort(np.asarray(exterior_facet_indices(mesh.topology), dtype=np.int64))
@@ -105,8 +101,7 @@ def _positions(
 def _lattice(corners: int, n: int) -> tuple[Array, Integers, Integers]:
     """A facet divided into n × n triangles (or twice that).
 
-    Returns:
-        (l, corners) weights of its corners at the points, (m, 3) triangles, (b, 2) their sides on the facet's border.
+    (l, corners) weights of its corners at the points, (m, 3) triangles, (b, 2) their sides on the facet's border.
     """
     square = corners == 4
     places = [(i, j) for j in range(n + 1) for i in range(n + 1) if square or i + j <= n]
@@ -185,20 +180,9 @@ def solid_mesh(
     *,
     remesh: bool = False,
 ) -> SolidMesh:
-    """Mesh of a solid link, distributed over `comm`.
+    """Mesh of a solid link, distributed over `comm`, all of whose processes call; arguments as of `part_mesh`.
 
-    Args:
-        geometry: of the link file.
-        record: its table `mesh`.
-        places: its tables `interface`.
-        outlines: of its patches.
-        path: the link file, named in errors.
-        comm: all its processes call.
-        progress: is called with what is being done.
-        remesh: whether a mesh of the same part kept from an earlier run does not count.
-
-    Raises:
-        InputError: the part cannot be read or meshed, or a face is not there; on every process.
+    Unless `remesh` a mesh of the same part kept from an earlier run counts. Raises `InputError` on every process.
     """
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:

@@ -99,9 +99,8 @@ class Source:
 def source_from(raw: RawMesh, where: str) -> Source:
     """One mesh from the blocks of `raw`, each cell once; `where` (file and key) begins the messages.
 
-    Raises:
-        InputError: no volume elements, unsupported or mixed ones, curved hexahedra of 20 nodes, or nodes that are not
-            there or nowhere.
+    Raises `InputError` for no volume elements, unsupported or mixed ones, curved hexahedra of 20 nodes, and nodes that
+    are not there or nowhere.
     """
     kind = _only_kind(raw, where)
     cell, degree = _SUPPORTED[kind]

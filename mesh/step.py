@@ -28,18 +28,10 @@ _OFF = 1e-3  # how far edges may be from their faces and ends, relative to the p
 
 
 def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> Source:
-    """Tetrahedra in the volumes of a STEP file, in the file's own numbers.
+    """Tetrahedra in the volumes of a STEP file, in the file's own numbers, whose unit is `scale` m.
 
-    Volumes that touch are joined. Labels of volumes and faces in the file name groups.
-
-    Args:
-        file: the STEP file.
-        record: `size` in m.
-        scale: the file's unit in m.
-        where: beginning of the message of an error.
-
-    Raises:
-        InputError: the file is damaged, holds no closed volume, or cannot be meshed.
+    Volumes that touch are joined. Labels of volumes and faces in the file name groups. Raises `InputError`, which
+    begins with `where`, for a file that is damaged, holds no closed volume, or cannot be meshed.
     """
     text = file.read_text(encoding="latin-1")
     if "ISO-10303-21" not in text[:4096]:

@@ -16,14 +16,10 @@ Divisions = tuple[int, int, int]
 def structured_box(
     length: float, root: tuple[float, float], tip: tuple[float, float], divisions: Divisions, cell: CellName
 ) -> PartMesh:
-    """A box along x, 0 … `length`, centred on the axis.
+    """A box along x, 0 … `length` (m), centred on the axis, of hexahedra, or tetrahedra in their place.
 
-    Args:
-        length: in m.
-        root: height (along y) and width (along z) at x = 0, in m.
-        tip: the same at x = length; in between they change linearly.
-        divisions: number of layers along x, y, z.
-        cell: hexahedra, or tetrahedra in their place.
+    `root` and `tip` are height (along y) and width (along z) at the ends, m, between which these change linearly;
+    `divisions` the number of layers along x, y, z.
     """
     x, y, z = np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in divisions), indexing="ij")
     height = root[0] + (tip[0] - root[0]) * x
@@ -51,20 +47,10 @@ COINCIDENT = 1e-9
 
 
 def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
-    """Nodes of `elements` elements between the first and the last of `breakpoints`, with a node at each of them.
+    """(elements + 1,) ascending nodes, m, of so many `elements`, with a node at each of `breakpoints` (s + 1,).
 
     Within a segment the elements are equal; they are shared out so that the longest is as short as possible. A uniform
-    mesh that meets all breakpoints is therefore kept.
-
-    Args:
-        breakpoints: (s + 1,) ascending ends of the s segments, in m.
-        elements: at least s.
-
-    Returns:
-        (elements + 1,) ascending coordinates in m, breakpoints included exactly.
-
-    Raises:
-        ValueError: fewer elements than segments.
+    mesh that meets all breakpoints is therefore kept. Raises `ValueError` for fewer elements than segments.
     """
     lengths = np.diff(np.asarray(breakpoints, dtype=np.float64))
     if elements < lengths.size:

@@ -26,12 +26,9 @@ def attachment_modes(
 ) -> list[tuple[float, Family, Array]]:
     """ω², family and degrees of freedom x (m,) of that family's model, xᵀMx = 1, of attachment modes, by family.
 
-    Args:
-        models: by family.
-        known: of each family (m, n), its eigenmodes in the file.
-        places: the stations of the interfaces.
-        length: of the link in m: a unit force goes with a moment of force times length.
-        twists_along: whether torsion has the shape under a torque along the link, which bent links bear, too.
+    `known` (m, n) are each family's eigenmodes in the file, `places` the stations of the interfaces, `length` (m) that
+    of the link: a unit force goes with a moment of force times length. `twists_along`: whether torsion has the shape
+    under a torque along the link, which bent links bear, too.
     """
     found = list[tuple[float, Family, Array]]()
     for family, model in models.items():

@@ -21,24 +21,12 @@ ROUNDING_LIMIT = 1e-6
 def lowest_modes(
     K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int, solver: Solver = "block-lanczos"
 ) -> tuple[Array, Array]:
-    """Lowest eigenpairs of K x = ω² M x by `solver` on the inverse of K.
+    """The `count` lowest eigenpairs of K x = ω² M x: ω² (count,) ascending in rad²/s², X (m, count) with Xᵀ M X = I.
 
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
-    them, and tells where a mesh is too fine for double precision.
-
-    Args:
-        K: (m, m) stiffness, symmetric positive definite.
-        M: (m, m) mass, symmetric positive definite.
-        strain: (s, m) with K = strainᵀ strain but for rounding.
-        count: how many, at most m.
-        solver: block Lanczos, or Krylov–Schur of SLEPc.
-
-    Returns:
-        ω² (count,) ascending in rad²/s² and X (m, count) with Xᵀ M X = I to rounding.
-
-    Raises:
-        SolveError: rounding errors spoil them.
+    them, and tells where a mesh is too fine for double precision. K and M (m, m) are symmetric positive definite, and K
+    = strainᵀ strain but for rounding. Raises `SolveError` where rounding errors spoil the modes.
     """
     try:
         F = Flexibility(K, strain)
@@ -65,11 +53,9 @@ def lowest_modes(
 
 
 class Flexibility:
-    """K⁻¹; factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
+    """K⁻¹ (m, m); factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
 
-    Args:
-        K: (m, m) stiffness.
-        strain: (s, m) with K = strainᵀ strain but for rounding, which one step of refinement by the strains takes out.
+    K = strainᵀ strain but for rounding, which one step of refinement by the strains (s, m) takes out.
     """
 
     def __init__(self, K: sp.csr_matrix, strain: sp.csr_matrix) -> None:

@@ -45,13 +45,8 @@ def geometric_stiffness(
 ) -> dict[str, Array]:
     """(n, n) K by unit load (`unit_loads`), of the link as its reference condition holds it.
 
-    Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
-
-    Args:
-        link: for density and sections.
-        stations: k of them; every interface is a vertex of their mesh.
-        fields: (6, k, n) rows U_X … R_Z at the stations.
-        interfaces: position of each in m.
+    `fields` (6, k, n) are rows U_X … R_Z at k stations; every interface, at its m from the root, is a vertex of their
+    mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
     """
     x, weight, values, slopes = _at_gauss_points(stations, fields)
     forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else ())

@@ -18,20 +18,15 @@ from .sections import Property, cellwise
 
 
 def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invariants:
-    """Inertia shape integrals (docs/theory.md) over axis and cross section.
+    """Inertia shape integrals (docs/theory.md) over axis and cross section; `fields` (6, k, n) U_X … R_Z at k stations.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
 
     Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0 in all that bends or turns as a whole. Their
-    torsion modes keep their own ρI_p, booked in S̄_33: no planar invariant then holds any rotary inertia, and
-    m_ff = S̄_11 + S̄_22 + S̄_33 stays true. What such a link has of inertia about its own axis, in space, is the spin
-    inertia ½∫ρI_p (ω_1 + φ̇)² dx: J_s = ∫ρI_p, h_s = ∫ρI_p φ, S_s = ∫ρI_p φᵀφ, apart from the integrals over the axis.
-
-    Args:
-        link: for density and sections.
-        stations: k of them.
-        fields: (6, k, n) rows U_X … R_Z at the stations.
+    torsion modes keep their own ρI_p, booked in S̄_33: no planar invariant then holds any rotary inertia, and m_ff =
+    S̄_11 + S̄_22 + S̄_33 stays true. What such a link has of inertia about its own axis, in space, is the spin inertia
+    ½∫ρI_p (ω_1 + φ̇)² dx: J_s = ∫ρI_p, h_s = ∫ρI_p φ, S_s = ∫ρI_p φᵀφ, apart from the integrals over the axis.
     """
     rho = link.material.density
     line_mass = link.model.theory == "euler-bernoulli"

@@ -46,9 +46,7 @@ class Mode(NamedTuple):
 def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; its hashes are left empty.
 
-    Raises:
-        InputError: more modes are asked for than the mesh has.
-        SolveError: round-off errors spoil the modes.
+    Raises `InputError` for more modes than the mesh has, `SolveError` where round-off errors spoil the modes.
     """
     length = link.geometry.length
     named = link.places

@@ -28,15 +28,9 @@ def contains(record: SectionRecord, y: float, z: float) -> bool:
 
 
 def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, y: float, z: float) -> Array:
-    """(6, n) stress, rows xx, yy, zz, yz, xz, xy, in Pa.
+    """(6, n) stress, rows xx, yy, zz, yz, xz, xy, in Pa, at the point (y, z), m from the axis.
 
-    Args:
-        record: shape of the section.
-        section: its properties.
-        F: (3, n) force in N that the part beyond the section exerts on it, n cases.
-        M: (3, n) moment in N·m likewise, about the section's centroid.
-        y: of the point, in m from the axis.
-        z: likewise.
+    F (3, n) N and M (3, n) N·m about the centroid: what the part beyond the section exerts on it, in n cases.
     """
     stress = np.zeros((6, F.shape[1]))
     stress[0] = F[0] / section.area - M[2] * y / section.I_yy + M[1] * z / section.I_zz

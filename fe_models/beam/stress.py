@@ -38,16 +38,9 @@ def beam_stresses(
     """Stresses and strains of modes, and static stresses of unit loads, at the points that the link file names.
 
     Bending, axial force, torque and transverse shear: see `section_stress`. Strains by Hooke's law. At a step of the
-    section, the section beyond it counts; at a lump, what the beam carries just beyond it.
-
-    Args:
-        link: for sections, material, points.
-        stations: with their elements.
-        omega2: (n,) ω² in rad²/s².
-        families: of the modes.
-        attached: lumps, with what the modes do there.
-        residual: (n,) 1 of residual attachment modes.
-        interfaces: likewise, where loads act in these.
+    section, the section beyond it counts; at a lump, what the beam carries just beyond it. `omega2` (n,) is ω² in
+    rad²/s², `residual` (n,) 1 of residual attachment modes; `attached` lumps and `interfaces` have what the modes do
+    there.
     """
     W, at_interfaces = _loads_of_modes(link, omega2, families, residual, interfaces)
     loads = [*at_interfaces.items(), *((lump.name, _inertia_of(lump) @ W) for lump in attached)]

@@ -75,13 +75,10 @@ class Modes:
 
 
 def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia) -> Modes:
-    """Attachment modes from static shapes, by family of their loads.
+    """Attachment modes from static shapes: by family K⁻¹B and the loads B, both (m, loads).
 
-    Args:
-        static: for each family K⁻¹B (m, loads) and the loads B (m, loads): forces, and moments of these times a length.
-        X: (m, n) eigenmodes, XᵀMX = I.
-        highest: their highest ω² in rad²/s²; inf where there is none.
-        inertia: of the model.
+    B are forces, and moments of these times a length; X (m, n) eigenmodes with XᵀMX = I, `highest` their highest ω² in
+    rad²/s², inf where there is none.
     """
     known, families = X, list[Family]()
     largest = max((float(_energies(*pair, inertia).max(initial=0.0)) for pair in static.values()), default=0.0)
@@ -154,17 +151,10 @@ def interface_loads(
 ) -> tuple[Array, dict[str, Array]]:
     """The loads that bend a link into each of its n modes, as far as they are loads at interfaces.
 
-    K x = ω² M x of an eigenmode x. Of a residual mode r = R c it is Bc − M X XᵀBc: loads c at the interfaces, and the
-    opposite of the inertia that the eigenmodes have of them; c follows from the work rᵀBc = rᵀKr.
-
-    Args:
-        omega2: (n,) in rad²/s².
-        residual: (n,) 1 of residual attachment modes.
-        interfaces: what the modes do there.
-
-    Returns:
-        W (n, n): the inertia in column k is M times the modes times W[:, k]; and by interface (6, n), force in N and
-        moment in N·m per unit of modal coordinate.
+    W (n, n): the inertia in column k is M times the modes times W[:, k]; and by interface (6, n), force in N and moment
+    in N·m per unit of modal coordinate. K x = ω² M x of an eigenmode x. Of a residual mode r = R c (`residual` (n,) is
+    1) it is Bc − M X XᵀBc: loads c at the interfaces, and the opposite of the inertia that the eigenmodes have of them;
+    c follows from the work rᵀBc = rᵀKr.
     """
     static = residual.astype(bool)
     W = np.diag(np.where(static, 0.0, omega2))

@@ -31,12 +31,8 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Modes:
     """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of it.
 
-    Those that stand for eigenmodes, then as many of each family as loads brought.
-
-    Args:
-        K: (n, n) XᵀKX.
-        families: of the columns of X.
-        is_static: which of them are static shapes.
+    Those that stand for eigenmodes, then as many of each family as loads brought. K (n, n) is XᵀKX; `families` and
+    `is_static` are of the columns of X.
     """
     names: list[str] = list(FAMILIES)
     of = np.array([names.index(family) for family in families])
@@ -90,8 +86,7 @@ def interface_coordinates(
 ) -> InterfaceCoordinates:
     """From ω² and families of n modes, the number of static shapes among them, and what all do at interfaces.
 
-    Raises:
-        InputError: interfaces are so near to each other that they cannot move by themselves.
+    Raises `InputError` for interfaces so near to each other that they cannot move by themselves.
     """
     moving = sorted({k for family in FAMILIES if family in families for k in COMPONENTS[family]})
     names = [f"{name}/{AXES[k]}" for name in interfaces if name != ROOT for k in moving]

@@ -23,13 +23,10 @@ def damping_ratio(link: Link, omega: Array) -> Array:
 
 
 def canonical_signs(fields: Array) -> Array:
-    """(n,) 1 or −1, to multiply each mode by.
+    """(n,) 1 or −1, to multiply each mode by; `fields` (6, k, n) as in `station_fields`, root first.
 
     The dominant translation is then positive at the station nearest the root where it exceeds half its largest value;
     of a mode without translation, the dominant rotation.
-
-    Args:
-        fields: (6, k, n) displacement and rotation along x, y, z of n modes at k stations, root first.
     """
     signs = np.ones(fields.shape[2])
     for k in range(signs.size):

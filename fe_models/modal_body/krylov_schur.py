@@ -21,14 +21,9 @@ TOLERANCE = 1e-13
 
 
 class KrylovSchur:
-    """The search, anew each time.
+    """The search, anew each time, with F (m, m) symmetric and M (m, m) symmetric positive definite, m `rows` here.
 
-    Args:
-        flexibility: F (m, m), symmetric.
-        mass: M (m, m), symmetric positive definite.
-        rows: m, of this process.
-        comm: the processes that share the vectors.
-        total: sum of an array over all of them.
+    `comm` are the processes that share the vectors, `total` sums an array over all of them.
     """
 
     def __init__(

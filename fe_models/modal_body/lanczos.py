@@ -41,17 +41,10 @@ class Product(Protocol):
 class BlockLanczos:
     """The search, which goes on from where it is when more modes are asked for.
 
-    Of vectors that several processes share each has its own rows; all take part in everything.
-
-    Args:
-        flexibility: F (m, m), symmetric.
-        mass: M (m, m), symmetric positive definite.
-        rows: m, of this process.
-        rank: of F.
-        total: sum of an array over all processes.
-        allowed: vectors less what F brings about in no way but by rounding; without it that grows from block to block.
-        process: its number.
-        tolerance: of θ, the residual of a mode that has converged.
+    Of vectors that several processes share each has its own m `rows`; all take part in everything, and `total` sums an
+    array over them. F (m, m) is symmetric, of a `rank`; M (m, m) symmetric positive definite. `allowed`: vectors less
+    what F brings about in no way but by rounding; without it that grows from block to block. `tolerance`: of θ, the
+    residual of a mode that has converged.
     """
 
     def __init__(
@@ -82,10 +75,7 @@ class BlockLanczos:
         """X (m, count), XᵀMX = I to rounding, ω² ascending.
 
         A block of p vectors finds p modes of each frequency. Where as many are alike the search goes on with more
-        vectors.
-
-        Raises:
-            SolveError: there are not as many but for round-off.
+        vectors. Raises `SolveError` where there are not as many but for round-off.
         """
         while True:
             theta, Y = (found[..., ::-1] for found in np.linalg.eigh(self._T))

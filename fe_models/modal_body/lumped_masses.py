@@ -92,11 +92,8 @@ def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> 
 def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
     """What is linear in the loads of a link (geometric stiffness, static stress), the inertia of the lumps included.
 
-    A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves.
-
-    Args:
-        of_loads: an array of the same shape for each unit load (`unit_loads`), of the bare link.
-        attached: lumps; their interfaces are among the loads.
+    A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves:
+    `of_loads` has an array for each unit load (`unit_loads`) of the bare link.
     """
     total = dict(of_loads)
     for lump in attached:
@@ -123,11 +120,8 @@ def of_turning(E: Array, products: Array) -> dict[str, Array]:
     """(n, n) by load: geometric stiffness of d'Alembert's loads on a rigid body that turns to second order.
 
     A point d from its center moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ φ·d = pᵀG p are
-    K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md).
-
-    Args:
-        E: (3, 3) ∫ρ d dᵀ dV, kg·m².
-        products: (3, 3, n, n) φ_a φ_b.
+    K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md). E (3, 3)
+    is ∫ρ d dᵀ dV in kg·m², `products` (3, 3, n, n) φ_a φ_b.
     """
     products = 0.5 * (products + products.transpose(0, 1, 3, 2))
     K_x = np.einsum("kl,aamn->klmn", E, products) - np.einsum("kb,blmn->klmn", E, products)

@@ -35,13 +35,8 @@ def unit_load_names(interfaces: Iterable[str]) -> list[str]:
 def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> dict[str, Array]:
     """D'Alembert force and moment (q, 6) of small bodies for each unit motion of the frame.
 
-    Frame acceleration a, angular acceleration α and angular velocity ω (Newton and Euler): force
-    −m [a + α × x + ω × (ω × x)], moment −J α − ω × J ω about the center.
-
-    Args:
-        x: (q, 3) centers, m.
-        mass: (q,) kg.
-        inertia: (q, 3) J_x, J_y, J_z about the centers, kg·m².
+    Frame acceleration a, angular acceleration α and angular velocity ω (Newton and Euler): force −m [a + α × x + ω × (ω
+    × x)], moment −J α − ω × J ω about the center; x (q, 3) m, `mass` (q,) kg, `inertia` (q, 3) J_x, J_y, J_z in kg·m².
     """
     e = np.eye(3)
     m = mass[:, None]

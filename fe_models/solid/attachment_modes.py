@@ -35,15 +35,8 @@ def attachment_modes(
 ) -> Modes:
     """Those of the loads that belong to `families`; collective.
 
-    Args:
-        families: wanted ones.
-        mass: with what is attached.
-        modes: eigenmodes.
-        loads: (3 owned,) as `invariants.unit_loads` finds them.
-        shapes: (3 owned,) displacements under them, as `invariants.static_shapes` finds them.
-        interfaces: their names.
-        length: of the link in m: a unit force goes with a moment of force times length.
-        twists_along: whether torsion has the shape under a torque along the link, which bent links bear, too.
+    `loads` and `shapes` (3 owned,) are as `invariants.unit_loads` and `static_shapes` find them, `mass` has what is
+    attached; `length` and `twists_along` as of `beam.attachment_modes`.
     """
     model, scale = mass.model, np.repeat([1.0, length], 3)
     static = {}
@@ -67,9 +60,7 @@ def attachment_modes(
 class FixedInterfaceFlexibility:
     """Of a body whose interfaces rest, as `Flexibility`; vectors hold this rank's own degrees of freedom.
 
-    Args:
-        flexibility: under the supports of the root.
-        rows: B (c, 3 owned) of what is held besides.
+    `flexibility` is that under the supports of the root, B (c, 3 owned) are the `rows` of what is held besides.
     """
 
     def __init__(self, flexibility: Flexibility, rows: Array) -> None:

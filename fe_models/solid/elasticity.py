@@ -128,9 +128,7 @@ class SolidModel:
 class Mass:
     """M, with what is attached to interfaces: M u + Σ Bᵀ diag(w) B u.
 
-    Args:
-        model: has the mass of the part itself.
-        attached: for each attached mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
+    `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
     """
 
     def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]] = ()) -> None:

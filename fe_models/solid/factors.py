@@ -28,11 +28,8 @@ COLUMNS = 32
 class Factors:
     """K = L Lᵀ, ordered by MUMPS' own PORD. Vectors hold this rank's own degrees of freedom.
 
-    Args:
-        K: symmetric positive definite, upper triangle; destroyed.
-
-    Raises:
-        SolveError: K is not positive definite in double precision, or memory or disk does not suffice.
+    K is an upper triangle, which is destroyed. Raises `SolveError` where it is not positive definite in double
+    precision, or memory or disk does not suffice.
     """
 
     _remove: Callable[[], object] | None = None

@@ -79,11 +79,8 @@ def names(motion: SectionMotion) -> list[str]:
 def aligned(omega2: Array, motion: SectionMotion, wanted: Sequence[str] | str) -> Array:
     """(n, n) Q that turns modes of equal frequency into the families, so that the basis is reproducible; orthogonal.
 
-    Args:
-        omega2: (n,) ascending.
-        motion: of the modes.
-        wanted: families, or "all". For families, modes of nearly equal frequency are turned too: into Ritz vectors, of
-            which one has all that the cluster has of a family.
+    `omega2` (n,) is ascending, `motion` that of the modes. For `wanted` families (not "all") modes of nearly equal
+    frequency are turned too: into Ritz vectors, of which one has all that the cluster has of a family.
     """
     Q = np.eye(omega2.size)
     gap = REPEATED if wanted == "all" else NEARLY

@@ -43,12 +43,9 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
 def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, Array]:
     """(3 owned,) consistent nodal forces of each unit load (docs/theory.md, Geometric stiffness); collective.
 
-    D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and
-    ω_y ω_x together), and unit forces and moments at interfaces.
-
-    Args:
-        model: of the solid.
-        interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
+    D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and ω_y
+    ω_x together), and unit forces and moments at interfaces, which the transpose of their mean motion B (6, 3 owned)
+    spreads.
     """
     wrenches = inertia_wrenches(model.x, np.ones(len(model.x)), np.zeros_like(model.x))
     fields = {name: np.ascontiguousarray(wrench[:, :3]) for name, wrench in wrenches.items()}
@@ -60,12 +57,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, 
 
 
 def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[str, Array]:
-    """(3 owned,) displacements under each unit load, the body held by its reference condition; collective.
-
-    Args:
-        flexibility: of the held body.
-        loads: as `unit_loads` finds them.
-    """
+    """(3 owned,) displacements under each of the `unit_loads`, the body held by its reference condition; collective."""
     model = flexibility.model
     forces = np.stack(list(loads.values()), axis=1)
     displacements = flexibility @ forces
@@ -75,13 +67,7 @@ def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[
 
 
 def prestressed(model: SolidModel, modes: Array, shapes: Mapping[str, Array]) -> dict[str, Array]:
-    """(n, n) geometric stiffness by unit load; collective.
-
-    Args:
-        model: of the solid.
-        modes: (3 owned, n).
-        shapes: as `static_shapes` finds them.
-    """
+    """(n, n) geometric stiffness by unit load of `modes` (3 owned, n), by its `static_shapes`; collective."""
     displacements = np.stack(list(shapes.values()), axis=1)
     matrices = geometric_stiffness(model, model.with_ghosts(modes), model.with_ghosts(displacements))
     return dict(zip(shapes, matrices, strict=True))

@@ -74,11 +74,9 @@ def solid_modal_body(
 ) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; collective over `comm`, the same on all its processes.
 
-    A mesh kept from an earlier run is used unless `remesh`. The hashes are left empty.
-
-    Raises:
-        InputError: the part cannot be meshed, a face is missing, or more modes are asked for than the mesh has.
-        SolveError: the stiffness cannot be factorised, or the eigensolver did not converge.
+    A mesh kept from an earlier run is used unless `remesh`. The hashes are left empty. Raises `InputError` where the
+    part cannot be meshed, a face is missing, or more modes are asked for than the mesh has; `SolveError` where the
+    stiffness cannot be factorised, or the eigensolver did not converge.
     """
     outlines = link.surface_patch.outlines(link.geometry.length) if link.surface_patch else None
     solid = solid_mesh(link.geometry, link.mesh, link.interface, outlines, path, comm, progress, remesh=remesh)

@@ -34,11 +34,8 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     """The modes that `link.modes` asks for; collective.
 
     The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
-    share of wanted ones so far.
-
-    Raises:
-        InputError: more are asked for than the mesh has, or than can be found in reasonable time.
-        SolveError: modes are lost in round-off.
+    share of wanted ones so far. Raises `InputError` for more than the mesh has, or than can be found in reasonable
+    time; `SolveError` where modes are lost in round-off.
     """
     family, model = "all" if link.modes.family == "all" else link.families, flexibility.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1

@@ -128,12 +128,8 @@ def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Ar
     """(l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
 
     Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
-    Procedures, §6.2.3): positive where tension stiffens.
-
-    Args:
-        model: of the solid.
-        modes: (3 (owned + ghosts), n) Φ.
-        prestress: (3 (owned + ghosts), l) displacements that cause the stresses.
+    Procedures, §6.2.3): positive where tension stiffens. `modes` (3 (owned + ghosts), n) are Φ, `prestress` (3 (owned +
+    ghosts), l) the displacements that cause the stresses.
     """
     n, loads = modes.shape[1], prestress.shape[1]
     total = np.zeros((loads, n * n))

@@ -33,11 +33,7 @@ NEWTON_STEPS = 10
 def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
     """(q, 6, n) strains ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes at points of cells.
 
-    Args:
-        space: vector Lagrange.
-        cells: (q,) cells of this process.
-        X: (q, 3) reference coordinates in them.
-        modes: (dofs, n) degrees of freedom of each mode on this process, ghosts included.
+    `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (dofs, n) with ghosts.
     """
     element, nodes = lagrange_element(space), node_map(space)
     n = modes.shape[1]
@@ -62,15 +58,10 @@ def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
 
 
 def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers, Array]:
-    """All cells owned by this process that contain each of `points` (k, 3), in m.
+    """All cells owned by this process that contain each of `points` (k, 3), m.
 
-    Args:
-        mesh: any geometry; curved cells are inverted by Newton's method.
-        points: in m.
-        slack: how far outside its cell a point may be, in reference coordinates (fractions of the cell's size).
-
-    Returns:
-        For each hit the point (h,), the cell (h,) and the reference coordinates (h, 3).
+    For each hit the point (h,), the cell (h,) and the reference coordinates X (h, 3); `slack` is how far outside its
+    cell a point may be, in X. Curved cells are inverted by Newton's method.
     """
     owned = mesh.topology.index_map(3).size_local
     corners = mesh.geometry.x[geometry_nodes(mesh)]
@@ -118,13 +109,7 @@ def recovered_stresses(
 ) -> dict[str, Any]:
     """What a link file asks for: `stress` … `surface_static` of its `ModalBody`.
 
-    Args:
-        link: for the points.
-        model: of the solid.
-        modes: (3 (owned + ghosts), n).
-        shapes: (3 owned,) static displacements by unit load.
-        surface: (p, 3) points of the surface.
-        path: of the link file, for errors.
+    `modes` (3 (owned + ghosts), n); `shapes` (3 owned,) static displacements by unit load; `surface` (p, 3) its points.
     """
     if not (link.stress.points or link.stress.surface):
         return {}
@@ -148,17 +133,10 @@ def _split(point: StressPoint, n: int) -> StressPoint:
 def point_stresses(
     space: FunctionSpace, C: Array, modes: Array, points: Mapping[str, tuple[float, float, float]], path: Path
 ) -> dict[str, StressPoint]:
-    """Modal stresses and strains at named points.
+    """Modal stresses and strains at named points, m.
 
-    Args:
-        space: vector Lagrange.
-        C: (6, 6), or (cells, 6, 6) for the cells of this process, as in `constitutive.stiffness`, in Pa.
-        modes: (dofs, n) degrees of freedom of each mode on this process, ghosts included.
-        points: position of each, in m.
-        path: of the link file, for the error.
-
-    Raises:
-        InputError: a point is outside the part; on every process.
+    C (6, 6), or (cells, 6, 6) for the cells of this process, in Pa, as in `constitutive.stiffness`; `modes` (dofs, n)
+    with ghosts. Raises `InputError` for a point outside the part, on every process.
     """
     positions = np.array(list(points.values()), dtype=np.float64).reshape(-1, 3)
     count, strain, stress = _averages(space, C, modes, positions)
@@ -175,8 +153,7 @@ def point_stresses(
 def surface_stresses(space: FunctionSpace, C: Array, modes: Array, points: Array) -> Array:
     """(p, 6, n) modal stresses at `points` (p, 3), the same on all processes: those of the picture mesh.
 
-    Raises:
-        ValueError: a point is not on the mesh.
+    Raises `ValueError` for a point that is not on the mesh.
     """
     count, _, stress = _averages(space, C, modes, points)
     if not np.all(count):

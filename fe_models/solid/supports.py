@@ -40,13 +40,8 @@ class RigidFace:
 class Flexibility:
     """Factorised once, applied often; see the module. Vectors hold this rank's own degrees of freedom.
 
-    Args:
-        model: free in space.
-        faces: rigid ones; may be none.
-        B: (6, 3 owned) rows of the mean supports; None where the rigid faces hold the body.
-
-    Raises:
-        SolveError: the supported stiffness is not positive definite.
+    `faces` are rigid ones; B (6, 3 owned) rows of the mean supports, None where the rigid faces hold the body. Raises
+    `SolveError` where the supported stiffness is not positive definite.
     """
 
     def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Array | None) -> None:

@@ -40,17 +40,9 @@ def outlined_patches(
 ) -> OutlinedPatches:
     """Modal forces of the patches of a link file; collective, the same on every process.
 
-    Args:
-        space: vector Lagrange.
-        facet_tags: of the mesh, with the tags in `faces`.
-        faces: tag of "patch/K/top" and "patch/K/bottom", K from 0, where the record has them.
-        record: of the link file.
-        length: of the link, m.
-        modes: (dofs, n) degrees of freedom of each mode on this process, ghosts included.
-        path: of the link file, for the error.
-
-    Raises:
-        SolveError: the facets of a patch do not fill its outline.
+    `faces` has the tags, among `facet_tags`, of "patch/K/top" and "patch/K/bottom", K from 0, where the record has
+    them; `length` (m) is that of the link, `modes` (dofs, n) with ghosts. Raises `SolveError` where the facets of a
+    patch do not fill its outline.
     """
     edges = record.edges(length)
     sides = ("top", "bottom") if record.faces == "both" else (record.faces,)

@@ -34,14 +34,9 @@ def without_their_turn(
 ) -> dict[str, Array]:
     """K (n, n) by unit load, for centers and rotation vectors of the interfaces; collective.
 
-    Args:
-        K: with what the mean motion of interfaces reads.
-        flexibility: of the held body.
-        loads: (3 owned,) nodal forces by unit load.
-        shapes: (3 owned,) displacements under them.
-        rows: B (6, 3 owned) of the mean motion of each interface, which spreads loads on it.
-        interfaces: what the modes do at each.
-        supports: components of the mean motion that are held, in the order of `flexibility.B`; none of rigid faces.
+    The given K has what the mean motion of interfaces reads. `loads` and `shapes` (3 owned,) are nodal forces and
+    displacements by unit load, `rows` B (6, 3 owned) the mean motion of each interface, which spreads loads on it.
+    `supports`: components of the mean motion that are held, in the order of `flexibility.B`; none of rigid faces.
     """
     names = list(K)
     f = np.stack([loads[name] for name in names], axis=1)

@@ -94,10 +94,8 @@ def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:
     """The columns qw, qx, qy, qz of a table as those of a rotation vector, and the reference that it turns.
 
     It is log(A A_refᵀ) about the middle of all orientations: splines of it have all the derivatives that they have of
-    numbers, where those of quaternions by pieces jump in angular velocity.
-
-    Raises:
-        InputError: a row is no unit quaternion, or orientations are too far apart for one rotation vector.
+    numbers, where those of quaternions by pieces jump in angular velocity. Raises `InputError` for a row that is no
+    unit quaternion, and for orientations too far apart for one rotation vector.
     """
     columns = [table.columns.index(name) for name in QUATERNION]
     e = table.values[:, columns]

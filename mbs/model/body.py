@@ -151,9 +151,7 @@ def transformed(body: Body, T: Array, stiffness: Array) -> Body:
 def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> Body:
     """All modes of a modal body; `stiffened`: with geometric stiffening; `is_planar`: for motion in z = 0 alone.
 
-    Raises:
-        InputError: the file of a beam does not say what inertia it has about its own axis; it has to be stiffened, and
-            the file does not say how.
+    Raises `InputError` where the file of a beam lacks the inertia about its own axis, or how a body to be stiffened is.
     """
     stiffening = stiffenings.from_modal_body(body, is_planar=is_planar) if stiffened else None
     if stiffened and stiffening is None:

@@ -115,12 +115,8 @@ def mode_acceleration(
 ) -> Recovery:
     """With the static stresses of loads, as far as the file has them.
 
-    Args:
-        body: as its file has it.
-        T: (n, m) what makes its modal coordinates of those in the equations.
-        p: (outputs, n) modal coordinates of the file.
-        loads: sizes (outputs,) of unit loads by name.
-        sections: what layers on the link do to its sections.
+    `body` is as its file has it, p (outputs, n) in its modal coordinates, which are T (n, m) times those in the
+    equations; `loads` are sizes (outputs,) of unit loads by name.
     """
     known = [name for name in body.stress_loads if name in loads]
     if not known:

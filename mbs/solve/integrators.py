@@ -101,13 +101,9 @@ def faster_of(
 ) -> Choice:
     """DOP853 or Radau IIA, whichever is expected to be faster, with the other to take over where it is not.
 
-    Args:
-        frequency: (n,) rad/s, ascending, of what vibrates.
-        damping_ratio: (n,) of it.
-        excited: (n,) relative size with which each rings from the start on.
-        analysis: gives end and tolerance.
-        outputs: how many, none of which a step goes beyond.
-        cost: of a step of Radau IIA, in steps of DOP853.
+    `frequency` (n,) rad/s, ascending, and `damping_ratio` (n,) of what vibrates; `excited` (n,) the relative size with
+    which each rings from the start on. No step goes beyond one of the `outputs`; `cost` of a step of Radau, in
+    DOP853's.
     """
     top, scale = frequency[-1], analysis.tolerance / 1e-4
     phase = partial(_ringing_phase, frequency, damping_ratio, excited, analysis.end)

@@ -32,11 +32,8 @@ def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
 def unit_damping(frequency: Array, shape: Array) -> Array:
     """D (modes of all bodies)², 1/s, under which all vibrations have the damping ratio 1: ΦᵀDΦ = diag(2ω).
 
-    Rigid motion is free of it; motion of p that the joints do not allow, too.
-
-    Args:
-        frequency: ω (n,) rad/s of the vibrations.
-        shape: Φ (modes of all bodies, n), the rows p of their M-orthonormal shapes, body by body.
+    Rigid motion is free of it; motion of p that the joints do not allow, too. `frequency` ω (n,) rad/s; `shape` Φ
+    (modes of all bodies, n), the rows p of M-orthonormal shapes, body by body.
     """
     inverse = np.linalg.pinv(shape)
     return as_floats(inverse.T @ (2 * frequency[:, None] * inverse))
