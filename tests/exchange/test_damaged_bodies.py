@@ -29,10 +29,12 @@ def given():
 CHANGES = {
     "size": (".SID_FEM", r"(phi\n(?:.*\n){2}\s*ncol\s*=)\s*\d+", r"\g<1> 1", r"phi: expected a matrix of 3 × \d+"),
     "symmetry": (".SID_FEM", r"(phi\n(?:.*\n){5}\s*structure\s*=)\s*\d+", r"\g<1> 2", r"phi: expected a square matrix"),
-    "index": (".SID_FEM", r"(mdCM\n(?:.*\n)*?\s*m0\( 1,) 1", r"\g<1> ", r"mdCM: expected whole numbers in indices"),
     "interface": (".SID_FEM", r"tip=\d+", "tip=99", 'expected NAME=NUMBER of nodes in the file, found "tip=99"'),
-    "no number": (".fem", r"tip=\d+", "tip", 'interfaces: expected NAME=NUMBER of nodes in the file, found "tip"'),
-    "record": (".fem", r"\*\* RECORD GROUP 5", "**", r"expected a \.fem file of MBDyn with records 1, 2 and 5 to 10"),
+    "end": (".SID_FEM", " end part", "", "expected `end part`"),
+    "object": (".SID_FEM", r"(?s)\n +Oe\n.*?end Oe", "", "expected the object Oe in modal, found none"),
+    "no stiffness": (".SID_FEM", r"(?s)Ke\n(.*?)m0\(.*?end Ke", r"Ke\n\1end Ke", "a positive stiffness"),
+    "cut": (".fem", r"(?s)\*\* RECORD GROUP 14.*", "", "which couple modes with rigid motion"),
+    "numbers": (".fem", r"\*\* RECORD GROUP 10", "1\n** RECORD GROUP 10", r"record 9: expected \d+"),
     "huge": (".fem", r"(RECORD GROUP 14.*\n)\S+", r"\g<1>1e200", "numbers of a body, found ones that are too large"),
 }  # fmt: skip
 
@@ -49,7 +51,17 @@ def test_messages(given, tmp_path, suffix, old, new, told):
     assert not (tmp_path / "arm.h5").exists()
 
 
-DATASETS = ("mass", "second_moment", "invariants/I_bar", "interfaces/tip/rotation", "stations/position", "mesh/points")
+DATASETS = (
+    "mass",
+    "second_moment",
+    "invariants/I_bar",
+    "interfaces/tip/rotation",
+    "stations/position",
+    "mesh/points",
+    "modes/frequency",
+    "geometric_stiffness/omega_zz",
+    "length",
+)
 
 
 @pytest.mark.parametrize("dataset", DATASETS)

@@ -10,26 +10,10 @@ from ffrobot import FfrobotError
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 
 TEXT = (Path(__file__).parent / "robots" / "z1.urdf").read_text(encoding="utf-8")
-VALUES = [
-    *(
-        "",
-        " ",
-        "nan",
-        "inf",
-        "1e400",
-        "-1",
-        "0",
-        "0 0 0",
-        "1 2",
-        "1 2 3 4",
-        "1e-320",
-        "1e300 0 0",
-        "0x10",
-        "1_0",
-        "-0.0",
-    ),
-    *("x", "é/\n.", "base", "ground", "origin", "fixed", "floating", "true"),
-]
+VALUES = (
+    "", " ", "nan", "inf", "1e400", "-1", "0", "0 0 0", "1 2", "1 2 3 4", "1e-320", "1e300 0 0", "1e31", "-1e29",
+    "18446744073709551616", "0x10", "1_0", "-0.0", "x", "é/\n.", "base", "ground", "origin", "fixed", "true",
+)  # fmt: skip
 CHANGES = 400
 
 

@@ -1,12 +1,9 @@
 """Residual attachment modes: closed forms of the flexibility at interfaces, identities, and what files say of them."""
 
-import h5py
 import numpy as np
 import pytest
 
-from ffrobot.common.checksum import seal
 from ffrobot.fe_models.link import make_link
-from ffrobot.fe_models.modal_body_file import read_modal_body
 
 E, I_Z, L = 2.068427e11, 0.025 * 0.015**3 / 12, 1.0
 ATTACHED = {"attachment_modes = false\n": ""}  # as links are unless they say otherwise
@@ -72,10 +69,6 @@ def test_eigenmodes_stay_as_they_are(link_file, modal_body):
     assert body.residual.tolist() == [0] * n + [1] * 2
 
 
-def test_all_eigenmodes_of_the_mesh_leave_nothing_over(modal_body):
-    assert modal_body(count=40).mode_count == 40
-
-
 def test_near_interfaces(modal_body):
     """Seven interfaces, five of them at 5 mm: as many shapes as say something, and the flexibility of each is there."""
     body = modal_body(more=INTERFACES)
@@ -87,13 +80,6 @@ def test_near_interfaces(modal_body):
         assert found[5, 5] == pytest.approx((a**3 + (L - a) ** 3) / (3 * E * I_Z * L**2), rel=1e-5)
     assert 4 <= body.mode_count - body.eigenmode_count <= 12
     check_identities(body)
-
-
-def test_interface_twice_at_one_place(modal_body):
-    more = '[[interface]]\nname = "one"\nposition = 0.5\n[[interface]]\nname = "two"\nposition = 0.5\n'
-    body = modal_body(more=more)
-    assert body.mode_count == modal_body(more='[[interface]]\nname = "one"\nposition = 0.5\n').mode_count
-    assert np.array_equal(body.interfaces["one"].translation, body.interfaces["two"].translation)
 
 
 def test_all_families(modal_body):
@@ -108,15 +94,6 @@ def test_all_families(modal_body):
     assert found[3] == pytest.approx(L / (G * J), rel=5e-3)
     added = np.array(body.family)[body.residual == 1].tolist()
     assert sorted(added) == ["axial", *["in-plane-bending"] * 2, *["out-of-plane-bending"] * 2, *["torsion"] * 2]
-    check_identities(body)
-
-
-def test_list_of_families_and_default_count(modal_body):
-    listed = {'"in-plane-bending"': '["axial", "in-plane-bending"]', "count = 10": ""}
-    body = modal_body(listed, condition="cantilever")
-    eigenmodes = np.array(body.family)[body.residual == 0].tolist()
-    assert (eigenmodes.count("in-plane-bending"), eigenmodes.count("axial"), len(eigenmodes)) == (6, 1, 7)
-    assert flexibility(body, "tip")[0, 0] == pytest.approx(L / (E * 0.015 * 0.025), rel=1e-9)
     check_identities(body)
 
 
@@ -146,12 +123,3 @@ def test_damping(modal_body):
     rayleigh = modal_body(more="[damping]\nrayleigh = [1.0, 1e-5]\n", count=3)
     omega = 2 * np.pi * rayleigh.frequency
     assert rayleigh.damping_ratio == pytest.approx(0.5 / omega + 0.5e-5 * omega)
-
-
-def test_file_keeps_the_marks_and_old_files_have_none(link_file):
-    outcome = make_link(link_file(replace=ATTACHED))
-    assert read_modal_body(outcome.path).residual.tolist() == [0] * 10 + [1] * 2
-    with h5py.File(outcome.path, "r+") as file:
-        del file["modes/residual"]
-    seal(outcome.path)
-    assert not read_modal_body(outcome.path).residual.any()

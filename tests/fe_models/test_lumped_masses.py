@@ -163,18 +163,3 @@ def test_hub_on_the_root_of_a_cantilever_only_adds_mass(body):
     assert loaded.second_moment[0, 0] + loaded.second_moment[1, 1] == pytest.approx(
         bare.second_moment[0, 0] + bare.second_moment[1, 1] + 0.1
     )
-
-
-def test_all_families_and_theories_keep_the_identities(body):
-    """`ModalBody` checks m_ff = I and S̄_11 + S̄_22 + S̄_33 = m_ff to 1e-8 when it is made."""
-    more = '[[interface]]\nname = "tip"\nmass = 0.5\ninertia = [0.002, 0.003, 0.004]\n'
-    for theory in ("euler-bernoulli", "timoshenko"):
-        loaded = body(family="all", count=12, more=f'[model]\ntheory = "{theory}"\n{more}')
-        assert loaded.mass == pytest.approx(RHO_A * L + 0.5)
-        assert {"torsion", "out-of-plane-bending"} <= set(loaded.family)
-
-
-def test_massless_interface_changes_nothing(body):
-    bare, more = body(count=3), body(count=3, more=attached("grip", position=0.525))
-    np.testing.assert_array_equal(bare.frequency, more.frequency)
-    assert bare.mass == pytest.approx(more.mass, rel=1e-14)

@@ -1,7 +1,5 @@
 """The modal body by itself: immutable, checked, interpolated; no finite element library is involved."""
 
-import subprocess
-import sys
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
@@ -84,13 +82,6 @@ def test_hermite_interpolation_needs_no_smoothness_between_stations(body):
         np.testing.assert_array_equal(changed.interpolate(x).rotation[1:], body.interpolate(x).rotation[1:])
 
 
-@pytest.mark.parametrize("count", [2, 3])
-def test_few_stations(body, count):
-    stations = body.stations
-    few = Stations(*(getattr(stations, name)[:count] for name in ("position", "translation", "rotation", "height")))
-    assert np.all(np.isfinite(replace(body, stations=few, length=0.2).interpolate(0.1).translation))
-
-
 @pytest.mark.parametrize("x", [-0.01, 1.41, np.nan])
 def test_outside_the_body(body, x):
     with pytest.raises(InputError, match=r"made manually: x: expected 0 … 1\.4 m"):
@@ -109,31 +100,6 @@ def test_immutable(body):
         body.mass = 1.0
     with pytest.raises(TypeError):
         body.interfaces["grip"] = body.interfaces["tip"]
-
-
-def test_without_modes(body):
-    """A rigid link is a modal body with n = 0."""
-    nothing = np.zeros((0, 0))
-    at = {"translation": np.zeros((3, 0)), "rotation": np.zeros((3, 0))}
-    stations = replace(body.stations, translation=np.zeros((7, 3, 0)), rotation=np.zeros((7, 3, 0)))
-    rigid = replace(
-        body,
-        frequency=np.zeros(0),
-        stiffness=nothing,
-        modal_mass=nothing,
-        damping_ratio=np.zeros(0),
-        family=(),
-        residual=np.zeros(0, dtype=int),
-        S_bar=np.zeros((3, 0)),
-        I_bar=np.zeros((3, 3, 0)),
-        S_bar_kl=np.zeros((3, 3, 0, 0)),
-        interfaces={name: Interface(interface.position, **at) for name, interface in body.interfaces.items()},
-        stations=stations,
-        mesh=replace(body.mesh, mode_shapes=np.zeros((7, 3, 0))),
-        geometric_stiffness={},
-    )
-    assert rigid.mode_count == 0
-    assert rigid.interpolate(0.3).translation.shape == (3, 0)
 
 
 WRONG = {
@@ -176,9 +142,3 @@ def test_wrong_stations_are_refused(body, changes, message):
     changed = {name: change(getattr(body.stations, name)) for name, change in changes.items()}
     with pytest.raises(InputError, match=message):
         replace(body, stations=replace(body.stations, **changed))
-
-
-def test_import_needs_numpy_only():
-    heavy = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl", "h5py", "scipy", "pydantic")
-    code = f"import sys, ffrobot.fe_models.modal_body; print([m for m in {heavy} if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
