@@ -1,13 +1,8 @@
 """Where the nodes of a beam lie."""
 
 import numpy as np
-import pytest
 
 from ffrobot.mesh.structured import graded_nodes, with_points
-
-
-def test_a_uniform_mesh_is_uniform():
-    np.testing.assert_allclose(graded_nodes([0.0, 2.0], 7), np.linspace(0, 2, 8), atol=1e-15)
 
 
 def test_steps_are_nodes_and_a_uniform_mesh_that_meets_them_is_kept():
@@ -19,11 +14,6 @@ def test_steps_are_nodes_and_a_uniform_mesh_that_meets_them_is_kept():
 def test_the_longest_element_is_as_short_as_possible():
     nodes = graded_nodes([0.0, 0.1, 1.0], 4)
     np.testing.assert_allclose(nodes, [0.0, 0.1, 0.4, 0.7, 1.0])
-
-
-def test_fewer_elements_than_segments_is_refused():
-    with pytest.raises(ValueError, match="3 segments need at least 3 elements, found 2"):
-        graded_nodes([0.0, 0.3, 0.4, 1.0], 2)
 
 
 def test_points_are_added_once():

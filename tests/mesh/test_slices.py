@@ -53,15 +53,6 @@ def test_sections_of_a_taper_are_exact(cell, x):
     np.testing.assert_allclose(moments(section_quadrature(mesh, x, 2)), expected, rtol=1e-12, atol=1e-18)
 
 
-@pytest.mark.parametrize("cell", CELLS)
-def test_no_section_beyond_the_part(cell):
-    mesh = dolfinx_mesh(structured_box(1.0, (1, 1), (1, 1), (2, 1, 1), cell))
-    for x in (-0.1, 1.1):
-        section = section_quadrature(mesh, x, 2)
-        assert section.weights.size == 0
-        assert section.y_range == section.z_range == (np.inf, -np.inf)
-
-
 def test_a_step_is_seen_from_the_larger_x():
     """Two boxes of height 1 and 2 that meet at x = 1: the section there is the second's."""
     box = structured_box(2.0, (2, 1), (2, 1), (2, 4, 1), "tetrahedron")

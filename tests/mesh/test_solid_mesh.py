@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from solid_parts import rectangle
 
-from ffrobot.common.errors import InputError
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
 from ffrobot.mesh.records import CircleSection, Outlines, PlaceRecord, SolidMeshRecord
 from ffrobot.mesh.solid_mesh import distributed, solid_mesh
@@ -79,9 +77,3 @@ def test_surface_points_are_where_their_cells_say(solid):
     values = coordinate_element(body.mesh).tabulate(0, surface.X)[0, ..., 0]
     found = np.einsum("kv,kvi->ki", values, nodes)
     np.testing.assert_allclose(found, surface.points[surface.rows], atol=1e-14)
-
-
-def test_errors_reach_the_caller(solid):
-    lost = PlaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
-    with pytest.raises(InputError, match=r"link.toml: interface.position of a"):
-        solid_mesh(solid(section=rectangle()), SolidMeshRecord(), (lost,), None, LINK)
