@@ -32,12 +32,6 @@ def arm(body, path, joint=None, end=2.0):
     )
 
 
-def test_the_fastest_motion_is_sought_with_given_numbers_of_modes():
-    scene = arm(BEAM | {"modes": "auto"}, {"duration": 0.5, "fastest": True}, {"moment_limit": 5.0})
-    with pytest.raises(InputError, match='found modes = "auto": solve once without fastest'):
-        ffrobot.solve(scene)
-
-
 def test_limits_of_the_path_hold_for_the_fastest_motion():
     """Motors that are strong enough leave the path as it is."""
     path = {"speed": 1.0, "acceleration": 5.0, "fastest": True}
@@ -72,11 +66,6 @@ def test_least_stretch_is_found_from_both_sides(limit):
     assert len(tried) < 22
 
 
-def test_least_stretch_keeps_to_its_bounds():
-    assert least_stretch(lambda stretch: True, 0.5, 3.0) == 0.5
-    assert least_stretch(lambda stretch: False, 0.5, 3.0) is None
-
-
 def residual(results):
     """Largest distance of the tip from where the arm without vibration would have it, after the path, m."""
     over = results["inverse/time"] > results.attributes("inverse/trajectories/swing")["end"]
@@ -101,9 +90,3 @@ def test_shapers_know_the_robot_and_leave_less_vibration():
     assert left["zv"] < 0.05 * left["none"]  # of higher modes, and of what the motion itself does to the frequency
     assert left["zvd"] < 0.05 * left["none"]
     assert left["ei"] < 0.1 * left["none"]
-
-
-def test_shaper_of_more_modes_than_there_are_is_refused():
-    path = {"duration": 0.5, "shaper": {"kind": "zv", "modes": 4}}
-    with pytest.raises(InputError, match=r"shaper\.modes: expected at most 3"):
-        ffrobot.solve(arm(BEAM, path))

@@ -22,13 +22,6 @@ def test_replays_are_told_by_their_distance_from_the_path(two_link, replay):
     assert f"{replay}: {said.group()}" in re.sub(r"\s+", " ", two_link.stdout)
 
 
-def test_linear_and_static_analyses_are_not(solved):
-    results = ffrobot.Results(solved("two_link_linear").folder / "scene.results.h5")
-    for name in results.analyses:
-        if results.attributes(name)["kind"] != "forward":
-            assert "off its path" not in results.verdict[name].answer
-
-
 @pytest.mark.parametrize(
     ("motor", "message"),
     [(None, r"motors that fit the mechanism \(2 of them\) for \"joints\", found 1"), (False, "none")],

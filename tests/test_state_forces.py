@@ -144,19 +144,6 @@ def test_what_functions_return_in_3d():
         in_3d(None, FREE, load=beside)
 
 
-@pytest.mark.parametrize(
-    ("force", "complaint"),
-    [
-        ("3*t", "load no. 1: force: expected a function of t, position and velocity, in scenes made in Python, found "),
-        (SimpleNamespace(address="here"), "expected a function of t, position and velocity, found "),
-    ],
-)
-def test_what_is_no_function(force, complaint):
-    with pytest.raises(ffrobot.InputError) as error:
-        scene(force, joint=HINGE, analysis=FREE)
-    assert complaint in str(error.value)
-
-
 def test_wrong_returns_and_errors_come_through():
     with pytest.raises(ffrobot.InputError, match=r"<lambda>: expected a force \(x, y\), or \(x, y, moment\), found"):
         ffrobot.solve(scene(lambda t, x, v: 1.0, joint=HINGE, analysis=FREE))

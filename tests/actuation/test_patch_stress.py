@@ -37,12 +37,3 @@ def test_modes_alone_are_a_third_off():
     body, p = results.modal_body("strip"), results.modal("bent", "strip")[0]
     alone = np.array([body.stress[f"p{k}"].stress[0] @ p for k in range(len(PLACES))])
     assert np.abs(alone - stress(results)).max() > 0.3 * np.abs(stress(results)).max()
-
-
-def test_results_say_what_layers_do():
-    results = solved(0.004, "both", MODES, places=PLACES)
-    sections = results.stress_recovery("bent", "strip").sections
-    assert sections.moment.shape == (1, len(sections.x))
-    assert np.all((sections.x > START) & (sections.x < END))
-    bare = solved(0.004, "both", MODES, places=PLACES, structural=False)
-    assert bare.stress_recovery("bent", "strip").sections is None

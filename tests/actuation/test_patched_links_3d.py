@@ -149,32 +149,12 @@ def test_fibres_along_the_axis_bend_as_plain_ceramic_does():
     np.testing.assert_allclose(tip(body, [fibres])[0], tip(body, [plain])[0], rtol=1e-9, atol=1e-15)
 
 
-def test_layouts_side_by_side_are_one_layout():
-    body = link(SQUAT, 8)
-    one = layout(centers=[0.1, 0.22, 0.34], length=0.06, face="+y")
-    parts = [layout(name=f"part{k}", centers=[x], length=0.06, face="+y") for k, x in enumerate((0.1, 0.22, 0.34))]
-    V = [30.0, -70.0, 50.0]
-    for found, expected in zip(tip(body, parts, V), tip(body, [one], V), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-13)
-
-
 def test_both_faces_driven_apart_are_the_layout_on_both():
     """Two layouts on the same stretch of the link, a little longer one below: they share it, and stretch cancels."""
     body = link(SQUAT, 8)
     both = tip(body, [layout(face="both")])
     apart = tip(body, [layout(name="above", face="+y"), layout(name="below", face="-y")])
     np.testing.assert_allclose(apart[0], both[0], atol=1e-9 * np.abs(both[0]).max())
-
-
-def test_overlap_of_layouts_is_shared():
-    """Of patches that overlap in part each stretch has its own composite section: curvatures add up to the tip."""
-    h, b = 0.006, 0.014
-    body = link(rectangle(h, b), 8)
-    long, short = layout(name="long", face="both"), layout(name="short", bends="out-of-plane", face="both",
-                                                           centers=[0.16], length=0.08)  # fmt: skip
-    together = tip(body, [long, short])[0]
-    alone = tip(body, [long])[0] + tip(body, [short])[0]  # planes do not feel each other
-    np.testing.assert_allclose(together, alone, rtol=1e-7, atol=1e-12)
 
 
 def test_round_links_do_not_mix_their_planes():
@@ -236,14 +216,6 @@ def test_voltages_of_two_planes_do_not_disturb_each_other():
 def test_layouts_that_do_nothing_or_contradict_themselves(keys, message):
     with pytest.raises(InputError, match=message):
         layout(**keys)
-
-
-def test_isotropic_layers_twist_at_no_angle():
-    """Alike along and across, moduli of an isotropic layer: no shear under a voltage at any angle."""
-    alike = {"d33": 110e-12, "d31": 110e-12, "modulus": 60e9, "modulus_across": 60e9, "poissons_ratio": 0.3}
-    for angle in np.linspace(0.1, 3.0, 7):
-        with pytest.raises(InputError, match="expected fibers at an angle that shear under a voltage"):
-            layout(bends="twist", fibre_angle=float(angle), **alike, shear_modulus=60e9 / 2.6)
 
 
 def test_patches_that_do_not_fit_their_link():

@@ -8,7 +8,6 @@ from scipy.linalg import solve_continuous_lyapunov
 from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.placement import PatchableLink, locked_modes, place
 from ffrobot.actuation.control.records import Placement
-from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.solve.linearisation import LinearEquations
 from ffrobot.scene.load import make_scene
@@ -103,12 +102,3 @@ def test_voltages_over_a_path(arm):
     two = placed(arm, 2, F_p, criterion="voltage", modes=1)
     assert two.best.centers == pytest.approx([0.025, 0.075])
     assert two.largest_voltage[0] < one.largest_voltage[0]
-
-
-def test_what_cannot_be_placed_is_refused(arm):
-    with pytest.raises(InputError, match="expected patches that fit side by side"):
-        placed(arm, 21)
-    with pytest.raises(InputError, match=r"placement.modes: expected at most 6, found 7"):
-        placed(arm, 2, modes=7)
-    with pytest.raises(InputError, match=r"placement.modes: expected at most 2, found 3"):
-        placed(arm, 2, np.zeros((3, 6)), criterion="voltage", modes=3)
