@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from forked_commands import Commands
+from forked_commands import LIMIT, Commands
 
 from ffrobot.common.parallel import environment_without_mpi
 from ffrobot.mesh import form_cache
@@ -33,7 +33,8 @@ OTHER_COMMAND = os.environ.get("FFROBOT_COMMAND")  # an older version's, to see 
 class Command:
     """Runs `ffrobot` in a process of its own; links are cached in a folder of the test run, empty at its start.
 
-    The process is a fork of one that has loaded the program. A test of how a process starts or ends uses `path`.
+    The process is a fork of one that has loaded the program. Where there are options of `subprocess.run`, or variables
+    of the environment beside its own, it is one that starts anew. A test of how a process ends uses `path`.
     """
 
     cache: Path
@@ -45,14 +46,14 @@ class Command:
         """Without what MPI leaves behind in a process that has loaded dolfinx: a nested mpirun trips over it."""
         return environment_without_mpi() | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
 
-    def __call__(self, *arguments, cwd=None, timeout=120, **options):
+    def __call__(self, *arguments, cwd=None, timeout=LIMIT, env=None, **options):
         arguments = [str(argument) for argument in arguments]
         if arguments and arguments[0] in STUDIES and "-j" not in arguments:  # tests go side by side already
             arguments += ["-j", "1"]
-        if not options and OTHER_COMMAND is None:
+        if not options and env is None and OTHER_COMMAND is None:
             return self.forks.run(arguments, self.environment, cwd, timeout)
-        options |= {"env": self.environment, "cwd": cwd, "timeout": timeout, "capture_output": True, "text": True}
-        return subprocess.run([self.path, *arguments], **options)
+        options |= {"env": self.environment | (env or {}), "cwd": cwd, "timeout": timeout}
+        return subprocess.run([self.path, *arguments], capture_output=True, text=True, **options)
 
     def ok(self, *arguments, **options):
         """As called; a command that does not end with 0 fails the test with what it wrote to stderr."""
@@ -197,35 +198,35 @@ def _as_it_is(text):
 
 @pytest.fixture(scope="session")
 def solved(ffrobot, shared_folder, tmp_path_factory):
-    """Copy a case, edit the text of one of its scenes and of its link files, run it; within `timeout` (s).
+    """Copy a case, edit the text of one of its scenes and of its link files, run it.
 
     A case as it is runs once for all processes of the test session, in a folder that its tests share.
     """
     shared = shared_folder / "solved"
     shared.mkdir(exist_ok=True)
 
-    def solve(name, edit=_as_it_is, edit_link=_as_it_is, timeout=120, scene="scene.toml"):
+    def solve(name, edit=_as_it_is, edit_link=_as_it_is, scene="scene.toml"):
         if (edit, edit_link) != (_as_it_is, _as_it_is):
-            return run(name, tmp_path_factory.mktemp("solved"), edit, edit_link, timeout, scene)
+            return run(name, tmp_path_factory.mktemp("solved"), edit, edit_link, scene)
         of = name if scene == "scene.toml" else f"{name} {scene}"
         with (shared / f"{of}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             told = shared / f"{of}.json"
             if not told.exists():
-                done = run(name, shared / f"of {of}", edit, edit_link, timeout, scene)
+                done = run(name, shared / f"of {of}", edit, edit_link, scene)
                 done.file.close()
                 told.write_text(json.dumps([str(done.folder), done.stdout, done.stderr]), encoding="utf-8")
         folder, stdout, stderr = json.loads(told.read_text(encoding="utf-8"))
         return SolvedCase(Path(folder), stdout, stderr, h5py.File(results_of(Path(folder, scene)), "r"))
 
-    def run(name, folder, edit, edit_link, timeout, scene):
+    def run(name, folder, edit, edit_link, scene):
         path = _copy(name, folder).with_name(scene)
         path.write_text(edit(path.read_text(encoding="utf-8")), encoding="utf-8")
         for body in tomllib.loads(path.read_text(encoding="utf-8"))["body"]:
             if "link" in body and edit_link is not _as_it_is:
                 link = path.parent / body["link"]
                 link.write_text(edit_link(link.read_text(encoding="utf-8")), encoding="utf-8")
-        done = ffrobot.ok("solve", scene, "--verbose", cwd=path.parent, timeout=timeout)
+        done = ffrobot.ok("solve", scene, "--verbose", cwd=path.parent)
         return SolvedCase(path.parent, done.stdout, done.stderr, h5py.File(results_of(path), "r"))
 
     def results_of(path):

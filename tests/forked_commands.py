@@ -26,6 +26,7 @@ LOADED = (
     "ffrobot.actuation.feasibility", "scipy.integrate", "scipy.signal", "email.message", "concurrent.futures.thread",
 )  # fmt: skip
 CASES = Path(__file__).parent.parent / "cases"
+LIMIT = 600  # s, of a command: also where much else runs
 BEFORE_LOADING = ("PYTHON", "OMP_", "OPENBLAS_", "LD_", "MPL")  # begin variables that are read as a process starts
 
 
@@ -39,7 +40,7 @@ class Commands:
         self._seconds = 0.0  # of its commands, which the system counts as its own when it ends
         self._environment = {}
 
-    def run(self, arguments, environment, folder, timeout, *, merged=False):
+    def run(self, arguments, environment, folder, timeout=LIMIT, *, merged=False):
         """As `subprocess.run(["ffrobot", *arguments], …)` with both streams captured as text, `merged` in stdout."""
         with tempfile.TemporaryDirectory(prefix="ffrobot-command-") as streams:
             out, err = (Path(streams, name) for name in ("out", "out" if merged else "err"))

@@ -211,16 +211,20 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
         ), 1e-7,
     ),
     "finer check": ("deflection", lambda: one_link({"kind": "pcid", "check": "finer"}), 1e-6),
+    "an implicit integrator": (
+        "deflection", lambda: pair("two_link", INVERSE | {"integrator": "radau", "tolerance": 1e-6, "end": 0.01}), 1e-7,
+    ),
     "motors alone": ("moment", lambda: one_link({"kind": "motors-only"}, count=0), 1e-5),
     "few modes": ("required_voltage", few_modes, 1e-7),
     "pieces under control": ("commands", pieces_under_control, 1e-4),
     "pieces": ("deflection", lambda: one_link({"kind": "pcid"}, {"pieces": 3}, stiffened=True), 1e-5),
 }  # fmt: skip
 COMPARED = (
-    "coordinate", "rate", "moment", "reaction", "force", "modal", "modal_force", "position", "deflection", "target",
-    "kinetic", "strain", "dissipated_power", "frequency", "motor_angle", "gear_moment", "required_voltage", "voltage",
-    "von_mises", "stress", "commands", "wanted", "tip_error", "centers", "reach", "value", "share", "candidates",
-    "candidate_reach", "largest_voltage", "residual", "edges", "moment_per_volt", "stiffness_ratio", "authority",
+    "coordinate", "rate", "moment", "reaction", "force", "modal", "modal_force", "position",
+    "deflection", "target", "kinetic", "strain", "dissipated_power", "frequency", "motor_angle", "gear_moment",
+    "required_voltage", "voltage", "von_mises", "stress", "commands", "wanted", "tip_error", "centers", "reach",
+    "value", "share", "candidates", "candidate_reach", "largest_voltage", "residual", "edges", "moment_per_volt",
+    "stiffness_ratio", "authority",
 )  # fmt: skip
 
 

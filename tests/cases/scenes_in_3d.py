@@ -15,10 +15,6 @@ CRANK = {
     "B": 0.43192099736991246,
     "guide": 0.233,
 }
-# What is compared
-TIGHT = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.01, "tolerance": 1e-10}
-STRAIGHT = {"name": "straight", "kind": "fcid", "shape": "zero", "end": 0.2, "output_step": 0.01}
-REST = {"name": "rest", "kind": "static"}
 
 
 def in_3d(tables):

@@ -34,13 +34,9 @@ def arm(case_copy, points=ARM_POINTS, more=AGAIN):
     return scene
 
 
-def test_forces_along_three_axes_carry_an_arm(case_copy, ffrobot, monkeypatch):
+def test_forces_along_three_axes_carry_an_arm(case_copy):
     """The path's force acts on the forearm's tip: three components there are that force, whatever others there are."""
-    import ffrobot as library
-
-    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
-    scene = arm(case_copy)
-    with library.solve(scene) as results:
+    with ffrobot.solve(arm(case_copy)) as results:
         group = "inverse/actuation_points/fore"
         assert list(results.attributes(group)["components"]) == ["x", "y", "y", "z", "z"]
         force, path = results[f"{group}/force"], results["inverse/trajectories/tool/force"]
@@ -71,13 +67,10 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("what", MISTAKES)
-def test_mistakes(case_copy, ffrobot, monkeypatch, what):
-    import ffrobot as library
-
-    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
+def test_mistakes(case_copy, what):
     keys, message = MISTAKES[what]
-    with pytest.raises(library.InputError, match=message):
-        library.solve(arm(case_copy, f"[[actuation_points]]\n{keys}\n"))
+    with pytest.raises(ffrobot.InputError, match=message):
+        ffrobot.solve(arm(case_copy, f"[[actuation_points]]\n{keys}\n"))
 
 
 def test_forces_that_turn_a_strip_and_hold_it_straight():

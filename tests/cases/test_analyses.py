@@ -106,27 +106,6 @@ def test_forward_motion_under_given_moments(tmp_path, ffrobot):
         assert "moment" not in group["joints/q1"]
 
 
-REPLAY = '\n[[analysis]]\nname = "again"\nkind = "forward"\nactuation = "inverse"\napply = "joints"\ntolerance = 1e-8\n'
-
-
-@pytest.mark.parametrize("name", ["slider_crank_3d", "arm5_tool_axis"])
-def test_forces_on_paths_bring_the_motion_again(name, tmp_path, ffrobot):
-    """Links that vibrate, a loop, a tool axis: the robot alone under the path's forces moves as on the path."""
-    scene = write_scene(name, tmp_path, more=REPLAY.replace('"joints"', '"trajectory"'))
-    with solved(ffrobot, scene) as file:
-        for body, group in file["inverse/bodies"].items():
-            for key in ("position", "modal"):
-                if group[key].size:
-                    close(file[f"again/bodies/{body}/{key}"], group[key][()], 1e-3 if key == "position" else 1e-12)
-        for joint, group in file["inverse/joints"].items():
-            if "coordinate" in group:
-                close(file[f"again/joints/{joint}/coordinate"], group["coordinate"][()], 0.1)
-            largest = np.abs(group["reaction"]).max()
-            np.testing.assert_allclose(file[f"again/joints/{joint}/reaction"], group["reaction"], atol=2e-5 * largest)
-        told = list(file["again"].attrs["warnings"])  # the reference has no stiffening
-        assert all("geometric stiffening is off" in text for text in told)
-
-
 def test_shape_that_is_given(tmp_path, ffrobot):
     """p as asked for; what holds it is what the equations of one mode say where nothing else moves."""
     given = 'kind = "fcid"\nshape = "given"\nmodal = { fore = ["1e-3*sin(20*t)"] }'

@@ -121,7 +121,7 @@ def test_lateral_buckling_of_a_solid():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("newtons", "third_order"), [(4.9, 1e-3), (15.0, 3e-3)])
+@pytest.mark.parametrize(("newtons", "third_order"), [pytest.param(4.9, 1e-3, marks=pytest.mark.nightly), (15.0, 3e-3)])
 def test_a_strip_let_go(tmp_path, newtons, third_order):
     """Straight, with a weight beside its axis: against the same modes without expansion; energy to the tolerance.
 

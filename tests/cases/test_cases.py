@@ -2,108 +2,65 @@
 
 import numpy as np
 import pytest
-from checkpoints import check_column, check_table, peak, reference
+from checkpoints import check_column, reference
 
 from ffrobot import Results
 
 RELATIVE = 1e-6  # of each quantity's peak
-ARM_RUNS = [("line", "static"), ("line", "undeformed"), ("circle", "static"), ("circle", "undeformed")]
-ARM_LENGTHS = (0.7, 0.6)  # m, upper.toml and fore.toml
+ARM_RUNS = [("line", "static"), ("circle", "static"), ("circle", "undeformed")]  # the other one: test_scenes.py
+ARM_LENGTHS = {"upper": 0.7, "fore": 0.6}  # m
 
 
-@pytest.fixture(scope="module")
-def arm_runs(case_copy_of_module, ffrobot):
-    """The arm on both paths from both starts, as its README says: by (path, start)."""
-    found = {}
-    for path, start in ARM_RUNS:
-        folder = case_copy_of_module("arm_3r").parent
-        scene = folder / {"line": "scene.toml", "circle": "circle.toml"}[path]
-        text = scene.read_text(encoding="utf-8")
+@pytest.fixture(scope="module", params=ARM_RUNS, ids="-".join)
+def arm(request, solved):
+    """The arm on both paths from both starts, as its README says: path, start, solved case."""
+    path, start = request.param
+
+    def edit(text):
         assert 'state = "static"' in text
-        scene.write_text(text.replace('state = "static"', f'state = "{start}"'), encoding="utf-8")
-        ffrobot.ok("solve", scene)
-        found[path, start] = Results(scene.with_suffix(".results.h5"))
-    yield found
-    for results in found.values():
-        results.close()
+        return text.replace('state = "static"', f'state = "{start}"')
+
+    return path, start, solved("arm_3r", edit, scene={"line": "scene.toml", "circle": "circle.toml"}[path])
 
 
-class Columns:
-    """What `check_column` asks of a solved case, of an open results file."""
-
-    def __init__(self, results):
-        self.file = {"inverse": results._file["inverse"]}
-
-    def rows(self, analysis, times):
-        output = self.file[analysis]["time"][()]
-        rows = np.abs(output[:, None] - times).argmin(axis=0)
-        np.testing.assert_allclose(output[rows], times, rtol=0, atol=1e-12)
-        return rows
-
-
-@pytest.mark.parametrize(("path", "start"), ARM_RUNS)
-def test_arm_at_the_checkpoints(arm_runs, path, start):
+def test_arm_at_the_checkpoints(arm):
+    path, start, case = arm
     table = reference(f"arm_3r/reference_{path}_{start}.csv")
-    times = np.array(table["t"], dtype=float)
-    for name in table:
-        if name != "t":
-            check_column(Columns(arm_runs[path, start]), "inverse", name, times, table[name], RELATIVE)
+    times = np.array(table.pop("t"), dtype=float)
+    for name, printed in table.items():
+        check_column(case, "inverse", name, times, printed, RELATIVE)
 
 
-def test_slider_crank_at_the_checkpoints(slider_crank_3d):
-    table = reference("slider_crank_3d/reference.csv")
-    for name in table:
-        if name != "t":
-            times = np.array(table["t"], dtype=float)
-            check_column(slider_crank_3d, "inverse", name, times, table[name], RELATIVE)
-
-
-def test_peaks_of_the_readme(arm_runs, slider_crank_3d):
-    measured = {}
-    for (path, start), results in arm_runs.items():
-        deflection = 1e3 * np.abs(results["inverse/points/fore.tip/deflection"]).max(axis=0)
-        moments = [np.abs(results[f"inverse/joints/{j}/moment"]).max() for j in ("waist", "shoulder", "elbow")]
-        force = np.linalg.norm(results["inverse/trajectories/tool/force"], axis=1).max()
-        measured[f"{path}, {start}"] = [*moments, force, *deflection[1:]]
-    check_table("arm_3r", "run", measured)
-    group = slider_crank_3d.file["inverse"]
-    y, z = 1e3 * np.abs(group["points/rod.mid/deflection"][:, 1:]).max(axis=0)
-    force, moment = peak(group["trajectories/slider/force"]), peak(group["joints/crank/moment"])
-    axial = peak(group["bodies/rod/modal_force"][:, -1])
-    check_table("slider_crank_3d", "largest", {"value": [force, moment, y, z, axial]})
-
-
-@pytest.mark.parametrize(("path", "start"), ARM_RUNS)
-def test_arm_is_on_its_path_and_in_one_piece(arm_runs, path, start):
+def test_arm_is_on_its_path_and_in_one_piece(arm):
     """From the outputs alone: the tip, the two joints, the lengths of links that hardly stretch."""
-    results = arm_runs[path, start]
-    at = {name: results[f"inverse/points/{name}/position"] for name in ("column.top", "upper.root", "upper.tip",
-                                                                       "fore.root", "fore.tip")}  # fmt: skip
-    np.testing.assert_allclose(at["fore.tip"], results["inverse/trajectories/tool/target"], rtol=0, atol=1e-9)
+    *_, case = arm
+    group = case.file["inverse"]
+    at = {name: group[f"points/{name}/position"][()] for name in ("column.top", "upper.root", "upper.tip", "fore.root",
+                                                                  "fore.tip")}  # fmt: skip
+    np.testing.assert_allclose(at["fore.tip"], group["trajectories/tool/target"], rtol=0, atol=1e-9)
     np.testing.assert_allclose(at["column.top"], at["upper.root"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(at["upper.tip"], at["fore.root"], rtol=0, atol=1e-12)
-    for (one, other), length in zip((("upper.root", "upper.tip"), ("fore.root", "fore.tip")), ARM_LENGTHS, strict=True):
-        deflection = results[f"inverse/points/{other}/deflection"]
-        chord = np.linalg.norm(at[other] - at[one], axis=1)
-        np.testing.assert_allclose(
-            chord, np.hypot(length + deflection[:, 0], np.hypot(*deflection[:, 1:].T)), atol=1e-12
-        )
+    for link, length in ARM_LENGTHS.items():
+        along, *across = group[f"points/{link}.tip/deflection"][()].T
+        chord = np.linalg.norm(at[f"{link}.tip"] - at[f"{link}.root"], axis=1)
+        np.testing.assert_allclose(chord, np.hypot(length + along, np.hypot(*across)), atol=1e-12)
 
 
-@pytest.mark.parametrize("path", ["line", "circle"])
-def test_work_of_force_and_moments_is_the_change_of_energy(arm_runs, path):
+@pytest.mark.parametrize("arm", ARM_RUNS[:2], indirect=True, ids="-".join)
+def test_work_of_force_and_moments_is_the_change_of_energy(arm):
     """Of the static start: power of the force on the tip, less what 0.5 % of damping takes, is the rate of the energy.
 
     The damping is that of the link files: 2 ζ ω ṗ² for each mode.
     """
-    results = arm_runs[path, "static"]
-    t, force = results["inverse/time"], results["inverse/trajectories/tool/force"]
-    target = results["inverse/trajectories/tool/target"]
-    power = np.sum(force * np.gradient(target, t, axis=0, edge_order=2), axis=1)
-    for name in ("upper", "fore"):
-        body, rates = results.modal_body(name), results[f"inverse/bodies/{name}/modal_velocity"]
-        power -= (rates**2) @ (2 * body.damping_ratio * 2 * np.pi * body.frequency)
-    energy = sum(results[f"inverse/energy/{kind}"] for kind in ("kinetic", "strain", "gravitational"))
+    *_, case = arm
+    with Results(case.file.filename) as results:
+        t, force = results["inverse/time"], results["inverse/trajectories/tool/force"]
+        target = results["inverse/trajectories/tool/target"]
+        power = np.sum(force * np.gradient(target, t, axis=0, edge_order=2), axis=1)
+        for name in ARM_LENGTHS:
+            body, rates = results.modal_body(name), results[f"inverse/bodies/{name}/modal_velocity"]
+            power -= (rates**2) @ (2 * body.damping_ratio * 2 * np.pi * body.frequency)
+        energy = sum(results[f"inverse/energy/{kind}"] for kind in ("kinetic", "strain", "gravitational"))
     work = np.append(0.0, np.cumsum(0.5 * np.diff(t) * (power[1:] + power[:-1])))
     change = energy - energy[0]
     # trapezia over steps of 5 ms under forces that ring at up to 15 Hz: (ω h)²/12 of each swing

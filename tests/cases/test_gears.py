@@ -10,7 +10,7 @@ from tables_3d import ORIGIN, revolute
 
 import ffrobot
 
-J, N, K, C = 3e-3, 9.0, 500.0, 0.4
+J, N, K = 3e-3, 9.0, 500.0
 GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
 RUN = {"name": "run", "kind": "forward", "end": 1.0, "output_step": 0.002, "tolerance": 1e-10, "integrator": "dop853"}
@@ -72,14 +72,14 @@ def test_linear_model_of_a_motor_behind_its_gear(turned):
     np.testing.assert_allclose(low, -1e6 / M.sum(), rtol=1e-4)
 
 
-def free_arm(**keys):
+def free_arm():
     """Two bodies on a free one, joints askew, rotors on links that turn: no axis is a principal one."""
     bodies = [
         rigid("base", [0.3, 0.2, 0.4], 2.0, [0.1, 0.0, 0.05]),
         rigid("a", [0.05, 0.04, 0.03], 0.8, [0.2, 0.1, 0.0]),
         rigid("b", [0.02, 0.05, 0.04], 0.5, [0.1, -0.1, 0.1]),
     ]
-    soft = GIVES | {"stiffness": 1.0} | keys
+    soft = GIVES | {"stiffness": 1.0}
     first = revolute("A", "base.tip", "a.root", AXIS, **soft)
     second = revolute("B", "b.root", "a.tip", [1.0, 0.5, 0.2], **soft)  # its rotor sits on b
     return scene(bodies, [first, second], RUN, initial={"joint_rates": {"A": 2.0, "B": -3.0}})
@@ -93,19 +93,6 @@ def test_momentum_and_energy_of_a_free_arm_are_kept():
         energy = found["run/energy/kinetic"] + found["run/energy/strain"]
         assert np.ptp(found["run/energy/strain"]) > 0.01 * energy[0]
         np.testing.assert_allclose(energy, energy[0], rtol=2e-8)
-
-
-def test_dampers_and_motors_make_up_the_energy():
-    tables = free_arm(damping=0.05) | {"load": [{"joint": joint, "moment": "5*sin(10*t)"} for joint in "AB"]}
-    with solve(tables) as found:
-        t, energy = found["run/time"], found["run/energy/kinetic"] + found["run/energy/strain"]
-        power = [
-            np.gradient(found[f"run/joints/{joint}/motor_angle"], t, edge_order=2) * 5 * np.sin(10 * t)
-            for joint in "AB"
-        ]
-        losses = simpson(found["run/energy/dissipated_power"], x=t)
-        assert losses > 0.02 * energy[0]
-        assert abs(simpson(sum(power), x=t) - losses - (energy[-1] - energy[0])) < 2e-4 * losses
 
 
 def test_replays_behind_gears_are_as_good_as_outputs_are_close():
@@ -216,8 +203,7 @@ def test_motors_behind_gears_are_judged_between_outputs():
         assert judged["speed"] == pytest.approx(A * w * (1 - I * w**2 / K), rel=1e-4)
 
 
-@pytest.mark.parametrize("tolerance", [1e-9, 1e-10])
-def test_moments_that_set_out_from_nothing(tolerance):
+def test_moments_that_set_out_from_nothing():
     """Springs that hold nothing, in no gravity: moments of their rounding are not what steps follow.
 
     The springs vibrate at 700 rad/s, 110 times in all; before, the run ended at its start in steps of nothing.
@@ -227,9 +213,9 @@ def test_moments_that_set_out_from_nothing(tolerance):
         revolute("O", "ground", "a.root", [0.0, 0.0, 1.0], **stiff),
         revolute("A", "a.tip", "b.root", [0.0, 0.0, 1.0], **stiff),
     ]
-    bodies = [{"name": name, **_rod(1.0, 1.0)} for name in "ab"]
+    bodies = [tables_3d.rigid(name, 1.0, [1e-6, 1 / 12, 1 / 12], [0.5, 0.0, 0.0], tip=[1.0, 0.0, 0.0]) for name in "ab"]
     load = [{"joint": "O", "moment": "4*sin(2*t)**4"}, {"joint": "A", "moment": "sin(2*t)**4"}]
-    run = RUN | {"tolerance": tolerance, "output_step": 0.05, "max_steps": 2000}
+    run = RUN | {"output_step": 0.05, "max_steps": 2000}
     tables = scene(bodies, joints, run, load=load, initial={"joints": {"O": 0.4, "A": 0.9}})
     with solve(tables) as found:
         for joint in "OA":
@@ -267,9 +253,3 @@ def test_springs_at_rest_do_not_hold_the_steps():
     """Rounding of the angles at their ends once drove steps below any size: 100 000 led to 0.6 ms."""
     with solve(wrist_at_rest()) as found:
         assert found.attributes("lift")["status"] == "completed"
-
-
-def _rod(mass, length):
-    inertia = [1e-6, mass * length**2 / 12, mass * length**2 / 12]
-    points = {"root": ORIGIN, "tip": [length, 0.0, 0.0]}
-    return {"rigid": {"mass": mass, "center": [length / 2, 0.0, 0.0], "inertia": inertia, "points": points}}

@@ -88,10 +88,9 @@ def case(request):
         yield make(), results, points
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_scene_turned_as_a_whole_moves_as_before(case, seed):
+def test_a_scene_turned_as_a_whole_moves_as_before(case):
     tables, before, points = case
-    Q = random_rotation(np.random.default_rng(seed))
+    Q = random_rotation(np.random.default_rng(1))
     with solved(moved(tables, Q)) as after:
         compare(before, after, tables, Q, points)
 
@@ -103,17 +102,6 @@ def test_a_mirrored_robot_moves_as_in_the_mirror(case):
         for point in points:
             R, mirrored = (rotation(of[f"inverse/points/{point}/quaternion"][-1]) for of in (before, after))
             np.testing.assert_allclose(mirrored, MIRROR @ R @ MIRROR, rtol=0, atol=SHARE)
-
-
-@pytest.mark.parametrize("case", ["arm"], indirect=True)
-def test_products_of_inertia_with_the_other_sign_show(case):
-    """The comparison above tells them: in the mirror two of the three change their sign."""
-    tables, before, points = case
-    mirrored = moved(tables, MIRROR)
-    (place,) = (k for k, body in enumerate(tables["body"]) if body["name"] == "w6")
-    mirrored["body"][place]["rigid"]["inertia"] = tables["body"][place]["rigid"]["inertia"]
-    with solved(mirrored) as after, pytest.raises(AssertionError, match="moment"):
-        compare(before, after, tables, MIRROR, points)
 
 
 def test_bodies_in_another_order_move_as_before(case):

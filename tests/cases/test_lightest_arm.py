@@ -83,9 +83,7 @@ def test_solids_from_step_do_the_same(arm, solved):
     """Tubes as gmsh meshes them, against Timoshenko beams: masses of the drawing, and the tip error."""
     with_holes(arm, CHOSEN)
     beam, _ = tip_error(arm / "scene.toml")
-    with ffrobot.Results(
-        solved("lightest_arm", timeout=600, scene="solid.toml").folder / "solid.results.h5"
-    ) as results:
+    with ffrobot.Results(solved("lightest_arm", scene="solid.toml").folder / "solid.results.h5") as results:
         solid = np.sqrt(np.mean(results["held/tip_error"] ** 2))
         for name, inner in CHOSEN.items():
             # Cells with parabolic edges of 10 mm leave 1e-4 of a circle's area out.

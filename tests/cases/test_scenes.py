@@ -118,14 +118,3 @@ def test_motor_that_is_not_there_is_told(tmp_path, ffrobot):
     done = ffrobot("solve", scene, "--strict")
     assert done.returncode == 1
     assert "joints without motor: q3" in done.stdout + done.stderr
-
-
-def test_radau_finds_the_same_forces(tmp_path, ffrobot):
-    """An implicit method on a loop with universal and spherical joints."""
-    scene = write_scene("slider_crank_3d", tmp_path)
-    scene.write_text(scene.read_text().replace('kind = "pcid"', 'kind = "pcid"\nintegrator = "radau"'))
-    assert ffrobot("solve", scene).returncode == 0
-    with h5py.File(scene.with_suffix(".results.h5")) as file:
-        assert file["inverse"].attrs["integrator"] == "radau"
-        samples = load("slider_crank_3d")["samples"]
-        close(file["inverse/joints/crank/moment"], [sample["motor_moment"] for sample in samples])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from rod_chain import falling_tip
-from scenes_in_3d import REST
 from scipy.linalg import eigh
 from tables_3d import ORIGIN, Y, revolute, scene
 
@@ -97,7 +96,12 @@ def test_how_far_a_cantilever_bends_in_an_oblique_plane():
     EI, P = 7e10 * 0.01**4 / 12, 2.0
     wall = [{"name": "wall", "type": "weld", "between": ["ground", "blade.root"]}]
     force = {"y": repr(float(P * np.cos(0.8))), "z": repr(float(P * np.sin(0.8)))}
-    rest = {"load": [{"point": "blade.tip", **force}], "joint": wall, "trajectory": [], "analysis": [REST]}
+    rest = {
+        "load": [{"point": "blade.tip", **force}],
+        "joint": wall,
+        "trajectory": [],
+        "analysis": [{"name": "rest", "kind": "static"}],
+    }
     with solve(**blade(**rest)) as results:
         found = results.attributes("rest/bodies/blade")
     at = 1 - 1 / np.sqrt(3)

@@ -9,7 +9,6 @@ import tomli_w
 from beam_links import beam_link, rectangle
 
 from ffrobot import InputError
-from ffrobot.bench.campaign import TIME, as_text
 from ffrobot.bench.measuring import Run
 from ffrobot.bench.precision import Point, _is_hopeless
 from ffrobot.cli import cli
@@ -130,14 +129,6 @@ def test_an_integrator_a_hundred_times_slower_is_asked_no_further():
     assert not _is_hopeless(slow, "generalized-alpha", 1e-5)  # with nothing to compare with
 
 
-def test_table_and_figure_show_the_same_named_time(done):
-    (row, *_) = read(done / "work_precision.csv")
-    headings, cells = as_text([row | {"seconds_min": 0.25, "seconds": 0.5}], "work-precision")
-    assert cells[0][headings.index("least seconds")] == "0.25"
-    assert "seconds" not in headings
-    assert TIME == "seconds_min"
-
-
 MISTAKES = {
     "unknown analysis": (["--analysis", "inverze"], 'scene.toml: analysis: expected one of "inverse", found "inverze"'),
     "analysis at rest": (["--analysis", "held"], f'scene.toml: analysis "held": {INTEGRATES} kind = "static"'),
@@ -163,9 +154,3 @@ def test_nothing_to_integrate_is_refused(tmp_path, refused):
     (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
     (tmp_path / "scene.toml").write_text(SCENE[: SCENE.index('[[analysis]]\nname = "inverse"')], encoding="utf-8")
     assert f'scene.toml: analysis: {INTEGRATES} "static"' in refused(tmp_path, "bench", "scene.toml")
-
-
-def test_the_paper_needs_the_source_tree(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="--source: expected ffrobot's source tree"):
-        cli(["bench"], standalone_mode=False)

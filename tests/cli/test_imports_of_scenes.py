@@ -93,6 +93,7 @@ def test_failed_imports(ffrobot, folder):
     assert [row["status"] for row in rows(scene.with_suffix(".sweep"))] == ["completed"] * 2
 
 
+@pytest.mark.nightly
 def test_studies(ffrobot, folder):
     scene, helper = folder("name", 5.0)
     command = ["uncertainty", scene, "--of", "peak loop/joints.O.moment", "--by", "gradients"]

@@ -36,11 +36,3 @@ def test_every_dataset_of_a_modal_body_has_a_meaning(ffrobot, case_copy):
     text = describe(folder / "body.h5")
     assert "under the reference condition" in text
     assert "of a unit load" in text
-
-
-def test_names_are_matched_part_by_part():
-    assert meaning("joints/elbow/moment", RESULTS).unit == "N m, N"
-    assert meaning("feasibility/pzt/arm/factor", RESULTS).what == "required against available"
-    assert meaning("joints/elbow/torque", RESULTS) is None
-    assert meaning("joints/moment", RESULTS) is None
-    assert meaning("geometric_stiffness/force/tip/x", MODAL_BODY) is not None

@@ -26,7 +26,8 @@ joint = [{ name = "j", type = "revolute", between = ["ground", "arm.root"], axis
 trajectory = [{ name = "p", joint = "j", value = "0.1*t" }]
 analysis = [{ name = "a", kind = "pcid", end = 0.1, output_step = 0.05 }]
 """
-SUFFIXES = ["msh", "MSH", "step", "inp", "bdf", "vtk", "med", "geo", "opt", "stl"]
+SUFFIXES = ["msh", "step", "inp", "vtk", "geo"]
+SUFFIXES += [pytest.param(suffix, marks=pytest.mark.nightly) for suffix in ("MSH", "bdf", "med", "opt", "stl")]
 
 
 @pytest.fixture

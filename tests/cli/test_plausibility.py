@@ -194,10 +194,6 @@ def test_a_posture_that_nobody_chose_is_told(two_link_copy, ffrobot):
     assert f'branch = {{ A = "{"down" if angle > 0.0 else "up"}" }}' in line
 
 
-def test_plotting_a_scene(two_link_copy, refused):
-    assert "scene.toml, which writes .results.h5)" in refused(two_link_copy(), "plot", "scene.toml")
-
-
 def test_blends_that_take_longer_than_stops_are_told():
     """Both segments go the same way: while they overlap, speeds add up to twice the limit, and all get slower."""
     motion = {"via": [7.0, -2.0, -7.0], "profile": "trapezoid", "speed": 1.0, "acceleration": 4.0}

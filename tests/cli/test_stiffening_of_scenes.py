@@ -58,10 +58,9 @@ def spin_up(tmp_path, ffrobot):
     return run
 
 
-@pytest.mark.parametrize("key", ["geometric_stiffening = true", 'geometric_stiffening = "auto"'])
-def test_spin_up_with_it(spin_up, key):
+def test_spin_up_with_it(spin_up):
     """The tip lags by at most 0.535 m, at 6.77 s, and settles."""
-    done, file = spin_up(key)
+    done, file = spin_up('geometric_stiffening = "auto"')
     assert done.returncode == 0, done.stderr
     assert "with geometric stiffening" in " ".join(done.stdout.split())
     time, lag = file["inverse/time"][()], -file["inverse/points/beam.tip/deflection"][:, 1]
@@ -72,9 +71,8 @@ def test_spin_up_with_it(spin_up, key):
     assert file["inverse"].attrs["stiffening_effect"] > 1
 
 
-@pytest.mark.parametrize("key", ["", "geometric_stiffening = false"])
-def test_spin_up_without_it(spin_up, key):
-    done, file = spin_up(key)
+def test_spin_up_without_it(spin_up):
+    done, file = spin_up("")
     assert done.returncode == 1
     assert "diverged" in done.stderr
     assert "geometric_stiffening = true" in done.stderr

@@ -46,9 +46,3 @@ def test_a_cantilever_under_its_weight_and_a_mass(folder, ffrobot):
     assert table[1].split()[:2] == ["rest", "arm"]
     assert float(table[1].split()[2]) == pytest.approx(moments[0] / resistance / 1e6, rel=2e-3)
     assert "root_top" in table[1]
-
-
-def test_info_names_the_points(folder, ffrobot):
-    assert ffrobot("link", "arm.toml", cwd=folder).returncode == 0
-    told = ffrobot("info", "arm.h5", cwd=folder).stdout
-    assert "modal and static stresses at root_top, (0, 0.02, 0) m" in told

@@ -175,7 +175,7 @@ def test_a_worker_that_is_killed_costs_its_run(sweep, scene):
     assert found[1][0] == found[0][0] != found[2][0]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.nightly)])
 def test_interruptions_leave_no_process(ffrobot, scene, number):
     """As a terminal sends them, to all, and as `kill` does, to the sweep alone."""
     text = scene.read_text(encoding="utf-8").replace("mine.py:constant", "mine.py:waiting").replace("0.1", "100.0")

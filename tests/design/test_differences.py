@@ -64,14 +64,6 @@ def test_noise_shows_in_the_estimate(noise):
     assert within >= 36
 
 
-def test_smaller_steps_are_taken_where_they_are_better():
-    """Of a fast oscillation, h = 1 says nothing, h = 1/16 all."""
-    x = np.concatenate([[0.0], *(sign * 2.0 ** -np.arange(7) for sign in (1.0, -1.0))])
-    found = derivative(x, np.sin(12.0 * x))
-    assert found.value == pytest.approx(12.0, rel=1e-6)
-    assert found.step <= 1 / 16
-
-
 def test_failed_runs_are_left_out():
     values = function(0.1 * CENTRAL)
     values[1] = np.nan  # the largest step to one side

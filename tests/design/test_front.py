@@ -1,7 +1,5 @@
 """`ffrobot optimise … --against`: the curve of mass and deflection of a cantilever, which is a power law."""
 
-import csv
-
 import numpy as np
 import pytest
 import tomli_w
@@ -42,25 +40,6 @@ def test_mass_against_deflection_is_a_power_law(scene):
     np.testing.assert_allclose(axes[f"{TIP} (m)"], [deflection(h) for h in axes[HEIGHT.partition("=")[0]]], rtol=1e-6)
     best = [value for value, state in zip(axes["mass (kg)"], designs.states, strict=True) if state == "best"]
     np.testing.assert_allclose(sorted(best), sorted(mass), rtol=1e-14)
-
-
-def test_going_on(ffrobot, scene):
-    """What was stopped is taken up: the same command makes no run twice, and writes table and picture."""
-    folder = scene.with_suffix(".optimum")
-    command = ("optimise", scene, "--minimise", "mass", "--against", TIP, "--points", 3, "--vary", HEIGHT, "-j", 2)
-    stopped = ffrobot(*command, "--runs", 6)
-    assert stopped.returncode == 1
-    assert "as many as allowed" in stopped.stderr
-    rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
-    assert 0 < len(rows) <= 6
-    ffrobot.ok(*command)
-    assert {path: path.stat().st_mtime_ns for path in rows} == rows
-    with (folder / "front.csv").open(encoding="utf-8") as file:
-        designs = list(csv.DictReader(file))
-    assert [row["converged"] for row in designs] == ["yes"] * 3
-    assert float(designs[1][TIP]) == pytest.approx(np.sqrt(deflection(0.01) * deflection(0.04)), rel=1e-6)
-    for name in ("front.png", "designs.png", "front.json"):
-        assert (folder / name).stat().st_size > 1000
 
 
 def test_goals_that_go_together(scene):

@@ -47,7 +47,9 @@ def choices_by_hand():
             yield max(torque / float(rated), N * SPEED / float(fastest)), name, N, float(mass), float(cost)
 
 
-@pytest.mark.parametrize(("what", "column"), [("mass", 3), ("cost", 4), ("share", 0)])
+@pytest.mark.parametrize(
+    ("what", "column"), [pytest.param("mass", 3, marks=pytest.mark.nightly), ("cost", 4), ("share", 0)]
+)
 def test_a_motor_from_a_catalog(write, tmp_path, what, column):
     """The lightest, cheapest or least used motor of those that are strong and fast enough."""
     (tmp_path / "motors.csv").write_text(CATALOG)
@@ -83,11 +85,6 @@ def test_the_mass_of_a_motor_loads_the_joint_before_it(write, tmp_path):
     assert found.value == pytest.approx(min(shares.values()), rel=1e-6)
 
 
-def test_goals_of_motors_want_motors(write):
-    with pytest.raises(ffrobot.InputError, match='expected `optimise` with --vary "motor JOINT in CATALOG"'):
-        ffrobot.optimise(write(ARM), [f"{RATIO}=20:500:log"], minimise="motors mass")
-
-
 @pytest.mark.parametrize("method", ["slsqp", "trust-constr"])
 def test_gear_ratio_of_matched_inertias(write, method):
     """Of a motor with inertia J_m behind a gear, α (J/N + J_m N) is least at N = √(J/J_m): 2 α √(J J_m)."""
@@ -116,6 +113,7 @@ def test_limits_below_zero(write, method):
     )
     least = 8.0 / (9.81 * 0.3)
     assert found.feasible
+    assert found.conflict is None
     if method == "slsqp":
         assert found.value == pytest.approx(least, rel=2e-6)
         assert found.prices[0] == pytest.approx(-1.0 / (9.81 * 0.3), rel=1e-4)
@@ -159,17 +157,6 @@ def test_designs_that_fail_are_passed_over(write):
     np.testing.assert_allclose(found.values, expected, rtol=1e-6)
     assert any("expected less than outer" in text for text in found.failures)
     assert found.converged
-
-
-def test_rows_of_a_catalogue(write):
-    """Gears with their rotors: 2 (J/N + J_m N) of each row, by hand."""
-    rows = [(30, 1e-5), (60, 5e-5), (90, 2e-5), (160, 2.5e-5)]
-    text = ", ".join(f"{ratio}:{inertia}" for ratio, inertia in rows)
-    found = ffrobot.optimise(write(ARM), [f"{RATIO},joint.shoulder.rotor_inertia in {{{text}}}"], minimise=MOTOR)
-    moments = [2.0 * (J / ratio + inertia * ratio) for ratio, inertia in rows]
-    assert found.values == rows[int(np.argmin(moments))]
-    assert found.value == pytest.approx(min(moments), rel=1e-8)
-    assert (found.method, found.runs) == ("all", 4)
 
 
 @pytest.mark.nightly
@@ -324,7 +311,7 @@ OMEGA = np.pi / 6e-4  # rad/s
 JOLT = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({OMEGA}*(t - 0.1001))**4, 0))"
 JOLTED = ARM | {
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": JOLT}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 1e-3}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.102, "output_step": 1e-3}],
 }
 MOST = 4e-6 * OMEGA**2  # of |α| = A ω² |12 sin² φ − 16 sin⁴ φ|, between the outputs at 0.1 and 0.101 s
 
@@ -351,7 +338,7 @@ def test_peaks_between_outputs_count(write):
 def test_spreads_of_peaks_between_outputs(write):
     """Of that torque by an uncertain rotor, in which it is linear."""
     path, spread = write(JOLTED), ["joint.shoulder.rotor_inertia=normal:10%"]
-    for how in ({"by": "gradients"}, {"samples": 16}):
+    for how in ({"by": "gradients"}, {"samples": 8}):
         found = ffrobot.uncertainty(path, [MOTOR], spread, **how)
         assert found.statistics.mean[0] == pytest.approx((J / 50 + 2e-5 * 50) * MOST, rel=5e-3)
         assert found.statistics.deviation[0] == pytest.approx(0.1 * 2e-5 * 50 * MOST, rel=0.15)

@@ -8,7 +8,6 @@ import pytest
 from small_robots import ARM, SWING, TUBE
 
 import ffrobot
-from ffrobot.design.readings import read_history
 from ffrobot.sweep.files import set_key, value_of
 
 PLANE = SWING | {
@@ -45,8 +44,8 @@ def value_at(scene, key):
     )
 
 
-def by_hand(scene, key, quantity):
-    """The derivative by four values in memory, of order h⁴, from runs of the tightest tolerance."""
+def by_hand(scene, key):
+    """The derivatives of `GOALS` by four runs in memory, of order h⁴, of the tightest tolerance."""
     theta = value_at(scene, key)
     h = 5e-4 * theta  # the second mode passes through 40 periods, whose number goes by 1/length²
     f = {}
@@ -54,7 +53,7 @@ def by_hand(scene, key, quantity):
         new = changed(scene, key, theta + n * h)
         new["analysis"][0] |= {"tolerance": 1e-10, "output_step": STEP}
         with ffrobot.solve(ffrobot.make_scene(**new)) as results:
-            f[n] = quantity(results)
+            f[n] = np.array([quantity(results) for quantity in GOALS.values()])
     return (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12 * h)
 
 
@@ -112,8 +111,7 @@ def test_against_differences_by_hand(write, scene, keys):
     """
     found = ffrobot.sensitivity(write(scene), list(GOALS), keys, processes=2)
     for k, key in enumerate(keys):
-        for g, quantity in enumerate(GOALS.values()):
-            expected = by_hand(scene, key, quantity)
+        for g, expected in enumerate(by_hand(scene, key)):
             scale = found.value[g] / value_at(scene, key)
             assert abs(found.derivative[g, k] - expected) <= 1e-6 * max(abs(expected), abs(scale)), (key, g)
             assert found.error[g, k] <= 1e-6 * abs(scale), (key, g)
@@ -143,7 +141,9 @@ def test_the_derivative_of_a_peak_is_that_of_its_top(write, step):
     assert abs(found.derivative[0, 0] - expected) < min(1e-6 * expected, 2.0 * found.error[0, 0])
 
 
-@pytest.mark.parametrize("key", ["payload.0.mass", "links.arm.geometry.section.outer"])
+@pytest.mark.parametrize(
+    "key", [pytest.param("payload.0.mass", marks=pytest.mark.nightly), "links.arm.geometry.section.outer"]
+)
 def test_the_derivative_of_a_peak_that_rings(write, key):
     """At any output step that of the top: by differences of tops of splines through outputs every 20 µs."""
     from scipy.interpolate import make_interp_spline
@@ -172,9 +172,7 @@ def test_frequencies_of_a_cantilever(write):
         "links.arm.geometry.section.height": 1.0,
         "links.arm.geometry.section.width": 0.0,
         "links.arm.geometry.length": -2.0,
-        "links.arm.material.youngs_modulus": 0.5,
         "links.arm.material.density": -0.5,
-        "payload.0.mass": 0.0,
     }
     found = ffrobot.sensitivity(write(scene), ["frequency 1 arm", "frequency 2 arm"], list(keys))
     np.testing.assert_allclose(found.logarithmic, [list(keys.values())] * 2, atol=1e-9)
@@ -274,31 +272,3 @@ def test_a_count_has_no_derivative(write):
     with pytest.raises(ffrobot.InputError, match="expected keys that may be a little larger or smaller") as told:
         ffrobot.sensitivity(write(PLANE), ["rms joints.shoulder.moment"], ["links.arm.mesh.elements"])
     assert "expected a whole number" in str(told.value)
-
-
-def test_a_scene_that_cannot_be_solved(write):
-    scene = deepcopy(ARM)
-    scene["trajectory"][0]["value"] = "log(0.2 - t)"
-    with pytest.raises(ffrobot.FfrobotError, match=r"scene\.toml"):
-        ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], ["payload.0.mass"])
-
-
-ALONG = {"axis": [1.0, 0.0, 0.0]}
-JOINTS = [
-    {"name": "rail", "type": "prismatic", "between": ["ground", "slide.pin"], **ALONG},
-    {"name": "both", "type": "cylindrical", "between": ["slide.pin", "turn.pin"], **ALONG},
-]
-UNITS = {"shoulder.rate": "rad/s", "rail.coordinate": "m", "rail.reaction_moment": "N m", "both.rate[0]": ""}
-BOX = {"mass": 1.0, "center": [0.0, 0.0, 0.01], "inertia": [0.01, 0.01, 0.01], "points": {"pin": [0.0, 0.0, 0.0]}}
-
-
-def test_units_of_joints_are_those_of_their_coordinates(write):
-    """Moments where joints turn, forces where they slide, nothing where both are columns."""
-    keys = SPACE | {
-        "body": [*SPACE["body"], {"name": "slide", "rigid": BOX}, {"name": "turn", "rigid": BOX}],
-        "joint": [*SPACE["joint"], *JOINTS],
-        "analysis": [{"name": "fall", "kind": "forward", "end": 0.01, "output_step": 0.005}],
-    }
-    with ffrobot.solve(write(keys)) as results:
-        units = {name: read_history(results, f"joints.{name}", "--of").unit for name in UNITS}
-    assert units == UNITS

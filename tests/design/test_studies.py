@@ -18,7 +18,6 @@ from ffrobot.pictures.studies.study import (
     axis_of_goal,
     read_study,
     study_files,
-    wrapped,
 )
 
 OUTER, INNER = "links.arm.geometry.section.outer", "links.arm.geometry.section.inner"
@@ -62,14 +61,6 @@ def test_axes():
     alone = axis_of_goal("a", (2.0,))
     np.testing.assert_allclose(alone.places, [0.5])
     assert axis_of_goal("a", (None, None)).ticks
-
-
-def test_labels_break_at_dots_and_blanks():
-    label = "rms points.upper_arm.tip.deflection[0] (m)"
-    lines = wrapped(label, 16)
-    assert "".join(lines).replace(" ", "") == label.replace(" ", "")
-    assert max(map(len, lines)) <= 16
-    assert wrapped("peak joints.shoulder.moment (N m)", 20)[-1] == "(N m)"
 
 
 def test_all_designs_of_a_search(searched):

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from forked_commands import LIMIT
 
 DOCS = Path(__file__).parents[2] / "docs"
 # Half a minute of studies, whose commands the tests of studies run as well.
@@ -52,10 +53,10 @@ class Reader:
         """Run a command; `…` in the answer stands for anything, blanks at the ends of lines do not count."""
         first, *arguments = shlex.split(command)
         if first == "ffrobot" and not set("|><;&$*") & set(re.sub(r'"[^"]*"', "", command)):
-            done = self.forks.run(arguments, self.environment, self.folder, 120, merged=True)
+            done = self.forks.run(arguments, self.environment, self.folder, merged=True)
         else:
             done = subprocess.run(
-                ["bash", "-c", command], cwd=self.folder, env=self.environment, text=True, timeout=120,
+                ["bash", "-c", command], cwd=self.folder, env=self.environment, text=True, timeout=LIMIT,
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             )  # fmt: skip
         assert done.returncode == 0, f"{self.page}:{line}: {command}\n{done.stdout}"
@@ -83,7 +84,6 @@ class Reader:
 )
 def test_page_does_what_it_says(page, ffrobot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
     environment = ffrobot.environment | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     reader = Reader(tmp_path, page, environment, ffrobot.forks)
     reader.follow(page.read_text(encoding="utf-8"))

@@ -8,12 +8,9 @@ from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.cli import cli
-from ffrobot.common.errors import InputError
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
 from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
-from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
-from ffrobot.pictures.figures.style import round_below
 
 # Faces of a unit cube, their corners in order around each.
 CUBE = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
@@ -54,16 +51,6 @@ def test_a_beam_is_drawn_at_all_its_stations(beam):
         _, surface = axes.collections
         assert len(surface.get_paths()) >= 4 * (len(beam.stations.position) - 1)
         assert not axes.texts[0].get_text().startswith("the axis")
-
-
-def test_a_mode_that_does_not_move_the_axis_says_so(beam):
-    """Of a file that does not know the section."""
-    figure = draw_modes(replace(beam, stations=replace(beam.stations, outline=None)))
-    texts = {axes.get_title(loc="left"): [text.get_text() for text in axes.texts] for axes in figure.axes}
-    twisting = [title for title in texts if "torsion" in title]
-    assert twisting
-    for title, words in texts.items():
-        assert ("the axis does not move" in words) == (title in twisting)
 
 
 def test_modes_of_a_solid_are_drawn_over_its_outline(solid):
@@ -130,26 +117,3 @@ def test_command_tells_modal_bodies_from_results(solid, tmp_path, capsys):
     written = [folder / f"{name}.{kind}" for name in ("mesh", "modes") for kind in ("png", "pdf")]
     assert capsys.readouterr().out.split() == [str(p) for p in written]
     assert all(p.stat().st_size > 2000 for p in written)
-
-
-def test_same_body_gives_the_same_files(beam, tmp_path):
-    path = tmp_path / "arm.h5"
-    write_modal_body(path, beam)
-    first, second = (plot_modal_body(path, tmp_path / name) for name in ("first", "second"))
-    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
-
-
-def test_what_is_refused(beam, tmp_path):
-    path = tmp_path / "arm.h5"
-    write_modal_body(path, beam)
-    with pytest.raises(InputError, match="expected a folder, found a file"):
-        plot_file(path, path)
-    path.write_bytes(path.read_bytes()[:4000])
-    with pytest.raises(InputError, match=r"arm\.h5: expected a results file, found not a readable"):
-        plot_file(path, tmp_path / "figures")
-
-
-def test_scale_bars_are_of_round_lengths():
-    assert [round_below(x) for x in (0.25, 0.2, 0.199, 1.0, 7.0, 4.9e-3)] == pytest.approx(
-        [0.2, 0.2, 0.1, 1.0, 5.0, 2e-3], rel=1e-12
-    )

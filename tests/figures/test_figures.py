@@ -1,8 +1,6 @@
 """Figures of a case that is really solved: the standard ones, those of `figures.toml`, and what it refuses."""
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,7 +10,7 @@ import pytest
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.joint import MotorLimits
-from ffrobot.pictures.figures.figure_file import Curve, FigureRecord, load_figures
+from ffrobot.pictures.figures.figure_file import Curve, FigureRecord
 from ffrobot.pictures.figures.plot import plot_results
 from ffrobot.pictures.figures.shared import curve_points, limit_curves
 from ffrobot.pictures.figures.style import new_axes
@@ -72,19 +70,6 @@ def test_figure_file_decides_what_is_drawn(results, tmp_path):
     assert stems(written) == {"fig02_mechanism", "fig03_actuator_force", "fig04_slider_motion", "fig05_rod_midpoint"}
 
 
-def test_same_results_give_the_same_files(results, tmp_path):
-    figures_beside(results, '[[figure]]\nname = "a"\ncurves = [{ data = "inverse/joints/O/reaction", label = "" }]')
-    first, second = (plot_results(results, tmp_path / name) for name in ("first", "second"))
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-
-
-@pytest.mark.parametrize("case", ["two_link", "slider_crank"])
-def test_case_figures_are_those_of_the_paper(case):
-    numbers = {"two_link": range(7, 18), "slider_crank": range(2, 6)}[case]
-    titles = [record.title for record in load_figures(CASES / case / "figures.toml").figure]
-    assert [title.split(":")[0] for title in titles] == [f"Fig. {number}" for number in numbers]
-
-
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -106,20 +91,6 @@ def test_wrong_figure_files_are_refused(results, tmp_path, text, complaint):
         plot_results(results, tmp_path / "figures")
     assert complaint in str(error.value)
     assert not (tmp_path / "figures").exists()
-
-
-def test_wrong_results_are_refused(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        plot_results(tmp_path / "absent.h5", tmp_path)
-    (tmp_path / "text.h5").write_text("no results")
-    with pytest.raises(InputError, match="not a readable HDF5 file"):
-        plot_results(tmp_path / "text.h5", tmp_path)
-
-
-def test_matplotlib_is_loaded_for_plotting_only():
-    program = "import sys, ffrobot.cli, ffrobot.run.solution; print('matplotlib' in sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "False"
 
 
 def test_only_the_figures_asked_for(results, tmp_path):
@@ -203,19 +174,3 @@ def test_voltages_beyond_the_limits_are_at_none():
     record = FigureRecord(name="v", curves=(Curve(data="v", label="patch"),), y_label="voltage (V)", limits=(-200, 200))
     draw_time_history(axes, record, results)
     assert not axes.collections
-
-
-def test_legend_of_many_columns_names_the_first_and_the_last():
-    time = np.linspace(0.0, 1.0, 5)
-    results = SimpleNamespace(data=lambda _: np.outer(time, np.arange(9.0)), time=lambda _: time)
-    figure, axes = new_axes("")
-    draw_time_history(axes, FigureRecord(name="v", curves=(Curve(data="v", label="patch"),)), results)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["patch 1", "patch 9"]
-    assert len(axes.lines) == 9
-
-
-def test_long_titles_have_two_lines():
-    """None is cut off at the edge of the figure; a formula stays whole."""
-    title = "largest von Mises stress on the surface of the upper arm, without patches"
-    assert new_axes(title)[1].get_title(loc="left").split("\n") == [title[:52], title[53:]]
-    assert new_axes(f"$x$ {title}")[1].get_title(loc="left") == f"$x$ {title}"

@@ -44,12 +44,6 @@ def test_standard_figures(arm, crank):
     assert not {"moment_universal_1", "coordinate_ball", "deflection_crank.tip"} & names  # no motor, no angle, rigid
 
 
-def test_deflections_are_drawn_by_axes_of_the_body(arm):
-    record = next(r for r in standard_figures(arm) if r.name == "deflection_fore.tip")
-    labels = {curve.label: curve.data for curve in record.curves}
-    assert labels == {f"inverse, {c}": f"inverse/points/fore.tip/deflection[{k}]" for k, c in ((1, "y"), (2, "z"))}
-
-
 def test_what_floats_has_no_ground(arm, slewing_appendage):
     with Results(slewing_appendage.folder / "scene.results.h5") as floating:
         for results, count in ((arm, 1), (floating, 0)):
@@ -171,11 +165,6 @@ def test_configurations_hold_every_link_at_every_time(arm):
             assert np.all(at < [axes.get_xlim()[1], axes.get_ylim()[1]])
             away = np.linalg.norm(at.reshape(-1, 1, 2) - drawn, axis=2).min(axis=1)
             assert away.max() < (0.02 if axes is corner else 1e-12)  # tubes of 8 and 11 mm seen from the corner
-
-
-def test_exaggeration_is_of_configurations_only():
-    with pytest.raises(ValueError, match='"exaggeration" only in kind = "configurations", found kind = "time"'):
-        FigureRecord(name="t", curves=({"data": "a", "label": "a"},), exaggeration=2.0)
 
 
 @pytest.mark.parametrize("s", [None, 3.0])

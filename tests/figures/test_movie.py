@@ -1,6 +1,5 @@
 """Movies: what is in them, read back by Pillow and by ffmpeg, and what is refused."""
 
-import io
 import sys
 
 import numpy as np
@@ -9,8 +8,8 @@ from PIL import Image
 
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.pictures.figures.movie import FACE, GROUND, SIZE, write_motion
-from ffrobot.pictures.movie_file import MovieOptions, gif_image, movie_outputs
+from ffrobot.pictures.figures.movie import FACE, GROUND, write_motion
+from ffrobot.pictures.movie_file import MovieOptions, movie_outputs
 from ffrobot.pictures.view import view_movie
 
 HALF = MovieOptions(analysis="forward", seconds=0.52, scale=1.0)
@@ -90,36 +89,6 @@ def test_movie_of_uneven_outputs_keeps_time():
     np.testing.assert_array_equal(movie_outputs(np.array([0.3]), 8.0), [0])
 
 
-def test_gif_keeps_colours():
-    frames = [np.full((20, 30, 3), color, dtype=np.uint8) for color in ((255, 0, 0), (0, 114, 178))]
-    with Image.open(io.BytesIO(gif_image(frames))) as movie:
-        for k, frame in enumerate(frames):
-            movie.seek(k)
-            assert np.abs(np.asarray(movie.convert("RGB"), dtype=int) - frame).max() <= 8
-
-
-@pytest.mark.usefixtures("can_draw")
-def test_movie_in_3d_follows_the_slider(results, slider_crank, tmp_path):
-    """By PyVista: the axis of the guide, dark, goes with the slider."""
-    path = tmp_path / "m.gif"
-    view_movie(results, path, MovieOptions(analysis="forward", seconds=0.2, scale=1.0))
-    with Image.open(path) as movie:
-        frames = []
-        for k in range(movie.n_frames):
-            movie.seek(k)
-            frames.append(np.asarray(movie.convert("RGB"), dtype=int))
-    assert np.shape(frames) == (5, *PIXELS, 3)
-    assert all(np.count_nonzero(np.ptp(frame[40:480], axis=-1) > 40) > 500 for frame in frames)  # the rod, in color
-    dark = [np.argwhere((frame[40:480].max(axis=-1) < 160) & (np.ptp(frame[40:480], axis=-1) < 40)) for frame in frames]
-    right_ends = np.array([places[:, 1].max() for places in dark])
-    time = slider_crank.file["forward/time"][()]
-    rows = [np.flatnonzero(time <= t + 1e-9)[-1] for t in np.linspace(time[0], time[-1], 5)]
-    slider = slider_crank.file["forward/bodies/slider/position"][rows, 0]
-    scale, start = np.polyfit(slider, right_ends, 1)
-    assert np.abs(start + scale * slider - right_ends).max() < 3.0  # pixels
-    assert scale * np.ptp(slider) > 20.0
-
-
 def test_what_is_refused(results, two_link, tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r'expected a name that ends in "\.gif" or "\.mp4", found "m\.avi"'):
         write_motion(results, tmp_path / "m.avi")
@@ -134,7 +103,3 @@ def test_what_is_refused(results, two_link, tmp_path, monkeypatch):
     with pytest.raises(SolveError, match=r"needs ffmpeg, which is not installed: .* pip install imageio-ffmpeg"):
         write_motion(results, tmp_path / "m.mp4")
     assert not list(tmp_path.iterdir())
-
-
-def test_size_of_frames():
-    assert tuple(round(120 * length) for length in SIZE[::-1]) == PIXELS

@@ -41,12 +41,6 @@ stiffness = 500.0
 """
 
 
-@pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture
 def write(tmp_path):
     def link(E=E, rho=RHO, tip=0.0, name="arm"):

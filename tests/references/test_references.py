@@ -28,7 +28,7 @@ LONG = "lightest_arm_solid"  # solids from STEP are in arm_6r, too
 def test_cases(name, solved):
     """Solved by commands, so that the memory of their meshes goes with them."""
     path = CASES[name]
-    found = reference_numbers.reduced(solved(path.parent.name, timeout=600, scene=path.name).file)
+    found = reference_numbers.reduced(solved(path.parent.name, scene=path.name).file)
     meets_its_reference(name, found)
 
 

@@ -174,24 +174,6 @@ def test_a_run_has_one_colour_on_the_page(two_link):
     assert charts["path_tip"].traces[0]["line"]["color"] not in COLORS  # the prescribed path
 
 
-def test_a_single_run_has_its_colour_beside_the_prescribed_path(slider_crank_3d):
-    with Results(slider_crank_3d.folder / "scene.results.h5") as results:
-        charts = {chart.name: chart for chart in history_charts([results])}
-    prescribed, reached = charts["path_slider"].traces
-    assert [prescribed["name"], reached["name"]] == ["prescribed, x", "inverse, x"]
-    assert prescribed["line"]["color"] not in COLORS
-    assert reached["line"]["color"] == COLORS[0]
-
-
-def test_verdict_of_a_loop(slider_crank_3d):
-    with Results(slider_crank_3d.folder / "scene.results.h5") as results:
-        verdict = results.verdict["inverse"]
-        largest = np.abs(results["inverse/joints/crank/moment"]).max()
-    assert list(verdict.motors) == ["crank"]
-    assert largest <= verdict.motors["crank"].moment < 1.01 * largest  # between outputs it may be larger
-    assert verdict.deflection[1] == "rod.mid"
-
-
 def test_axes_of_joints(slider_crank_3d):
     """Of the universal joint both, at right angles; of the ball none; of the guide x, at the slider."""
     with Results(slider_crank_3d.folder / "scene.results.h5") as results:

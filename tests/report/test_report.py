@@ -144,27 +144,6 @@ def test_texts_of_a_scene_are_no_markup(two_link, tmp_path):
     assert "<script>alert" not in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("output", "complaint"),
-    [("r.pdf", 'expected a name that ends in ".html"'), (".", "expected a file name, found a folder")],
-)
-def test_outputs_that_are_refused(two_link, tmp_path, output, complaint):
-    with pytest.raises(InputError, match=complaint):
-        write_report([two_link.folder / "scene.results.h5"], tmp_path / output)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_inputs_that_are_refused(two_link, tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        write_report([two_link.folder / "scene.results.h5", tmp_path / "absent.h5"], tmp_path / "r.html")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_folder_that_is_not_there(two_link, tmp_path):
-    with pytest.raises(SolveError, match="cannot write the report"):
-        write_report([two_link.folder / "scene.results.h5"], tmp_path / "nowhere" / "r.html")
-
-
 def test_page_goes_beside_the_first_file(two_link, tmp_path, capsys):
     path = copy_of(two_link, tmp_path / "scene.results.h5")
     cli(["report", str(path)], standalone_mode=False)

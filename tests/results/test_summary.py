@@ -76,15 +76,15 @@ def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
 CASES = sorted(path.parent.name for path in (Path(__file__).parents[2] / "cases").glob("*/scene.toml"))
 
 
-@pytest.mark.parametrize("width", [80, 120])
 @pytest.mark.parametrize("case", CASES)
-def test_every_case_has_a_summary_of_one_screen(case, width, solved):
+def test_every_case_has_a_summary_of_one_screen(case, solved):
     """With the verdicts of all analyses, of all motors, and warnings, or the number of those that had no room."""
     with Results(solved(case).folder / "scene.results.h5") as results:
         verdict = results.verdict
-    lines = summary_lines(verdict, ["a note"], 30 * "accuracy ", "scene.results.h5", width)
-    assert len(lines) <= LINES == 15
-    assert max(map(len, lines)) <= width
+    for width in (120, 80):
+        lines = summary_lines(verdict, ["a note"], 30 * "accuracy ", "scene.results.h5", width)
+        assert len(lines) <= LINES == 15
+        assert max(map(len, lines)) <= width
     shown = sum(line.startswith(one.name) for one in verdict.analyses for line in lines[1 : 1 + len(verdict.analyses)])
     left_out = sum(int(line.split()[0]) for line in lines if line.endswith("more: --verbose"))
     judged = [one for one in verdict.analyses if one.feasible is not None]

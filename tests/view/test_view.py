@@ -1,15 +1,12 @@
 """`ffrobot view`: grids read back with VTK's own reader hold what was solved; pictures show it."""
 
-import shutil
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from PIL import Image
 
 from ffrobot.cli import cli
-from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.quantities.stress import von_mises
 from ffrobot.pictures.view import Options, view_file
@@ -138,25 +135,6 @@ def test_modal_body_has_its_modes_as_vectors(read, solid_arm, tmp_path):
     ]
     for k, name in enumerate(sorted(data)):
         np.testing.assert_allclose(data[name], body.mesh.mode_shapes[:, :, k], rtol=0, atol=1e-6)
-
-
-def test_body_without_its_file_is_drawn_through_its_points(read, two_link, tmp_path):
-    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
-    with h5py.File(path, "r+") as file:
-        file.attrs["modal_bodies"] = file.attrs["modal_bodies"].replace('.h5"', '.gone.h5"')
-    seal(path)
-    viewed = view_file(path, tmp_path / "view", Options(analysis="inverse", frames=2, pictures=False))
-    assert [note.split(":")[0] for note in viewed.notes] == [
-        f"link{k} is drawn through its points only" for k in (1, 2)
-    ]
-    _, _, points, _, _ = read(viewed.paths[0])[-1]
-    at = two_link.file["inverse/points/link2.tip/position"][-1]
-    np.testing.assert_allclose(points[-1, :2], at, rtol=0, atol=DIGITS)
-
-
-def test_same_results_give_the_same_file(solid_arm, tmp_path):
-    first, second = (view_file(solid_arm / "scene.results.h5", tmp_path / name, GRIDS).paths for name in "ab")
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
 @pytest.mark.usefixtures("can_draw")

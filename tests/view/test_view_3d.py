@@ -7,9 +7,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-from ffrobot.pictures.projection import LINK, PLANE, SPACE
 from ffrobot.pictures.view import Options, view_file
-from ffrobot.pictures.view.drawing import _is_bare, _window
 from ffrobot.results.file import Results
 
 DIGITS = 2e-7  # numbers in the files have 7 digits; lengths are about 1 m
@@ -84,31 +82,3 @@ def test_picture_stands_upright(arm_3r, tmp_path):
     foot = columns[rows > rows.max() - 30]
     assert np.ptp(foot) < 40  # the column's foot is the lowest thing, and narrow
     assert columns.max() - foot.max() > 100  # the arm is on its right
-
-
-def test_windows_are_no_wider_than_needed():
-    """As high as asked for; as wide as a square of things needs beside its bar, the largest size for a long one."""
-    square, long = (np.array([[0.0, 0.0, 0.0], [width, 1.0, 0.0]]) for width in (1.0, 9.0))
-    assert _window((1400, 800), square, PLANE) == (880, 800)
-    assert _window((1400, 800), long, PLANE) == (1400, 800)
-    assert _window((1400, 800), np.zeros((1, 3)), PLANE) == (880, 800)
-
-
-def test_bodies_that_never_bend_have_no_color():
-    """Two lines of two points: one bends at the second step, its first point never does."""
-    grid = pyvista.UnstructuredGrid([2, 0, 1, 2, 2, 3], [3, 3], np.eye(4, 3))
-    grid.cell_data["body"] = [0, 1]
-    steps = [(grid, {"d": np.zeros(4)}), (grid, {"d": np.array([0.0, 2.0, 0.0, 0.0])})]
-    np.testing.assert_array_equal(_is_bare(steps, "d"), [False, False, True, True])
-
-
-@pytest.mark.parametrize("view", [LINK, PLANE, SPACE])
-def test_views_are_right_handed(view):
-    axes = np.array(view)
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-
-
-def test_up_is_up():
-    assert SPACE.up[2] > 0.9
-    assert SPACE.right[2] == 0.0
