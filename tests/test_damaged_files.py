@@ -114,26 +114,6 @@ def test_doctored_modal_bodies(modal, edit, named):
         read_modal_body(modal)
 
 
-@pytest.mark.parametrize(
-    ("command", "part"),
-    [
-        ("info", "inverse/time"),
-        ("feasibility", "inverse/pzt/link1"),
-        ("report", "inverse/joints/O/moment"),
-        ("plot", "inverse/points/link2.tip"),
-    ],
-)
-def test_results_with_missing_parts(results, ffrobot, command, part):
-    """Of a file that says nothing about its content."""
-    with h5py.File(results, "r+") as file:
-        del file.attrs[checksum.MARK], file[part]
-        file[part] = "text"
-    done = ffrobot(command, results)
-    assert done.returncode in (0, 2)  # not every command needs every part
-    assert "Traceback" not in done.stderr
-    assert done.returncode == 0 or "r.h5: " in done.stderr
-
-
 SCENE = """
 name = "arm"
 gravity = [0.0, -9.81]
@@ -171,18 +151,6 @@ def test_a_changed_file_is_not_resumed(stopped):
     checksum.seal(path)
     with pytest.raises(ffrobot.InputError, match=r"r\.h5: resume: .* found that the file itself has changed"):
         ffrobot.solve(scene, path, resume=True)
-
-
-@pytest.mark.parametrize(("group", "attribute"), [("inverse", "status"), ("inverse", "integrator_reason")])
-def test_attributes_that_are_missing(results, group, attribute):
-    with h5py.File(results, "r+") as file:
-        del file[group].attrs[attribute]
-    checksum.seal(results)
-    with (
-        Results(results) as file,
-        pytest.raises(InputError, match=f'r.h5: {group}: expected the attribute "{attribute}", found none'),
-    ):
-        file.attributes(group)[attribute]
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +207,7 @@ def test_results_that_lack_something(results, members, tmp_path, command):
         "view": lambda path: view_file(path, tmp_path / "view", Options(frames=2, pictures=False)),
     }[command]
     content, chance, refused = results.read_bytes(), random.Random(command), 0
-    for member in chance.sample(members, 4 if command in ("plot", "report", "view") else 40):
+    for member in chance.sample(members, 2 if command in ("plot", "report", "view") else 40):
         results.write_bytes(content)
         label = spoil(results, member, chance)
         try:
@@ -252,27 +220,3 @@ def test_results_that_lack_something(results, members, tmp_path, command):
         refused += bool(message)
         assert not message or message.startswith(f"{results}"), label
     assert refused or command not in ("feasibility", "linear")
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("dataset", ["modes/frequency", "stations/rotation", "geometric_stiffness/omega_zz", "length"])
-def test_complex_numbers_are_refused(modal, dataset):
-    _change(modal, dataset, lambda values: np.asarray(values, dtype=complex))
-    with pytest.raises(InputError, match=r"link1.h5: .*expected real numbers, found complex ones"):
-        read_modal_body(modal)
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("dataset", ["modes/frequency", "stations/rotation"])
-def test_numbers_whose_squares_are_infinite_are_refused(modal, dataset):
-    _change(modal, dataset, lambda values: np.full_like(values, 1e300))
-    with pytest.raises(InputError, match=r"link1.h5: .*expected numbers up to 1e\+100, found"):
-        read_modal_body(modal)
-
-
-def _change(path, dataset, change):
-    with h5py.File(path, "a") as file:
-        values = file[dataset][()]
-        del file[dataset]
-        file[dataset] = change(values)
-    checksum.seal(path)

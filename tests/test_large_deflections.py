@@ -50,8 +50,10 @@ def worst(results, key, analysis="fall"):
     return max(results.attributes(f"{analysis}/bodies/{name}")[key] for name in names)
 
 
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-@pytest.mark.parametrize("E", [2e10, pytest.param(7e9, marks=pytest.mark.nightly), 5e9])
+@pytest.mark.parametrize(
+    ("E", "condition"),
+    [(2e10, "cantilever"), pytest.param(7e9, "cantilever", marks=pytest.mark.nightly), (5e9, "simply-supported")],
+)
 def test_estimated_error_of_a_falling_pendulum(E, condition, tmp_path):
     """Within 0.4 and 5 times the error, from 6e-4 to 9e-2 of the length; said from 1e-3 on at the latest."""
     results, told = solved(pendulum(E, condition), tmp_path / "fall.h5")

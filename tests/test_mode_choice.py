@@ -9,8 +9,6 @@ import pytest
 
 from ffrobot import make_scene
 from ffrobot.common import checksum
-from ffrobot.present.console import summary_console
-from ffrobot.present.details import print_details
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.mode_choice import reported_modes
@@ -114,13 +112,3 @@ def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
         deflection = results["inverse/points/link2.tip/deflection"]
         np.testing.assert_allclose(p @ modal.interfaces["tip"].translation[:2].T, deflection, atol=1e-15)
         assert any("3 of 10 modes and 2 static shapes" in line for line in results.skipped)
-
-
-def test_the_summary_tells_the_number_the_estimate_and_what_is_saved(reduced, tmp_path, capsys):
-    results = Results.from_image(results_image(reduced), tmp_path / "x.h5")
-    print_details(reduced, results, reduced.seconds, summary_console())
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "link1: 3 of 10 modes and 2 static shapes for the others; link2: 3 of 10 modes" in printed
-    assert "inverse: error of leaving out the others, estimated: deflections" in printed
-    assert "solved with 6, 8, 10 modal coordinates" in printed
-    assert "the highest frequency is 8.82e+03 of 2.2e+04 rad/s" in printed

@@ -69,24 +69,6 @@ def test_results_in_memory_are_those_of_a_file(folder, results, tmp_path):
     assert (tmp_path / "r.html").is_file()
 
 
-def test_columns_split_what_has_several(results):
-    columns = results.columns("inverse")
-    assert {values.shape for values in columns.values()} == {(21,)}
-    tip = results["inverse/points/arm.tip/position"]
-    np.testing.assert_array_equal(columns["points/arm.tip/position[1]"], tip[:, 1])
-
-
-def test_a_load_of_python_numbers(folder):
-    """A scene varied in a loop: twice the payload, so much more moment at rest."""
-    moments = []
-    for mass in np.linspace(0.0, 1.0, 3)[1:]:
-        held = {"name": "rest", "kind": "static"}
-        scene = swing(folder, payload=[{"point": "arm.tip", "mass": mass}], analysis=[held])
-        moments.append(ffrobot.solve(scene)["rest/joints/shoulder/moment"][0])
-    # The arm lies straight along x but for its sag: 0.5 kg more at 0.6 m.
-    assert moments[1] - moments[0] == pytest.approx(0.5 * 9.81 * 0.6, rel=1e-3)
-
-
 def test_link_in_the_scene_is_that_of_its_file(folder, results):
     """Under the body's name where it has none, and in TOML as in Python."""
     keys = LINK | {"geometry": LINK["geometry"] | {"length": np.float64(0.6)}}
@@ -239,22 +221,6 @@ def test_xarray_has_dimensions_units_and_coordinates(results):
     assert dataset.attrs["kind"] == "pcid"
 
 
-def test_payload_without_mass(folder):
-    """The first point of a sweep over payloads."""
-    bare, zero = (
-        ffrobot.solve(swing(folder, payload=payload)) for payload in ([], [{"point": "arm.tip", "mass": 0.0}])
-    )
-    moment = "inverse/joints/shoulder/moment"
-    np.testing.assert_allclose(zero[moment], bare[moment], rtol=1e-6)  # the tolerance: modes are found anew
-
-
-def test_tables_without_end():
-    endless: dict[str, object] = {}
-    endless["a"] = endless
-    with pytest.raises(ffrobot.InputError, match="expected"):
-        ffrobot.make_scene(name="endless", initial=endless)
-
-
 def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
     """Peaks, RMS and limits of the motor, the deflection, what to try next; `ffrobot solve` prints the answer."""
     joint = {"name": "shoulder", "type": "revolute", "between": ("ground", "arm.root"), "moment_limit": 0.4}
@@ -279,16 +245,6 @@ def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
     assert "limits exceeded" in results._repr_html_()
     with pytest.raises(KeyError):
         results.verdict["invers"]
-
-
-def test_keys_of_results(results):
-    keys = results.keys()
-    assert {"inverse/time", "inverse/joints/shoulder/rate"} <= set(keys)
-    assert results._ipython_key_completions_() == keys == list(results)
-    assert "inverse/time" in results
-    assert "inverse/tim" not in results
-    for key in keys:
-        results[key]
 
 
 def test_progress_in_a_log_is_a_line_now_and_then(capsys, monkeypatch):

@@ -1,31 +1,20 @@
 """Scene files in 3D: what their records take, and the message of each mistake."""
 
 import copy
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scene_of
 import tables_3d
-from checkpoint_mechanisms import CASES, load
-from checkpoint_scenes import checkpoint_scene
 from tables_3d import X, Y, joint, revolute, rigid
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
-from ffrobot.scene.checks import UNSUPPORTED
 from ffrobot.scene.load import validated_scene
 
 FOLDER = Path(scene_of.__file__).parent
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_checkpoints_are_scenes(name):
-    scene = checkpoint_scene(name)
-    assert [joint.type for joint in scene.joint][:1] == ["revolute"]
-    assert scene.trajectory[0].row_count == len(load(name)["scene"]["path"]["rows"]) - 2 * (name == "slider_crank_3d")
 
 
 HAND_INERTIA = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.001], [0.0, 0.001, 0.02]]
@@ -213,11 +202,3 @@ def check_rates(law: OrientationLaw, times):
     np.testing.assert_allclose(np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1), omega, atol=1e-7)
     ahead, behind = law.rates(times + h)[0], law.rates(times - h)[0]
     np.testing.assert_allclose((ahead - behind) / (2 * h), alpha, atol=1e-7)
-
-
-def test_modules_that_refuse_what_space_does_not_have_exist():
-    for name in {lack.where for lack in UNSUPPORTED}:
-        spec = find_spec(name)
-        assert spec is not None, name
-        text = Path(spec.origin).read_text(encoding="utf-8")
-        assert "raise InputError" in text or "raise ValueError" in text, name

@@ -1,22 +1,18 @@
 """Runs that were stopped go on from their results file as if they had never been."""
 
-from types import SimpleNamespace
-
 import h5py
 import pytest
 from stopped_runs import SAME, Stops, check_attributes, differences, edit, go_on, stop
 
 import ffrobot
-from ffrobot.mbs.solve.integrators import METHODS, Choice
 
 END = 0.12
 SHORT = {"end = 1.0": f"end = {END}"}
 
 
 @pytest.fixture
-def arm(case_copy, ffrobot, monkeypatch):
+def arm(case_copy):
     """The two-link case, shorter, with texts replaced."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
 
     def copy(**edits):
         scene = case_copy("two_link")
@@ -123,19 +119,6 @@ def test_other_kinds_and_searches_for_modes_start_again(arm):
     assert 'resume=True) runs "inverse" again from its start' in stop(scene, "inverse", 0.0)
     results = go_on(scene)
     assert results.attributes("inverse")["status"] == "completed"
-
-
-@pytest.mark.parametrize("first", range(6))
-def test_changes_of_integrators_are_those_of_a_run_in_one_go(first):
-    """However many of five changes were made before the run was stopped."""
-    radau, dop853 = METHODS["radau"], METHODS["dop853"]
-    changes = [(0.1 * k, *((radau, dop853) if k % 2 else (dop853, radau)), 1e-3) for k in range(5)]
-    choice, parts = Choice("dop853", "highest natural frequency 3 rad/s"), (changes[:first], changes[first:])
-    whole = choice.changed_in(SimpleNamespace(changes=changes))
-    for part in parts:
-        choice = choice.changed_in(SimpleNamespace(changes=part))
-    assert choice == whole
-    assert whole.reason.endswith("; changed 5 times in all")
 
 
 def test_needs_a_file():

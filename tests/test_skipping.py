@@ -5,14 +5,12 @@ import sys
 from io import BytesIO
 
 import h5py
-import numpy as np
 import pytest
 import tomli_w
 from beam_links import link_keys, rectangle
 
 from ffrobot import make_scene
 from ffrobot.fe_models.link import make_link
-from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import prepare_scene, solve_scene
@@ -90,32 +88,6 @@ def test_terms_that_vanish_are_named(folder):
         assert f"{symbol}, which is zero" in bending
         assert f"{symbol}, which is zero" not in both
     assert "damping, which is zero" in bending
-
-
-def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
-    def refuse(*_):
-        raise AssertionError
-
-    monkeypatch.setattr(_core, "tree_motion", refuse)
-    analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
-    solution = solve_scene(arm(folder, "bending", analysis=[analysis]))
-    outcome = solution.outcomes["stiff"]
-    assert outcome.statistics.steps == outcome.statistics.evaluations == 0
-    assert outcome.q.shape[0] == 11
-    assert np.abs(solution.analyses["stiff"].motion.path_force("path")).max() > 1.0
-    assert "integration of stiff, algebraic" in solution.omissions
-
-
-def test_only_runs_that_are_replayed_are_recorded(folder):
-    run = {"kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-4}
-    forward = {"name": "back", "kind": "forward", "actuation": "first", "apply": "joints"}
-    solution = solve_scene(
-        arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward])
-    )
-    assert solution.outcomes["first"].continuation.recording is not None
-    assert solution.outcomes["second"].continuation.recording is None
-    assert not solution.analyses["first"].histories.stresses  # the modal body file has no modal stresses
-    assert not solution.analyses["first"].actuation.voltages  # no patches
 
 
 def test_no_analysis_loads_finite_elements_or_plotting(folder):

@@ -8,9 +8,9 @@ from patched_strip import exact, tip
     "modes", [{"count": 10, "attachment_modes": False}, {}, {"family": ["in-plane-bending", "axial"]}]
 )
 @pytest.mark.parametrize("face", ["both", "+y", "-y", None])
-@pytest.mark.parametrize("height", [0.002, 0.004, 0.015])
+@pytest.mark.parametrize("height", [0.002, 0.015])
 def test_composite_section_with_few_modes(height, face, modes):
-    """ψ = 4.4, 8.9, 33. Ten modes alone miss 1.3e-5 of the displacement; attachment modes have it.
+    """ψ = 4.4, 33. Ten modes alone miss 1.3e-5 of the displacement; attachment modes have it.
 
     On either face a volt bends the link the same way.
     """
@@ -20,7 +20,7 @@ def test_composite_section_with_few_modes(height, face, modes):
 
 
 @pytest.mark.parametrize("face", ["both", "-y"])
-@pytest.mark.parametrize("pieces", [2, 4])
+@pytest.mark.parametrize("pieces", [4])
 def test_composite_section_of_a_link_in_pieces(pieces, face):
     """A cut at 75 mm, under the patch. What is left is the foreshortening of pieces, which always have stiffening."""
     expected = exact(0.004, 2 if face == "both" else 1)

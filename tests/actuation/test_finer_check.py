@@ -74,14 +74,6 @@ def test_error_is_that_of_the_modes_left_out(gravity):
     assert 1e-7 < errors[1] < 1e-3
 
 
-@pytest.mark.nightly
-def test_links_with_all_that_matters_leave_nothing():
-    """Motors alone in a horizontal plane, eight modes: what sixteen add is below the tolerance of the replay."""
-    check = solve_scene(arm(8, kind="motors-only", patches=False)).analyses["inverse"].check
-    assert check.point == "link2.tip"
-    assert check.error < 1e-5 * 0.4  # of the path
-
-
 def test_it_is_told_and_kept(tmp_path, ffrobot):
     path = tmp_path / "scene.toml"
     path.write_text(arm(2).text, encoding="utf-8")

@@ -115,6 +115,9 @@ def test_what_is_refused(ur5, ffrobot, tmp_path):
     done = ffrobot("export", ur5, "--format", "xls")
     assert done.returncode == 2
     assert '--format: expected one of "csv", "joint-trajectory", "rosbag2", "fmu" of results' in done.stderr
+    done = ffrobot("export", "nosuch.h5", "--format", "sid", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "ffrobot: nosuch.h5: expected a scene, a modal body or a results file, found no such file\n"
 
 
 def test_each_analysis_has_a_file_and_none_is_replaced(crank, ffrobot, tmp_path):
@@ -134,9 +137,3 @@ def test_each_analysis_has_a_file_and_none_is_replaced(crank, ffrobot, tmp_path)
     assert len(made[0].read_text().splitlines()) > 2
     motion = replace(robot_motion(results, names[0]), joints=(JointMotion("=cmd|' /C calc'!A0", *3 * (np.zeros(2),)),))
     assert csv_text(replace(motion, time=np.zeros(2))).startswith("time,'=cmd|' /C calc'!A0.coordinate,")
-
-
-def test_a_file_that_is_not_there(ffrobot, tmp_path):
-    done = ffrobot("export", "nosuch.h5", "--format", "sid", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr == ("ffrobot: nosuch.h5: expected a scene, a modal body or a results file, found no such file\n")

@@ -10,7 +10,7 @@ from rigid_robots import moments, with_motion
 from test_urdf_flexible import ALONG, ARM, BAR, J_BAR, LENGTH, MASS
 from test_urdf_inertias import imported, joint, link
 
-from ffrobot import FfrobotError, InputError
+from ffrobot import InputError
 from ffrobot.exchange.urdf.shape_masses import Filling
 
 RHO = 1500.0
@@ -48,23 +48,6 @@ def test_shapes_against_their_meshes(shape, tmp_path):
         np.testing.assert_allclose(one, other, rtol=0, atol=5e-4 * np.abs(one).max())
 
 
-def test_two_boxes_are_one_long_box(tmp_path):
-    halves = (
-        f'<collision><origin xyz="{x} 0 0"/><geometry><box size="0.2 0.1 0.1"/></geometry></collision>'
-        for x in (-0.1, 0.1)
-    )
-    found = imported(
-        tmp_path, link("base"), f'<link name="arm">{"".join(halves)}</link>', joint("j", "base", "arm"),
-        filling=Filling(RHO),
-    )  # fmt: skip
-    mass, center, inertia = body_of(found)
-    assert mass == pytest.approx(RHO * 0.4 * 0.1 * 0.1, rel=1e-14)
-    np.testing.assert_allclose(center, 0, atol=1e-16)
-    expected = mass / 12 * np.diag([0.02, 0.17, 0.17])
-    np.testing.assert_allclose(inertia, expected, rtol=0, atol=1e-15)
-    assert 'link "arm" has no mass: 6 kg by its <collision> filled with 1500 kg/m³' in found.remarks
-
-
 def test_open_meshes_count_with_their_hull(tmp_path):
     box = trimesh.creation.box((0.1, 0.2, 0.3))
     box.update_faces(np.arange(len(box.faces)) > 0)
@@ -93,30 +76,6 @@ def test_cylinders_where_meshes_are_missing(tmp_path):
     across, along = mass * (0.25 / 12 + 0.0025 / 4), mass * 0.0025 / 2
     np.testing.assert_allclose(np.linalg.eigvalsh(np.array(rigid["inertia"])), [along, across, across], rtol=1e-12)
     np.testing.assert_allclose(np.array(rigid["inertia"]) @ [0.6, 0, 0.8], np.multiply(along, [0.6, 0, 0.8]))
-
-
-@pytest.mark.parametrize(
-    "shape", ['<box size="0.1 0.1"/>', '<sphere radius="0"/>', '<cylinder radius="x" length="1"/>']
-)
-def test_shapes_without_volume(shape, tmp_path):
-    parts = link("base"), shaped("arm", shape), joint("j", "base", "arm")
-    with pytest.raises(InputError, match=r'link "arm": <collision>: expected a shape with a volume'):
-        imported(tmp_path, *parts, filling=Filling(RHO))
-    with pytest.raises(FfrobotError, match="expected a link with mass"):
-        imported(tmp_path, *parts)
-
-
-def test_links_with_shapes_but_no_mass_are_named(tmp_path):
-    box = '<box size="0.1 0.1 0.1"/>'
-    parts = (
-        link("base"),
-        shaped("arm", box),
-        link("hand"),
-        joint("j", "base", "arm"),
-        joint("k", "arm", "hand", "fixed"),
-    )
-    found = imported(tmp_path, *parts)
-    assert 'link "arm" has shapes but no mass: --density estimates it from them' in found.remarks
 
 
 EXTRA = 1.3  # kg at this place in the bar's link, with an inertia of its own

@@ -5,7 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from rigid_robots import ROBOTS, moments, random_urdf, with_motion
+from rigid_robots import ROBOTS, moments, with_motion
 
 # Motor moments at q = 0.1(1 … n), q̇ = 0.2(n … 1), q̈ = 0.3 cos(0 … n − 1), gravity −9.81 along z, no friction: Pinocchio
 # 2.6.20 and MuJoCo 4.0.0, equal to all these digits.
@@ -44,25 +44,6 @@ def test_real_arms(robot, tmp_path, ffrobot):
     np.testing.assert_allclose([found[name] for name in names], expected, rtol=1e-8, atol=5e-9)
     of_urdf = moments(urdf.read_text(), *motion)
     np.testing.assert_allclose([found[name] for name in names], [of_urdf[name] for name in names], atol=1e-11)
-
-
-@pytest.fixture(scope="module", params=[1, 2, 3])
-def tree(request, tmp_path_factory, ffrobot):
-    """A random tree, its motion, and the moments that `solve` finds."""
-    rng = np.random.default_rng(request.param)
-    folder = tmp_path_factory.mktemp("tree")
-    urdf = folder / "random.urdf"
-    urdf.write_text(random_urdf(rng))
-    names = joint_names(urdf)
-    motion = [{name: float(rng.uniform(-1, 1)) for name in names} for _ in range(3)]
-    return urdf, names, motion, solved_moments(ffrobot, urdf, folder / "scene", motion)
-
-
-def test_random_trees(tree):
-    urdf, names, motion, found = tree
-    expected = moments(urdf.read_text(), *motion)
-    scale = max(map(abs, expected.values()))
-    np.testing.assert_allclose([found[name] for name in names], [expected[name] for name in names], atol=1e-11 * scale)
 
 
 def test_friction_of_joints(tmp_path, ffrobot):

@@ -105,14 +105,6 @@ def test_axes_of_a_fork_are_those_of_its_faces(tmp_path):
     np.testing.assert_allclose(np.abs(keys["interface"][1]["position"]), [0.25, 0, 0.01], atol=1e-9)
 
 
-def test_axes_of_a_plate_are_those_of_its_faces(tmp_path):
-    """Nodes of a mesh that is not symmetric are longest in a direction off these."""
-    plate(tmp_path / "plate.step", ())
-    keys = tomllib.loads(draft_link(inspect_part(tmp_path / "plate.step"), tmp_path / "plate.step", "plate", tmp_path))
-    y_axis = keys["geometry"]["y_axis"]
-    np.testing.assert_array_equal(np.abs(y_axis), [0, 0, 1])
-
-
 def test_what_has_no_ends(tmp_path):
     with gmsh_session():
         gmsh.model.occ.addSphere(0, 0, 0, 100)

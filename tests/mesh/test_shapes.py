@@ -94,16 +94,6 @@ def test_holes_that_leave_the_part_are_refused(solid, mesh_part, hole, key):
         mesh_part(solid(section=rectangle(0.02, 0.01), hole=(Hole(**hole),)))
 
 
-def test_a_finer_size_makes_more_cells(solid, mesh_part):
-    counts = [len(mesh_part(solid(), size=size).cells) for size in (0.02, 0.01, 0.005)]
-    assert counts[0] < counts[1] / 2 < counts[2] / 4
-
-
-def test_divisions_are_counted(solid, mesh_part):
-    assert len(mesh_part(solid(), divisions=(10, 2, 3), cell="hexahedron").cells) == 60
-    assert len(mesh_part(solid(), divisions=(10, 2, 3)).cells) == 360
-
-
 def test_the_same_drawing_gives_the_same_mesh(solid, mesh_part):
     tube = solid(section=TubeSection(shape="tube", outer=0.05, inner=0.03))
     first, second = mesh_part(tube, size=0.02), mesh_part(tube, size=0.02)
@@ -124,11 +114,6 @@ def test_patches_lie_on_whole_facets(solid, mesh_part, faces):
             np.testing.assert_allclose(corners.min(axis=0)[[0, 2]], [begin, -0.01], atol=1e-12)
             np.testing.assert_allclose(corners.max(axis=0)[[0, 2]], [end, 0.01], atol=1e-12)
             np.testing.assert_allclose(corners[:, 1], 0.0075 if side == "top" else -0.0075, atol=1e-12)
-
-
-def test_patches_side_by_side_over_the_full_width(solid, mesh_part):
-    part = mesh_part(solid(), outlines=Outlines(tuple((0.1 * k, 0.1 * (k + 1)) for k in range(10)), 0.025))
-    assert sum(face_area(part, name) for name in part.faces if name.endswith("top")) == pytest.approx(0.025, rel=1e-9)
 
 
 def test_gmsh_says_nothing_and_leaves_interrupts_alone(solid, mesh_part, capfd):

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from solid_parts import integrate, rectangle
 
-from ffrobot.mesh.compat import coordinate_element, create_solid_mesh, geometry_nodes
+from ffrobot.mesh.compat import create_solid_mesh
 from ffrobot.mesh.records import CircleSection, Hole, TubeSection
 from ffrobot.mesh.slices import section_quadratures
 from ffrobot.mesh.structured import structured_box
@@ -63,17 +63,6 @@ def test_a_step_is_seen_from_the_larger_x():
         section = section_quadrature(mesh, x, 2)
         assert section.weights.sum() == pytest.approx(height)
         assert section.y_range == pytest.approx((-height / 2, height / 2))
-
-
-@pytest.mark.parametrize("cell", CELLS)
-def test_reference_points_lie_in_their_cells_at_the_points(cell):
-    mesh = dolfinx_mesh(structured_box(1.0, (0.3, 0.5), (0.15, 0.2), (3, 2, 2), cell))
-    section = section_quadrature(mesh, 0.4, 3)
-    nodes = mesh.geometry.x[geometry_nodes(mesh)[section.cells]]
-    values = coordinate_element(mesh).tabulate(0, section.X)[0, ..., 0]
-    np.testing.assert_allclose(np.einsum("qv,qvi->qi", values, nodes), section.points, atol=1e-14)
-    assert section.X.min() > -1e-12
-    assert (section.X.sum(axis=1) if cell == "tetrahedron" else section.X.max(axis=1)).max() < 1 + 1e-12
 
 
 def test_the_degree_is_that_of_the_rule():

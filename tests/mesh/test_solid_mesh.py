@@ -1,6 +1,5 @@
 """The distributed mesh: regions, faces and surface are the part's, whatever the number of processes."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +8,8 @@ import ufl
 from dolfinx import fem
 
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
-from ffrobot.mesh.records import CircleSection, Outlines, PlaceRecord, SolidMeshRecord
-from ffrobot.mesh.solid_mesh import distributed, solid_mesh
-from ffrobot.mesh.structured import structured_box
+from ffrobot.mesh.records import CircleSection, PlaceRecord, SolidMeshRecord
+from ffrobot.mesh.solid_mesh import solid_mesh
 
 LINK = Path("link.toml")
 
@@ -31,22 +29,6 @@ def test_faces_and_volume_by_dolfinx(solid, cell):
     for name, area, first in (("root", 0.000375, 0.0), ("tip", 0.000375, 1.0), ("grip", 0.015, 0.5)):
         assert total(one * ds(body.faces[name])) == pytest.approx(area)
         assert total(x[0] * ds(body.faces[name])) == pytest.approx(area * first, abs=1e-12)
-
-
-def test_patches_by_dolfinx(solid):
-    body = solid_mesh(solid(), SolidMeshRecord(), (), Outlines(((0.225, 0.275), (0.725, 0.775)), 0.02), LINK)
-    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
-    x = ufl.SpatialCoordinate(body.mesh)
-    assert total(x[0] * ds(body.faces["patch/1/bottom"])) == pytest.approx(0.75 * 0.05 * 0.02)
-
-
-def test_regions_by_dolfinx():
-    box = structured_box(1.0, (0.1, 0.1), (0.1, 0.1), (10, 2, 2), "tetrahedron")
-    tags = np.where(box.points[box.corners, 0].mean(axis=1) > 0.7, 3, 0).astype(np.int32)
-    body = distributed(replace(box, cell_tag=tags, regions={"hub": 3}))
-    dx = ufl.Measure("dx", domain=body.mesh, subdomain_data=body.cell_tags)
-    x = ufl.SpatialCoordinate(body.mesh)
-    assert total(x[0] * dx(body.regions["hub"])) == pytest.approx(0.01 * 0.3 * 0.85)
 
 
 def test_curved_cells_by_dolfinx(solid):

@@ -114,21 +114,6 @@ def test_faces_of_a_step_file_in_no_shape_are_told(solid, mesh_part, step_file):
     assert part.remarks == ("1 of the 7 faces in the file are in no shape that OpenCASCADE makes of it",)
 
 
-def test_parts_apart_are_refused(solid, mesh_part, step_file):
-    def apart(occ):
-        bar(occ, 0, 490)
-        bar(occ, 500, 1000)
-
-    with pytest.raises(InputError, match=r"expected one connected part, found 2: \d+ elements around \(0.24"):
-        mesh_part(solid(file=step_file(apart), unit="mm"))
-
-
-@pytest.mark.parametrize(("unit", "says"), [("m", "1000 m along x: looks like millimetres"), ("in", "25.4 m along x")])
-def test_a_unit_slip_is_told(solid, mesh_part, step_file, unit, says):
-    with pytest.raises(InputError, match=rf"expected a part 1 m long, found {says}.*geometry.unit = \"mm\""):
-        mesh_part(solid(file=step_file(bar), unit=unit))
-
-
 def test_a_size_for_another_unit_is_refused_at_once(solid, mesh_part, step_file):
     geometry = solid(file=step_file(lambda cad: cad.addBox(0, -20, -5, 300, 40, 10)), length=0.3)
     with pytest.raises(InputError, match=r"mesh\.size that fits the part, found 0\.012 m .* another unit"):
