@@ -1,14 +1,13 @@
 """Compiled finite element forms in the user's cache, which no end of a process, however sudden, leaves unusable.
 
 FFCx locks a form by creating its `.c` file, and waits in vain for a process that died before the form was ready. Here
-it compiles into a folder that belongs to this process alone; a form that is complete goes to the cache in one step, as
-a folder of its own with the checksums of its files. Entries depend on interpreter, machine and dolfinx, as forms do.
+one process compiles at a time, under a lock that ends with it, so that a form which is not ready then is nobody's. A
+ready one carries the checksum of its library. Entries depend on interpreter, machine and dolfinx, as forms do.
 """
 
 from __future__ import annotations
 
 import atexit
-import json
 import os
 import platform
 import shutil
@@ -25,17 +24,17 @@ from typing import TYPE_CHECKING
 from platformdirs import user_cache_path
 
 from ..common.errors import SolveError
-from ..common.locks import held, is_running, this_process
+from ..common.locks import held
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-READY = ".c.cached"  # FFCx writes it last
-CHECKSUMS = "checksums.json"
-OWN = ".of-"  # begins the names of folders of single processes
+READY = ".c.cached"  # FFCx makes this file last, and never reads it: it takes the checksum
 ROOM = 32 << 20  # bytes that compiling takes at most
 LEAST = 2 << 20  # bytes: with less a compilation has failed for want of them
 PATIENCE = 60.0  # s, then a form that another process compiles is compiled twice
+
+_sound: set[Path] = set()  # of forms that this process has checked, where each is ready
 
 
 @contextmanager
@@ -47,93 +46,46 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
     if comm.rank != 0:
         yield Path(comm.bcast(None))
         return
-    shared, own = _folders(compiler)
-    if comm.size > 1:
-        comm.bcast(str(own))
-    with held(shared / "compiling.lock", PATIENCE):  # others wait, and find what this process compiles
-        _forget_unfinished(own)
-        _fetch(shared, own)
+    folder = user_cache_path("ffrobot") / "forms" / f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    with held(folder / "compiling.lock", PATIENCE) as is_alone:  # others wait, and find what this process compiles
+        if not is_alone or shutil.disk_usage(folder).free < ROOM:
+            folder = _own_folder()
+        _forget_unsound(folder)
+        if comm.size > 1:
+            comm.bcast(str(folder))
         try:
-            yield own
+            yield folder
         except Exception as error:  # of FFCx, cffi or the compiler
-            if full := [place for place in (own, tempfile.gettempdir()) if shutil.disk_usage(place).free < LEAST]:
+            if full := [place for place in (folder, tempfile.gettempdir()) if shutil.disk_usage(place).free < LEAST]:
                 raise SolveError(f"{full[0]}: cannot compile finite elements: {os.strerror(ENOSPC)}") from error
             raise
-        _publish(own, shared)
+        with suppress(OSError):  # a form without its checksum is compiled again
+            for ready in set(folder.glob(f"*{READY}")) - _sound:
+                ready.write_text(_checksum(ready), encoding="ascii")
+                _sound.add(ready)
 
 
 @cache
-def _folders(compiler: str) -> tuple[Path, Path]:
-    """The cache, and a new folder of this process, gone when it ends; those of processes that were killed are removed.
-
-    They are where the environment says at first: what has been loaded from there cannot move.
-    """
-    shared = user_cache_path("ffrobot") / "forms" / f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
-    try:
-        shared.mkdir(parents=True, exist_ok=True)
-        if shutil.disk_usage(shared).free < ROOM:
-            raise OSError(ENOSPC, os.strerror(ENOSPC))
-        for folder in shared.glob(f"{OWN}*"):
-            if not is_running(folder.name.removeprefix(OWN).rpartition(".")[0]):
-                shutil.rmtree(folder, ignore_errors=True)
-        own = tempfile.mkdtemp(prefix=f"{OWN}{this_process()}.", dir=shared)
-    except OSError:  # read-only, full, or a file in its place
-        own = tempfile.mkdtemp(prefix="ffrobot-forms-")
+def _own_folder() -> Path:
+    """A new folder, gone when this process ends."""
+    own = tempfile.mkdtemp(prefix="ffrobot-forms-")
     atexit.register(shutil.rmtree, own, ignore_errors=True)
-    return shared, Path(own)
+    return Path(own)
 
 
-def _forget_unfinished(own: Path) -> None:
-    """What an interrupted compilation of this very process has left: FFCx would wait for it."""
-    names = set(os.listdir(own))
-    for name in names:
-        if name.endswith(".c") and name.replace(".c", READY) not in names:
-            (own / name).unlink()
+def _forget_unsound(folder: Path) -> None:
+    """Remove forms that nobody has finished, and damaged ones."""
+    for ready in {source.with_suffix(READY) for source in folder.glob("*.c")} - _sound:
+        if ready.is_file() and ready.read_bytes() == _checksum(ready).encode():
+            _sound.add(ready)
+        else:
+            for file in folder.glob(f"{ready.name.removesuffix(READY)}.*"):
+                file.unlink()
 
 
-def _fetch(shared: Path, own: Path) -> None:
-    """Bring in forms that others have compiled; damaged ones are left out and removed."""
-    with suppress(OSError):
-        there = set(os.listdir(own))
-        for entry in (shared / name for name in sorted(os.listdir(shared)) if name + READY not in there):
-            if entry.name.startswith(".") or not entry.is_dir():
-                continue
-            if not _is_sound(entry):
-                shutil.rmtree(entry, ignore_errors=True)
-                continue
-            for file in sorted(entry.iterdir(), key=lambda file: file.name.endswith(READY)):  # which goes last
-                if file.name != CHECKSUMS:
-                    _give(file, own / file.name)
-
-
-def _give(file: Path, name: Path) -> None:
-    try:
-        name.hardlink_to(file)
-    except OSError:
-        shutil.copyfile(file, name)
-
-
-def _publish(own: Path, shared: Path) -> None:
-    """Give others what this process has compiled; a cache that cannot be written does no harm."""
-    with suppress(OSError):
-        known = set(os.listdir(shared))
-        for name in (file.removesuffix(READY) for file in os.listdir(own) if file.endswith(READY)):
-            if name in known:
-                continue
-            made = Path(tempfile.mkdtemp(prefix=".new-", dir=own))
-            files = [file for file in own.glob(f"{name}.*") if file.suffix in (".c", ".so", ".cached")]
-            for file in files:
-                shutil.copyfile(file, made / file.name)
-            sums = {file.name: zlib.crc32(file.read_bytes()) for file in files}
-            (made / CHECKSUMS).write_text(json.dumps(sums), encoding="utf-8")
-            made.chmod(0o755)
-            with suppress(OSError):  # another process may have been first
-                made.rename(shared / name)
-
-
-def _is_sound(entry: Path) -> bool:
-    try:
-        sums = json.loads((entry / CHECKSUMS).read_text(encoding="utf-8"))
-        return bool(sums) and all(zlib.crc32((entry / name).read_bytes()) == value for name, value in sums.items())
-    except (OSError, ValueError, AttributeError):
-        return False
+def _checksum(ready: Path) -> str:
+    """Of the library of a form, by the file that says it is ready; empty where there is none."""
+    libraries = ready.parent.glob(f"{ready.name.removesuffix(READY)}.*.so")
+    return "".join(f"{zlib.crc32(library.read_bytes()):08x}" for library in libraries)
