@@ -12,7 +12,7 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 from .interpolation import AlongAxis, interpolate
-from .parts import Integrals, Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
+from .parts import Frozen, Integrals, Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint
 from .unit_loads import unit_load_names
 
 # m_ff = I and the identities between invariants must hold to this.
@@ -41,7 +41,7 @@ OF_PART: dict[type, dict[str, str]] = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ModalBody(Integrals):
+class ModalBody(Integrals, Frozen):
     """A flexible link in mass-orthonormal modal coordinates; immutable, checked when made. SI units, the link's frame.
 
     Attributes:
@@ -110,7 +110,7 @@ class ModalBody(Integrals):
     def __post_init__(self) -> None:
         if not np.size(self.residual):
             object.__setattr__(self, "residual", np.zeros(len(self.family), dtype=np.int64))
-        freeze(self)
+        super().__post_init__()
         with np.errstate(all="ignore"):  # what is not finite is refused
             _check(self)
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
 
 # ε_abc, (3, 3, 3): (u × v)_a = ε_abc u_b v_c.
 LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for b in range(3)] for a in range(3)])
@@ -56,8 +51,28 @@ class Invariants(Integrals):
     S_spin: Array
 
 
+class Frozen:
+    """A dataclass that owns read-only copies of all its arrays, and read-only views of its mappings."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if isinstance(value, Mapping):
+                value = MappingProxyType({key: _frozen(entry) for key, entry in value.items()})
+            object.__setattr__(self, name, _frozen(value))
+
+
+def _frozen(value: object) -> object:
+    if not isinstance(value, np.ndarray):
+        return value
+    if value.ndim == 0:
+        return float(value)
+    copy = np.array(value, dtype=np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64)
+    copy.setflags(write=False)
+    return copy
+
+
 @struct
-class Interface:
+class Interface(Frozen):
     """What the modes do at one point of the axis, in the link's frame.
 
     Attributes:
@@ -72,12 +87,9 @@ class Interface:
     rotation: Array
     coupling: str = ""
 
-    def __post_init__(self) -> None:
-        freeze(self)
-
 
 @struct
-class Stations:
+class Stations(Frozen):
     """Points along the axis, ascending in x, at which the modes are known.
 
     Attributes:
@@ -106,12 +118,9 @@ class Stations:
     out_of_plane_rigidity: Array | None = None
     torsional_rigidity: Array | None = None
 
-    def __post_init__(self) -> None:
-        freeze(self)
-
 
 @struct
-class PictureMesh:
+class PictureMesh(Frozen):
     """What a picture of the link needs.
 
     Attributes:
@@ -126,12 +135,9 @@ class PictureMesh:
     mode_shapes: Array
     edges: Integers | None = None
 
-    def __post_init__(self) -> None:
-        freeze(self)
-
 
 @struct
-class StressPoint:
+class StressPoint(Frozen):
     """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
 
     Attributes:
@@ -147,12 +153,9 @@ class StressPoint:
     strain: Array
     static: Array | None = None
 
-    def __post_init__(self) -> None:
-        freeze(self)
-
 
 @struct
-class MeasuredValues:
+class MeasuredValues(Frozen):
     """Which values of the modes were measured, and what the finite element model says in the place of frequencies.
 
     Attributes:
@@ -165,9 +168,6 @@ class MeasuredValues:
     damping_ratio: Integers
     computed_frequency: Array
 
-    def __post_init__(self) -> None:
-        freeze(self)
-
     def in_words(self) -> str:
         """Which modes they are, counted from 1."""
         found = {"frequencies": self.frequency, "damping ratios": self.damping_ratio}
@@ -177,7 +177,7 @@ class MeasuredValues:
 
 
 @struct
-class OutlinedPatches:
+class OutlinedPatches(Frozen):
     """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
 
     Attributes:
@@ -192,25 +192,3 @@ class OutlinedPatches:
     width: float
     top: Array | None = None
     bottom: Array | None = None
-
-    def __post_init__(self) -> None:
-        freeze(self)
-
-
-def freeze(record: DataclassInstance) -> None:
-    """Own read-only copies of all arrays of a frozen dataclass, and read-only views of its mappings."""
-    for item in fields(record):
-        value = getattr(record, item.name)
-        if isinstance(value, Mapping):
-            value = MappingProxyType({key: _frozen(entry) for key, entry in value.items()})
-        object.__setattr__(record, item.name, _frozen(value))
-
-
-def _frozen(value: object) -> object:
-    if not isinstance(value, np.ndarray):
-        return value
-    if value.ndim == 0:
-        return float(value)
-    copy = np.array(value, dtype=np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64)
-    copy.setflags(write=False)
-    return copy
