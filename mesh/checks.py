@@ -12,8 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
-from .cells import KUHN
-from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes, volume_of_tetrahedra
+from .cells import KUHN, SLIVER, cell_quality, jacobians, reference_nodes, volume_of_tetrahedra
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import SolidGeometry
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..common.arrays import Array, Integers
 from ..common.errors import InputError
-from .cells import VOLUME_ELEMENTS
-from .jacobian import SLIVER, cell_quality
+from .cells import SLIVER, VOLUME_ELEMENTS, cell_quality
 from .records import CIRCLE, GROWTH
 from .source import MeshBlocks, RawMesh
 

@@ -16,9 +16,9 @@ from scipy.optimize import least_squares
 from ..common.arrays import Array, Integers, as_floats
 from ..common.errors import InputError
 from ..common.structs import struct
+from .cells import volume_of_tetrahedra
 from .checks import METRES, check_connected, check_neighbours, check_quality, oriented, straightened
 from .faces import Boundary, SmoothFace
-from .jacobian import volume_of_tetrahedra
 from .part import is_step, source_of_file
 from .records import SolidMeshRecord
 from .source import PointMass

@@ -3,7 +3,7 @@
 import basix
 import numpy as np
 
-from ffrobot.mesh.jacobian import jacobians, reference_nodes
+from ffrobot.mesh.cells import jacobians, reference_nodes
 from ffrobot.mesh.part_mesh import facet_geometry
 from ffrobot.mesh.records import RectangleSection
 

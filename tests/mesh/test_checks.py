@@ -7,6 +7,7 @@ import pytest
 from solid_parts import integrate, shape_functions
 
 from ffrobot.common.errors import InputError
+from ffrobot.mesh.cells import jacobians, reference_nodes
 from ffrobot.mesh.checks import (
     check_boundary,
     check_connected,
@@ -16,7 +17,6 @@ from ffrobot.mesh.checks import (
     oriented,
     straightened,
 )
-from ffrobot.mesh.jacobian import jacobians, reference_nodes
 from ffrobot.mesh.part_mesh import PartMesh
 from ffrobot.mesh.structured import structured_box
 
