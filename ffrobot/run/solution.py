@@ -29,8 +29,7 @@ from ..mbs.quantities.attachment_error import (
     start_jolt,
     start_of_motion,
 )
-from ..mbs.quantities.energy import Energies, Momentum
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import Energies, Momentum, RobotMotion
 from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing
 from ..mbs.quantities.stress import BodyStress

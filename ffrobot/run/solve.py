@@ -17,8 +17,7 @@ from ..actuation.points import PointForces, forces_at_points, solve_points
 from ..common.arrays import Array, Indices
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.energy import totals
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import RobotMotion, totals
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis

@@ -25,9 +25,11 @@ class CutCoordinate(NamedTuple):
     """A coordinate of a joint at which a loop is cut."""
 
     joint: JointRecord  # whose it is; of the second of its sides on the first
+    number: int  # of the joint's coordinates
     row: ConstraintRow  # measures `row.sign` times the coordinate
     friction: Friction | None  # along it
     loads: tuple[TimeFunction, ...]  # given forces of time along it, N·m or N
+    guess: float  # of its first value, as [initial] has it, else 0
 
     @property
     def is_loaded(self) -> bool:
@@ -57,9 +59,11 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
     """Of all joints at which loops are cut and whose coordinates the tree has not."""
     for joint in tree.cut_joints:
         frictions = joint.frictions or (None,) * len(joint.along)
+        guesses = np.array(scene.initial.joints.get(joint.name, ()), dtype=float).ravel()
         for number, friction in enumerate(frictions):
             loads = tuple(load.moments[number] for load in scene.load if load.joint == joint.name)
-            yield CutCoordinate(joint, cut_row(tree, joint, number), friction, loads)
+            guess = float(guesses[number]) if guesses.size else 0.0
+            yield CutCoordinate(joint, number, cut_row(tree, joint, number), friction, loads, guess)
 
 
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
@@ -108,3 +112,47 @@ def cut_damping(tree: KinematicTree, cut: Sequence[CutCoordinate], q: Array) -> 
             assert one.friction is not None
             found += one.friction.viscous * np.outer(G, G)
     return found
+
+
+class CutMotion(NamedTuple):
+    """Of a coordinate along a joint at which a loop is cut."""
+
+    coordinate: Array  # (T,), full turns counted
+    rate: Array  # (T,)
+    is_counted: bool  # whether the times are close enough together to count its turns
+
+
+def cut_motions(
+    tree: KinematicTree,
+    cut: Sequence[CutCoordinate],
+    q: Array,
+    v: Array,
+    times: Array,
+    frames: Sequence[Motion] | None = None,
+) -> list[CutMotion]:
+    """Of each of `cut` at q (T, n_q), v (T, n_v) and `times` (T,); angles begin nearest to their guesses."""
+    found = []
+    values, gradients = measured(tree, cut, q, tree.frames(q) if frames is None else frames)
+    for one, value, G in zip(cut, values.T, gradients.swapaxes(0, 1), strict=True):
+        rate = np.einsum("tj,tj->t", G, v)
+        turns = one.row.kind == "turn"
+        coordinate, is_counted = _unwound(value, rate, times, one.guess) if turns else (value, True)
+        found.append(CutMotion(coordinate, rate, is_counted))
+    return found
+
+
+def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Array, bool]:
+    """The angle (T,) with full turns: each the nearest to where the rates lead from the one before.
+
+    Rates lead there by cubics with the slopes of their differences. Turns are counted where these are near the
+    trapezoidal rule and the angle found.
+    """
+    if len(times) < 2:
+        return angle + 2 * np.pi * np.round((guess - angle) / (2 * np.pi)), True
+    h, slope = np.diff(times), np.gradient(rate, times, edge_order=2 if len(times) > 2 else 1)
+    rough = h * (rate[1:] + rate[:-1]) / 2
+    way = rough - h**2 * np.diff(slope) / 12
+    turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
+    found: Array = angle + 2 * np.pi * np.cumsum(turns)
+    off = np.abs(way - np.array([rough, np.diff(found)])).max()
+    return found, bool(off < np.pi / 2)

@@ -1,4 +1,4 @@
-"""What is read off a motion: places of bodies and points, joint coordinates, path forces, motor moments.
+"""What is read off a motion: places of bodies and points, joint coordinates, forces of paths and motors, energies.
 
 All arrays are over the output times (T, …), SI units, global axes unless a name says otherwise.
 """
@@ -18,8 +18,7 @@ from ...common.structs import struct
 from ..analysis.gears import Supplied, supplied_through_gears, with_motors
 from ..analysis.outcome import GearMotion
 from ..model.body import bent_section
-from ..model.cut import CutCoordinate
-from ..model.cut_motion import CutMotion, cut_motions
+from ..model.cut import CutCoordinate, CutMotion, cut_motions
 from ..model.drives import Drives, PointDrive
 from ..model.gears import compliance, with_compliance
 from ..model.known_motion import MotionForces, motion_forces, row_accelerations
@@ -147,7 +146,7 @@ class RobotMotion:
         """Coordinates of joints at which loops are cut."""
         if not self.model.cut:  # saves the motion of all frames
             return []
-        motions = cut_motions(self.model, self.q, self.v, self.time, self.frames)
+        motions = cut_motions(self.model.tree, self.model.cut, self.q, self.v, self.time, self.frames)
         return list(zip(self.model.cut, motions, strict=True))
 
     @cached_property
@@ -286,13 +285,13 @@ class RobotMotion:
         """
         return self._found_motor_forces()
 
+    def _found_motor_forces(self) -> MotorForces | None:
+        return None if self._supplied is None else self._supplied.forces
+
     @property
     def motor_moments(self) -> Mapping[str, Array]:
         """By joint (T, k), N·m or N: what motors do, or have to do in place of what is prescribed."""
         return self.commanded if self.motor_forces is None else self.motor_forces.moments
-
-    def _found_motor_forces(self) -> MotorForces | None:
-        return None if self._supplied is None else self._supplied.forces
 
     @cached_property
     def _supplied(self) -> Supplied | None:
@@ -346,3 +345,31 @@ def continuous(e: Array) -> Array:
     flips = np.sum(e[1:] * e[:-1], axis=1) < 0
     signs: Array = np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)
     return e * signs[:, None]
+
+
+@struct
+class Energies:
+    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate.
+
+    Compliant gears store energy, too, and their motors turn as they have to.
+    """
+
+    kinetic: Array
+    strain: Array
+    gravitational: Array
+    dissipated_power: Array
+
+
+@struct
+class Momentum:
+    """Linear (T, 3) kg·m/s, and angular about the global origin (T, 3) kg·m²/s."""
+
+    linear: Array
+    angular: Array
+
+
+def totals(motion: RobotMotion) -> tuple[Energies, Momentum]:
+    """Of all bodies and rotors."""
+    motion = motion.behind_gears
+    found = motion.system.core.states_totals(motion.system.scene, motion.q, motion.v)
+    return Energies(*found[:, :4].T), Momentum(found[:, 4:7], found[:, 7:])

@@ -15,7 +15,7 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..joints.joint import JointRecord
-from ..model.cut_motion import cut_motions
+from ..model.cut import cut_motions
 from ..model.model import Model
 from ..model.tree import KinematicTree, Node
 
@@ -34,13 +34,13 @@ class Watched(NamedTuple):
     @property
     def limits(self) -> tuple[float, float]:
         """In the core: of the tree's coordinate."""
-        lowest, highest = self.joint.position_limits[self.number]
-        return (lowest, highest) if self.sign > 0 else (-highest, -lowest)
+        lowest, highest = sorted(self.sign * limit for limit in self.joint.position_limits[self.number])
+        return lowest, highest
 
     def seen(self, found: Seen) -> Seen:
         """Of the joint's coordinate, from what the core has found."""
-        least, largest, left_at = found
-        return (least, largest, left_at) if self.sign > 0 else (0.0 - largest, 0.0 - least, left_at)
+        least, largest = sorted(self.sign * value + 0.0 for value in found[:2])
+        return least, largest, found[2]
 
 
 def watched(tree: KinematicTree) -> list[Watched]:
@@ -49,11 +49,9 @@ def watched(tree: KinematicTree) -> list[Watched]:
     for node in tree.nodes:
         if _is_limited(node.joint) and not _is_sampled(node):
             # Which of q with which sign, read off numbers that all differ
-            numbers = node.joint.coordinates(np.arange(1.0, node.joint.q_count + 1))
-            numbers = node.joint.turned_around(numbers) if node.backwards else numbers
-            for number, entry in enumerate(numbers):
+            for number, entry in enumerate(node.coordinates(np.arange(1.0, tree.n_q + 1))):
                 if np.isfinite(node.joint.position_limits[number]).any():
-                    at = node.v.start + abs(int(entry)) - 1
+                    at = abs(int(entry)) - 1 - node.q.start + node.v.start
                     found.append(Watched(node.joint, number, at, float(np.sign(entry))))
     return found
 
@@ -70,23 +68,18 @@ def left_ranges(model: Model, found: Sequence[Seen], times: Array, q: Array, v: 
     `found` is what the core has seen of `watched`; the others are looked at in outputs at `times` (T,): `q` (T, n_q),
     `v` (T, n_v).
     """
-    for one, seen in zip(watched(model.tree), found, strict=True):
-        yield from _messages(one.joint, one.number, one.seen(seen))
-    for joint, values in (*_sampled_in_tree(model, q), *_at_cuts(model, times, q, v)):
-        for number, of_one in enumerate(values):
-            lowest, highest = joint.position_limits[number]
-            outside = np.flatnonzero((of_one < lowest) | (of_one > highest))
-            left_at = float(times[outside[0]]) if outside.size else None
-            yield from _messages(joint, number, (float(of_one.min()), float(of_one.max()), left_at))
-
-
-def _messages(joint: JointRecord, number: int, seen: Seen) -> Iterator[str]:
-    (lowest, highest), unit, (least, largest, left_at) = joint.position_limits[number], joint.units[number], seen
-    if left_at is not None:
-        yield (
-            f"{joint.label}: leaves its position_limit [{lowest:.6g}, {highest:.6g}] {unit} at t ="
-            f" {left_at:.6g} s; it goes from {least:.6g} to {largest:.6g} {unit}"
-        )
+    seen = [(one.joint, one.number, one.seen(values)) for one, values in zip(watched(model.tree), found, strict=True)]
+    for joint, number, values in _sampled(model, times, q, v):
+        lowest, highest = joint.position_limits[number]
+        outside = times[(values < lowest) | (values > highest)]
+        seen.append((joint, number, (values.min(), values.max(), outside[0] if outside.size else None)))
+    for joint, number, (least, largest, left_at) in seen:
+        (lowest, highest), unit = joint.position_limits[number], joint.units[number]
+        if left_at is not None:
+            yield (
+                f"{joint.label}: leaves its position_limit [{lowest:.6g}, {highest:.6g}] {unit} at t ="
+                f" {left_at:.6g} s; it goes from {least:.6g} to {largest:.6g} {unit}"
+            )
 
 
 def _is_limited(joint: JointRecord) -> bool:
@@ -98,18 +91,11 @@ def _is_sampled(node: Node) -> bool:
     return node.backwards and node.joint.type == "planar"
 
 
-def _sampled_in_tree(model: Model, q: Array) -> Iterator[tuple[JointRecord, Array]]:
-    """Joints of the tree that the core does not watch, with their coordinates (k, T)."""
+def _sampled(model: Model, times: Array, q: Array, v: Array) -> Iterator[tuple[JointRecord, int, Array]]:
+    """Coordinates (T,) that the core does not watch, of joints with limits: in the tree, and where loops are cut."""
     for node in model.tree.nodes:
         if _is_limited(node.joint) and _is_sampled(node):
-            yield node.joint, node.coordinates(q).T
-
-
-def _at_cuts(model: Model, times: Array, q: Array, v: Array) -> Iterator[tuple[JointRecord, Array]]:
-    """Joints at which loops are cut, where they have limits."""
-    limited = {joint.name: joint for joint in model.tree.cut_joints if _is_limited(joint)}
-    if limited:
-        motions = cut_motions(model, q, v, times)
-        for name, joint in limited.items():
-            own = (motion for one, motion in zip(model.cut, motions, strict=True) if one.joint.name == name)
-            yield joint, np.array([motion.coordinate for motion in own])
+            yield from ((node.joint, number, values) for number, values in enumerate(node.coordinates(q).T))
+    if any(map(_is_limited, model.tree.cut_joints)):
+        for one, motion in zip(model.cut, cut_motions(model.tree, model.cut, q, v, times), strict=True):
+            yield one.joint, one.number, motion.coordinate

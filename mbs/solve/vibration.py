@@ -1,9 +1,10 @@
-"""Small vibrations of an assembly about rest, and along a path, under its constraints."""
+"""Small vibrations of an assembly about rest, and along a path, under its constraints; damping wanted of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,10 +13,11 @@ import numpy as np
 from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
+from ..model.body import Body
 from ..model.cut import cut_damping
 from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
-from ..model.model import Model, row_values
+from ..model.model import Model, row_values, without_paths
 from ..model.system import MultibodySystem
 from .posture import solve_posture
 from .redundancy import resolved
@@ -125,3 +127,37 @@ def common_modes(path: Path, found: Sequence[tuple[Array, Array]], modes: int) -
         )
     frequency = np.array([omega[:modes] for omega, _ in found]) / (2 * np.pi)
     return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in found]))
+
+
+def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
+    """The robot with links so damped that its vibrations have the damping ratios ζ, given by body, where all agree.
+
+    At the initial posture, motors free, gears rigid. Bodies not named keep the damping that they have.
+    docs/theory.md, Damping.
+    """
+    if not ratios:
+        return model
+    start, tree = undeformed_posture(model), model.tree
+    modes = vibrations_of(without_paths(model), without_rows(model), 0.0, start.q)
+    wanted = unit_damping(modes.frequency, modes.shape[~tree.joint_columns])
+    bodies = _damped([node.body for node in tree.nodes], wanted, ratios)
+    return replace(model, tree=tree.with_bodies(bodies))
+
+
+def unit_damping(frequency: Array, shape: Array) -> Array:
+    """D (modes of all bodies)², 1/s, under which all vibrations have the damping ratio 1: ΦᵀDΦ = diag(2ω).
+
+    Rigid motion is free of it; motion of p that the joints do not allow, too. `frequency` ω (n,) rad/s; `shape` Φ
+    (modes of all bodies, n), the rows p of M-orthonormal shapes, body by body.
+    """
+    inverse = np.linalg.pinv(shape)
+    return as_floats(inverse.T @ (2 * frequency[:, None] * inverse))
+
+
+def _damped(bodies: Sequence[Body], wanted: Array, ratios: Mapping[str, float]) -> tuple[Body, ...]:
+    """With their blocks on the diagonal of `wanted` (modes of all bodies)², ζ times; bodies not named as they are."""
+    ends = np.cumsum([0, *(body.n_modes for body in bodies)])
+    return tuple(
+        replace(body, damping=ratios[body.name] * wanted[first:last, first:last]) if body.name in ratios else body
+        for body, (first, last) in zip(bodies, pairwise(ends), strict=True)
+    )

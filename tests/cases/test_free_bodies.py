@@ -12,8 +12,7 @@ from ffrobot.mbs.analysis.drive import drive_robot
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.model.known_motion import State
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.quantities.energy import totals
-from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.quantities.motion import RobotMotion, totals
 from ffrobot.run.bodies import load_bodies
 from ffrobot.scene.load import validated_scene
 

@@ -13,7 +13,7 @@ from triad_measures import Ground, Joint, Section, Spinning
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.cut import measured
 from ffrobot.mbs.model.gears import gear_forces, resistance, rotor
-from ffrobot.mbs.quantities.energy import Energies, Momentum
+from ffrobot.mbs.quantities.motion import Energies, Momentum
 
 
 class Accelerated(NamedTuple):

@@ -12,8 +12,7 @@ from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.analysis.outcome import Motion, Outcome
 from ffrobot.mbs.model.model import row_values, target_rates
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.energy import totals
-from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.quantities.motion import RobotMotion, totals
 from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.scene.analysis import IntegratedAnalysis
 from ffrobot.mbs.solve.start import undeformed_posture

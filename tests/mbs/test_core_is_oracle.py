@@ -9,7 +9,7 @@ from oracle_runs import evaluated, posture_of, random_tree_state
 from prescribed_oracle import residuals
 
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.quantities.energy import totals
+from ffrobot.mbs.quantities.motion import totals
 
 T = 0.37
 

@@ -9,7 +9,7 @@ from oracle_3d import Mechanism
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.energy import totals
+from ffrobot.mbs.quantities.motion import totals
 from ffrobot.mbs.quantities.reactions import reactions
 
 CHAINS = [

@@ -21,8 +21,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.model.drives import Drive, Drives
 from ffrobot.mbs.model.gears import gear_forces, with_compliance
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.energy import totals
-from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.quantities.motion import RobotMotion, totals
 from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.solve.integrators import METHODS
 
