@@ -50,14 +50,13 @@ def link(name, damping, length, height, width, E, density):
     )  # fmt: skip
 
 
-def solved(arm, pieces=None, **keys):
-    """All joints along fifth-order polynomials from a static start; links b and c in so many `pieces`."""
-    divided = {} if pieces is None else {"pieces": pieces}
+def solved(arm, **keys):
+    """All joints along fifth-order polynomials from a static start."""
     length, mass = arm["first"]
     points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]}
     first = {"mass": mass, "center": [length / 2, 0.01, -0.02], "inertia": [0.002, 0.01, 0.011], "points": points}
     flexible = [
-        {"name": name, "link": link(name, arm["damping"], *of), **divided}
+        {"name": name, "link": link(name, arm["damping"], *of)}
         for name, of in zip("bc", arm["links"], strict=True)
     ]  # fmt: skip
     sides = [["ground", "a.root"], ["a.tip", "b.root"], ["b.tip", "c.root"]]
@@ -85,8 +84,9 @@ def solved(arm, pieces=None, **keys):
     return ffrobot.solve(scene)
 
 
-@pytest.mark.parametrize("stiffened", [False, True], ids=["off", "on"])
-@pytest.mark.parametrize("name", list(ARMS))
+@pytest.mark.parametrize(
+    ("name", "stiffened"), [("bends by 15 %", False), ("bends by 15 %", True), ("bends by 5 %", False)]
+)
 @pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 def test_stated_errors_are_true_within_a_factor_of_five(name, stiffened):
     """Of the link that bends most, and of the other, which what the first does wrong moves and loads."""
@@ -102,19 +102,3 @@ def test_stated_errors_are_true_within_a_factor_of_five(name, stiffened):
             (error / np.linalg.norm(exact, axis=1).max(), about["relative_error"]),
         ):
             assert 0.2 < true / stated < 5
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
-def test_stated_errors_of_two_pieces_against_six():
-    """These are nearly ten times as accurate; the references above are not accurate enough to judge two."""
-    arm = ARMS["bends by 5 %"]
-    two, six = solved(arm, 2), solved(arm, 6)
-    for body, of in zip("bc", arm["links"], strict=True):
-        found, exact = (results[f"run/points/{body}.tip/deflection"] for results in (two, six))
-        error, about = np.linalg.norm(found - exact, axis=1).max(), two.attributes(f"run/bodies/{body}")
-        for true, stated in (
-            (error / of[0], about["position_error"]),
-            (error / np.linalg.norm(exact, axis=1).max(), about["relative_error"]),
-        ):
-            assert 0.2 < true / stated < 3

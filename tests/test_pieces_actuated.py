@@ -13,7 +13,7 @@ from ffrobot.run.solve import solve_scene
 
 S = "(10*t**3-15*t**4+6*t**5)"
 PATCHES = {"count": 4, "length": 0.12, "width": 0.02, "thickness": 5e-4, "modulus": 63e9, "d31": 1.1e-10}
-INVERSE = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}
+INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.01, "tolerance": 1e-5}
 LOOP = {"kind": "closed-loop", "end": 0.2, "output_step": 0.01, "tolerance": 1e-5, "sample_time": 1e-3} | {
     "actuation": "inverse", "unlimited": True
 }  # fmt: skip
