@@ -106,18 +106,6 @@ def test_forward_motion_under_given_moments(tmp_path, ffrobot):
         assert "moment" not in group["joints/q1"]
 
 
-def test_shape_that_is_given(tmp_path, ffrobot):
-    """p as asked for; what holds it is what the equations of one mode say where nothing else moves."""
-    given = 'kind = "fcid"\nshape = "given"\nmodal = { fore = ["1e-3*sin(20*t)"] }'
-    scene = write_scene("arm3_line_static", tmp_path, ('kind = "pcid"', given))
-    with solved(ffrobot, scene) as file:
-        group, t = file["inverse"], file["inverse/time"][()]
-        np.testing.assert_allclose(group["bodies/fore/modal"][:, 0], 1e-3 * np.sin(20 * t), atol=1e-15)
-        np.testing.assert_allclose(group["bodies/fore/modal_velocity"][:, 0], 0.02 * np.cos(20 * t), atol=1e-13)
-        assert not np.any(group["bodies/fore/modal"][:, 1:])
-        assert np.max(group["constraint_violation"]) < 1e-11
-
-
 @pytest.mark.parametrize(("seed", "number"), [(301, 1), (303, 17)])
 def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
     """Upright axes hold nothing: what is left of gravity and elasticity together is rounding, the same as all of it."""

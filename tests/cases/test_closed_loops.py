@@ -145,19 +145,3 @@ def test_bad_keys_are_refused(tmp_path, keys, expected):
     path = scenes_in_3d.write(arm(HOLD, held("loop", HOLDS) | keys), tmp_path / "scene.toml")
     with pytest.raises(InputError, match=expected):
         ffrobot.solve(path)
-
-
-def test_joints_that_no_sensor_reads_are_refused(tmp_path):
-    points = {"root": [0.0, 0.0, 0.0], "tip": [0.0, 0.0, 0.5]}
-    body = {
-        "name": "b",
-        "rigid": {"mass": 1.0, "center": [0.0, 0.0, 0.2], "inertia": [0.02, 0.03, 0.01], "points": points},
-    }
-    joint = {"name": "S", "type": "spherical", "between": ["ground", "b.root"]}
-    tables = {
-        "name": "s", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "body": [body], "joint": [joint],
-        "trajectory": [{"name": "tip", "point": "b.tip", "x": "0", "y": "0"}],
-        "analysis": [HOLD, held("loop", sensor=[{"joint": "S"}])],
-    }  # fmt: skip
-    with pytest.raises(InputError, match='expected one with coordinates, found "S", a spherical joint'):
-        solve(tables, tmp_path)

@@ -7,7 +7,6 @@ from scipy.interpolate import CubicSpline
 
 import ffrobot
 from ffrobot.actuation.control.robot import RigidArm
-from ffrobot.mbs.model.cut import cut_damping, cut_resistance
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
@@ -172,16 +171,6 @@ def test_sensors_on_all_joints_of_a_loop_without_a_rotor_are_refused():
     sensed = HELD | {"sensor": [{"joint": name} for name in SIDES]}
     with pytest.raises(ffrobot.InputError, match=r'expected one with coordinates, found "D".* at which a loop is cut'):
         ffrobot.solve(ffrobot.make_scene(**in_3d(own, [INVERSE, sensed])))
-
-
-def test_damping_of_a_cut_joint_is_its_resistance():
-    """Viscous friction alone, at any rates: D v."""
-    scene = ffrobot.make_scene(**in_3d({name: {"viscous_friction": 0.3} for name in "ABDC"}, [INVERSE]))
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
-    q, v = undeformed_posture(model).q, np.linspace(1.0, 2.0, model.tree.n_v)
-    expected = cut_resistance(model.tree, model.cut, q[None], v[None])[0]
-    assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(cut_damping(model.tree, model.cut, q) @ v, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("tables", [planar, in_3d])

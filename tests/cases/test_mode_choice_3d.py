@@ -6,7 +6,7 @@ import scenes_in_3d
 from checkpoints import CASES
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.truncation import interface_loads, with_fewer_modes
+from ffrobot.mbs.model.truncation import with_fewer_modes
 from ffrobot.run.bodies import load_bodies
 from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import difference
@@ -102,19 +102,6 @@ def test_what_is_left_out_keeps_its_static_flexibility_in_3d(link, lowest):
         return B_T.T @ (B_T / of.stiffness[:, None])
 
     np.testing.assert_allclose(flexibility(body), flexibility(link), rtol=0, atol=1e-9 * flexibility(link).max())
-
-
-def test_coordinates_with_fewer_modes_are_orthonormal_and_their_forces_known(link):
-    body = with_fewer_modes(link, 4, POINTS)
-    T, lift = body.reduction.T, body.reduction.lift
-    np.testing.assert_allclose(T.T @ T, np.eye(body.n_modes), atol=1e-11)
-    K = T.T @ np.diag(link.stiffness) @ T
-    np.testing.assert_allclose(K, np.diag(body.stiffness), rtol=0, atol=1e-10 * body.stiffness.max())
-    B_T = interface_loads(link, POINTS)
-    np.testing.assert_allclose(lift @ T.T @ B_T, B_T, atol=1e-10)
-    np.testing.assert_allclose(body.on_file @ body.modal_transform, np.eye(body.n_modes), atol=1e-9)
-    lowest = np.sort(link.stiffness)[:4]
-    np.testing.assert_array_equal(np.sort(body.stiffness[:4]), lowest)
 
 
 @pytest.mark.parametrize("modes", ["many", -1, 2.5])

@@ -11,7 +11,6 @@ from tables_3d import ORIGIN, Y, revolute, scene
 
 import ffrobot
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.mbs.model.body import from_modal_body
 
 BOTH = ["in-plane-bending", "out-of-plane-bending"]
 
@@ -60,18 +59,6 @@ def test_frequencies_of_a_rotating_cantilever(spin):
         assert np.abs(flap / flapping - 1).min() < 3e-5
         lag = np.sqrt(flapping**2 - spin**2)
         assert np.abs(zeros / lag - 1).min() < 1e-4
-
-
-def test_modal_forces_of_small_loads_are_those_without_stiffening():
-    """What forces along a link change goes to zero with them."""
-    path = [{"name": "tip", "point": "blade.tip", "y": "1e-3*t**2"}]
-    analysis = [{"name": "turning", "kind": "pcid", "end": 0.02, "output_step": 0.005}]
-    found = []
-    for stiffened in (True, False):
-        with solve(**blade(trajectory=path, analysis=analysis, geometric_stiffening=stiffened)) as results:
-            found.append(results["turning/bodies/blade/modal_force"])
-    assert np.abs(found[1]).max() > 0
-    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-5 * np.abs(found[1]).max())
 
 
 def test_links_that_bend_far_across_the_plane():
@@ -134,21 +121,6 @@ def test_auto_where_loads_change_the_stiffness(spin, stiffened):
             frequencies.append(results["about/linear/frequency"][0])
     assert effect == pytest.approx(softest_under_spin() * spin**2, rel=1e-3)
     np.testing.assert_array_equal(*frequencies)
-
-
-def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space():
-    """∫ρxG_x of a straight beam is that of the spin about z, ∫ρG_x that of a pull; nothing else, in any plane."""
-    modal = ffrobot.make_link(link()).body
-    in_3d = from_modal_body("b", modal, stiffened=True).stiffening
-    chosen = np.ix_(*[np.flatnonzero(np.array(modal.family) == "in-plane-bending")] * 2)
-    peak = np.abs(modal.geometric_stiffness["omega_zz"]).max()
-    for found, load, sign in ((in_3d.K_x[0, 0], "omega_zz", 1.0), (in_3d.K_s[0], "t_x", -1.0)):  # d'Alembert's loads
-        expected = sign * modal.geometric_stiffness[load]
-        np.testing.assert_allclose(found[chosen], expected[chosen], atol=1e-12 * peak)
-    rest = in_3d.K_x.copy()
-    rest[0, 0] = 0.0
-    assert np.abs(rest).max() < 1e-12 * peak
-    assert np.abs(in_3d.K_s[1:]).max() < 1e-12 * peak
 
 
 REFUSED = {

@@ -61,19 +61,6 @@ def test_grid_over_link_and_scene(ffrobot, short_scene):
     assert thin > 2 * thick  # inertia loads go as d², stiffness as d⁴
 
 
-def test_keys_of_a_link_in_the_scene(ffrobot, short_scene):
-    """Instead of a link file of its own, with the same results."""
-    assert ffrobot("sweep", short_scene, "--vary", HEIGHTS).returncode == 0
-    expected = deflections(short_scene)
-    text = short_scene.read_text(encoding="utf-8")
-    scene = tomllib.loads(text)
-    scene["body"][1]["link"] = tomllib.loads((short_scene.parent / scene["body"][1]["link"]).read_text("utf-8"))
-    inline = short_scene.with_name("inline.toml")
-    inline.write_text(tomli_w.dumps(scene), encoding="utf-8")
-    ffrobot.ok("sweep", inline, "--vary", HEIGHTS)
-    assert deflections(inline) == expected
-
-
 def test_what_is_varied_is_what_is_solved(ffrobot, short_scene, tmp_path):
     """A row equals a solve of the scene with that value written in by hand, kept files included."""
     assert ffrobot("sweep", short_scene, "--vary", MASSES).returncode == 0
@@ -107,15 +94,6 @@ def test_taken_up_again(ffrobot, short_scene):
     assert second.exists()
     assert not list(folders.glob("*/results.h5"))
     assert deflections(short_scene) == expected
-
-
-def test_processes_side_by_side(ffrobot, short_scene):
-    assert ffrobot("sweep", short_scene, "--vary", HEIGHTS, "-j", "2").returncode == 0
-    together = deflections(short_scene)
-    assert ffrobot("sweep", short_scene, "--vary", HEIGHTS, "-o", short_scene.with_name("alone")).returncode == 0
-    with (short_scene.with_name("alone") / "table.csv").open(encoding="utf-8") as file:
-        alone = [float(row["inverse/points/rod.mid/deflection max"]) for row in csv.DictReader(file)]
-    assert together == alone
 
 
 def test_under_mpirun(ffrobot, short_scene, mpirun):

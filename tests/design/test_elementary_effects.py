@@ -22,16 +22,6 @@ def test_a_trajectory_changes_every_key_once_on_the_levels_of_the_grid():
     np.testing.assert_allclose(starts, np.repeat([[0.0], [1 / 3], [2 / 3], [1.0]], 5, axis=0) * np.ones(7), atol=1e-9)
 
 
-def test_of_a_linear_function_the_mean_is_the_coefficient_and_there_is_no_scatter():
-    coefficients = np.array([3.0, -5.0, 0.0, 0.25])
-    taken = draw_trajectories(4, 3, seed=1)
-    found = elementary_effects(taken, (taken.points @ coefficients)[:, :, None])
-    np.testing.assert_allclose(found.mu[0], coefficients, atol=1e-14)
-    np.testing.assert_allclose(found.mu_star[0], np.abs(coefficients), atol=1e-14)
-    np.testing.assert_allclose(found.sigma[0], 0.0, atol=1e-14)
-    np.testing.assert_array_equal(found.count[0], 3)
-
-
 def test_ishigami():
     """sin x₁ + 7 sin² x₂ + 0.1 x₃⁴ sin x₁ on [−π, π]³: on four levels effects are sums over ±π and ±π/3.
 

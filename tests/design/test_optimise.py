@@ -311,7 +311,7 @@ OMEGA = np.pi / 6e-4  # rad/s
 JOLT = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({OMEGA}*(t - 0.1001))**4, 0))"
 JOLTED = ARM | {
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": JOLT}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.102, "output_step": 1e-3}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 1e-3}],
 }
 MOST = 4e-6 * OMEGA**2  # of |α| = A ω² |12 sin² φ − 16 sin⁴ φ|, between the outputs at 0.1 and 0.101 s
 

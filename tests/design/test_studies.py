@@ -9,13 +9,11 @@ from small_robots import SWING
 
 import ffrobot
 from ffrobot.pictures.studies.study import (
-    Axis,
     Band,
     Bars,
     Parallel,
     Points,
     Progress,
-    axis_of_goal,
     read_study,
     study_files,
 )
@@ -41,26 +39,6 @@ def searched(scene):
 
 def diagrams(study):
     return {one.name: one for one in study.diagrams}
-
-
-def test_axes():
-    """Places and round numbers, linear and by logarithms; goals that span decades are drawn by logarithms."""
-    linear = Axis(label="a", values=(1.0, None), low=0.0, high=4.0)
-    np.testing.assert_allclose(linear.places, [0.25, np.nan])
-    assert linear.ticks == [(0.0, "0"), (0.25, "1"), (0.5, "2"), (0.75, "3"), (1.0, "4")]
-    by_logarithm = Axis(label="a", values=(10.0,), low=1.0, high=1e4, logarithmic=True)
-    np.testing.assert_allclose(by_logarithm.places, [0.25])
-    assert [text for _, text in by_logarithm.ticks] == ["1", "10", "100", "1000", "10000"]
-    narrow = Axis(label="a", values=(), low=0.011, high=0.019, logarithmic=True)
-    assert len(narrow.ticks) > 2  # no power of ten is in there
-    assert axis_of_goal("a", (1e-3, 1.0, None)).logarithmic
-    assert not axis_of_goal("a", (-1e-3, 1.0)).logarithmic
-    goal = axis_of_goal("a", (2.0, 3.0, None), limit=5.0)
-    assert goal.low < 2.0
-    assert 5.0 < goal.high < 6.0
-    alone = axis_of_goal("a", (2.0,))
-    np.testing.assert_allclose(alone.places, [0.5])
-    assert axis_of_goal("a", (None, None)).ticks
 
 
 def test_all_designs_of_a_search(searched):

@@ -5,7 +5,6 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from beam_links import beam_link, rectangle
 from scipy.stats import norm, qmc
 from small_robots import ARM, MASS, PAYLOAD
 
@@ -15,25 +14,13 @@ from ffrobot.design.spreads import (
     LinearModel,
     Spread,
     parse_spread,
-    regression_shares,
     sobol_indices,
-    spread_points,
     statistics,
 )
 
 MOMENT = "joints.shoulder.moment"
 SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
 """Of the moment at the start, level and with 2 rad/s², by both masses."""
-
-BEAM = beam_link(
-    0.6,
-    rectangle(0.01, 0.02),
-    4,
-    nu=None,
-    name="arm",
-    modes={"count": 1, "family": "in-plane-bending", "attachment_modes": False},
-    damping={"ratio": 0.02},
-)
 
 
 def spread(kind, deviation, mean=0.0):
@@ -97,14 +84,6 @@ def test_sobol_indices_of_a_known_function():
     assert found.total_error.max() < 0.03
     f[3, 5] = np.nan  # a run that failed
     np.testing.assert_allclose(sobol_indices(f[0], f[1], f[2:]).total, found.total, atol=0.01)
-
-
-def test_shares_of_a_linear_function():
-    u = qmc.LatinHypercube(2, optimization="random-cd", seed=1).random(200)
-    x = np.array(spread_points((spread("uniform", 1.0), spread("normal", 2.0)), u))
-    shares, explained = regression_shares(x, x @ np.array([[3.0], [-2.0]]))
-    np.testing.assert_allclose(shares[0], [9.0 / 25.0, 16.0 / 25.0], atol=0.02)
-    assert explained[0] == pytest.approx(1.0, abs=1e-12)
 
 
 def test_gradients_of_a_quadratic_tell_how_far_they_are_off():
@@ -179,21 +158,3 @@ def test_failed_samples_are_told_and_left_out(write, ffrobot, tmp_path):
         masses = np.array([float(one[MASS]) for one in list(csv.DictReader(file))[1:]])
     assert float(row["mean"]) == pytest.approx(masses[masses > 0.0].mean(), rel=1e-12)
     assert float(row["deviation"]) == pytest.approx(masses[masses > 0.0].std(ddof=1), rel=1e-12)
-
-
-@pytest.mark.nightly
-def test_frequency_of_a_beam(write, tmp_path):
-    """f ∝ h/L²: with both uniform, E[h] E[L⁻²] and E[h²] E[L⁻⁴] are closed forms."""
-    body = [{"name": "arm", "link": BEAM}]
-    path = write(ARM | {"body": body, "analysis": [ARM["analysis"][0] | {"end": 0.001, "output_step": 0.001}]})
-    spreads = ["links.arm.geometry.section.height=±5%", "links.arm.geometry.length=uniform:0.55:0.65"]
-    found = ffrobot.uncertainty(path, ["frequency 1 arm"], spreads, tmp_path / "runs", samples=60)
-    a, b, h = 0.55, 0.65, 0.01
-    squared, fourth = 1.0 / (a * b), (a**-3 - b**-3) / (3.0 * (b - a))
-    factor = found.readings[0].value / (h / 0.6**2)
-    mean, square = h * squared, h**2 * (1.0 + 0.05**2 / 3.0) * fourth
-    assert found.statistics.mean[0] == pytest.approx(factor * mean, rel=2e-3)
-    assert found.statistics.deviation[0] == pytest.approx(factor * sqrt(square - mean**2), rel=0.04)
-    near = ffrobot.uncertainty(path, ["frequency 1 arm"], spreads, tmp_path / "runs", by="gradients")
-    off = abs(near.statistics.mean[0] - factor * mean)
-    assert off == pytest.approx(near.statistics.mean_error[0], rel=0.1)  # curvature is nearly all of it

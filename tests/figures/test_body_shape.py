@@ -74,14 +74,6 @@ def test_mesh_shows_cells_and_interfaces(solid, beam):
     assert len(draw_mesh(beam).axes[0].collections[0].get_segments()) == 10
 
 
-def test_mesh_with_edges_of_its_own_shows_no_others(solid):
-    """Two edges of elements, of which the other lines only divide the faces; one that is no side of a cell is left."""
-    edges = np.array([[0, 1], [4, 0], [0, 7]])
-    figure = draw_mesh(replace(solid, mesh=replace(solid.mesh, edges=edges)))
-    paths = figure.axes[0].collections[0].get_paths()
-    assert sum(len(np.unique(path.vertices, axis=0)) == 2 for path in paths) == 2
-
-
 def test_fold_of_a_roof_and_border_of_an_open_surface():
     """Two triangles that meet at 90° share a fold; all else is border. Flat, the diagonal goes."""
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
@@ -91,22 +83,6 @@ def test_fold_of_a_roof_and_border_of_an_open_surface():
     points[3, 2] = 5.0
     assert set(map(tuple, _outline(points, cells))) == edges | {(1, 2)}
     assert 0.8 < FOLD < 0.9
-
-
-def test_round_bodies_have_the_outline_that_the_viewer_sees():
-    """An open tube of 24 sides has no folds; from z it ends where y is least and largest."""
-    angle = 2 * np.pi * (np.arange(24) + 0.5) / 24
-    ring = np.stack([np.zeros(24), np.cos(angle), np.sin(angle)], axis=1)
-    points, k = np.concatenate([ring, ring + np.eye(3)[0]]), np.arange(24)
-    after = (k + 1) % 24
-    tube = np.stack([k, after, 24 + after, 24 + k], axis=1)
-    assert len(_outline(points, tube)) == 2 * 24  # its ends
-    edges = {tuple(edge) for edge in _outline(points, tube, np.array([0.0, 0.3, 1.0]))}
-    lines = edges - {tuple(edge) for edge in _outline(points, tube)}
-    assert len(lines) == 2
-    for first, last in lines:
-        assert last == first + 24
-        assert abs(points[first] @ [0.0, 0.3, 1.0]) < 0.2  # seen from there, on the rim
 
 
 def test_command_tells_modal_bodies_from_results(solid, tmp_path, capsys):

@@ -10,11 +10,11 @@ from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.configurations import draw_configurations
 from ffrobot.pictures.figures.figure_file import FigureRecord
 from ffrobot.pictures.figures.plot import draw, plot_results
-from ffrobot.pictures.figures.standard import main_figures, standard_figures
+from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.figures.style import SceneAxes
 from ffrobot.pictures.motion import moving_bodies, section_axes
 from ffrobot.pictures.projection import FRONT, PLANE, SIDE, SPACE
-from ffrobot.pictures.shapes import line_shape, shortest_tree, surface_shape
+from ffrobot.pictures.shapes import line_shape, surface_shape
 from ffrobot.results.file import Results
 
 FRAMES = np.array([0, 20, 61, 120])
@@ -42,30 +42,6 @@ def test_standard_figures(arm, crank):
     names = {record.name for record in standard_figures(crank)}
     assert {"coordinate_universal_1", "coordinate_universal_2", "reaction_ball", "coordinate_guide"} <= names
     assert not {"moment_universal_1", "coordinate_ball", "deflection_crank.tip"} & names  # no motor, no angle, rigid
-
-
-def test_what_floats_has_no_ground(arm, slewing_appendage):
-    with Results(slewing_appendage.folder / "scene.results.h5") as floating:
-        for results, count in ((arm, 1), (floating, 0)):
-            labels = [text.get_text() for text in draw(main_figures(results)[0], results).legends[0].get_texts()]
-            assert labels.count("ground") == count
-
-
-def test_motors_that_suffice_leave_no_modal_force_to_draw(solved):
-    """Of stable inversion it is round-off, of the force that pulls the tip what patches would have to supply."""
-    with Results(solved("flexible_arm_inversion").folder / "scene.results.h5") as results:
-        names = {record.name for record in standard_figures(results)}
-    assert "modal_force_force_at_tip_arm" in names
-    assert not {"modal_force_exact_arm", "modal_force_redefined_arm"} & names
-    assert {"modal_exact_arm", "modal_redefined_arm"} <= names
-
-
-def test_main_figures_answer_the_first_questions(arm):
-    """Where is the robot, does the tool follow, what do the motors do, how far do the links bend: one each."""
-    assert [record.name for record in main_figures(arm)] == [
-        "configurations_inverse", "path_tool", "moment_waist", "moment_shoulder", "moment_elbow", "deflection_fore.tip",
-        "deflection_upper.tip",
-    ]  # fmt: skip
 
 
 def test_every_standard_figure_is_drawn(arm_3r, tmp_path):
@@ -115,21 +91,6 @@ def test_sections_have_the_axes_of_the_file(crank):
     np.testing.assert_allclose(np.sum(z * y, axis=1), 0.0, atol=1e-10)
     axis = [0.19047253607043549, -0.47618134017608871, 0.85847046790847781]  # of the crank, scene.toml
     np.testing.assert_allclose(z, np.tile(axis, (len(FRAMES), 1)), atol=1e-12)
-
-
-def test_tree_of_points_is_the_shortest():
-    points = np.random.default_rng(7).normal(size=(9, 3))
-    edges = shortest_tree(points)
-    assert edges.shape == (8, 2)
-    for first, last in edges:
-        one_side = {int(first)}  # without this edge
-        for _ in edges:
-            one_side |= {int(k) for edge in edges if {*edge} != {first, last} and one_side & {*edge} for k in edge}
-        across = [np.linalg.norm(points[i] - points[j]) for i in one_side for j in {*range(9)} - one_side]
-        assert last not in one_side
-        assert min(across) == pytest.approx(np.linalg.norm(points[first] - points[last]))
-    assert shortest_tree(np.zeros((3, 3))).shape == (2, 2)
-    assert shortest_tree(points[:1]).shape == (0, 2)
 
 
 def test_a_metre_is_as_long_on_all_axes(arm, crank):

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from selenium.webdriver import ActionChains
 
 from ffrobot.common.errors import InputError
-from ffrobot.pictures.motion import joint_markers, moving_bodies
 from ffrobot.pictures.projection import COLORS
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import history_charts
@@ -172,19 +171,6 @@ def test_a_run_has_one_colour_on_the_page(two_link):
         found = {trace["name"].removesuffix(", y"): trace["line"]["color"] for trace in charts[name].traces}
         assert {run: found[run] for run in expected} == expected
     assert charts["path_tip"].traces[0]["line"]["color"] not in COLORS  # the prescribed path
-
-
-def test_axes_of_joints(slider_crank_3d):
-    """Of the universal joint both, at right angles; of the ball none; of the guide x, at the slider."""
-    with Results(slider_crank_3d.folder / "scene.results.h5") as results:
-        bodies, shift = moving_bodies(results, "inverse", np.array([0, 60]))
-        markers = {marker.name: marker for marker in joint_markers(results.scene, bodies, shift)}
-        slider = results["inverse/points/slider.pin/position"][[0, 60]]
-    first, second = markers["universal"].directions.swapaxes(0, 1)
-    np.testing.assert_allclose(np.sum(first * second, axis=1), 0.0, atol=1e-10)
-    assert markers["ball"].directions.shape == (2, 0, 3)
-    np.testing.assert_allclose(markers["guide"].directions[:, 0], [[1, 0, 0]] * 2)
-    np.testing.assert_allclose(markers["guide"].position, slider, atol=1e-12)
 
 
 def test_bars_stand_for_lines():

@@ -16,7 +16,7 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
 from ffrobot.pictures.figures.shared import bending_points
 from ffrobot.pictures.figures.standard import standard_figures
-from ffrobot.pictures.motion import targets, topology
+from ffrobot.pictures.motion import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, history_charts, kept_outputs
 from ffrobot.pictures.report.runs import distinct_parts, runs
@@ -28,16 +28,6 @@ from ffrobot.results.file import Results
 def results(two_link):
     with Results(two_link.folder / "scene.results.h5") as results:
         yield results
-
-
-def test_bodies_hang_from_the_ground(slider_crank):
-    with Results(slider_crank.folder / "scene.results.h5") as results:
-        carriers = topology(results.scene).carriers
-    assert {body: carrier[1:] for body, carrier in carriers.items()} == {
-        "crank": ("crank.root", "ground"),
-        "rod": ("rod.root", "crank.tip"),
-        "slider": ("slider.pin", "rod.tip"),
-    }
 
 
 def test_curve_of_many_points_keeps_its_peaks():
