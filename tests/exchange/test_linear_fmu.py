@@ -20,7 +20,6 @@ from scipy.signal import lsim
 
 from ffrobot import Results
 from ffrobot.actuation.control.linear_model import LinearModel
-from ffrobot.exchange.fmu.forward_model import joint_units
 from ffrobot.exchange.fmu.linear_fmu import make_unit
 
 LINK = beam_link(
@@ -188,22 +187,6 @@ def test_a_step_of_any_length_is_exact(step, robot):
             assert error < 1e-9 * np.abs(expected[half]).max()  # scipy's own exponential is no better at long steps
 
 
-def test_model_exchange_has_the_first_order_of_a_held_input(robot):
-    """fmpy's CVode sets inputs once a step: half the step, half the difference from straight lines."""
-    errors = []
-    for step in (STEP, STEP / 2):
-        count = round(0.1 / step) + 1
-        given = {MOTOR: signals(count, step)[MOTOR]}
-        found = robot.simulate("ModelExchange", given, step, relative_tolerance=1e-9)
-        model, u = robot.model, np.zeros((count, len(robot.inputs)))
-        u[:, robot.inputs.index(MOTOR)] = given[MOTOR]
-        exact = lsim((model.A, model.B, model.C, model.D), u, step * np.arange(count))[1]
-        hub = model.output_names.index("joint/hub")
-        errors.append(np.abs(found[:, hub] - exact[:, hub]).max() / np.abs(exact[:, hub]).max())
-    assert errors[0] < 0.05
-    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
-
-
 def test_derivatives_are_the_matrices(robot):
     """Of model exchange: x' and y are A x + B u and C x + D u; directional derivatives are columns of them."""
     model, rng = robot.model, np.random.default_rng(0)
@@ -243,13 +226,6 @@ def test_an_instance_goes_back(robot):
         fmu.doStep(currentCommunicationPoint=STEP, communicationStepSize=STEP)
         assert fmu.getReal(states) == second
         fmu.freeFMUstate(kept)
-
-
-def test_the_same_model_is_the_same_file(robot, ffrobot):
-    ffrobot.ok(
-        "export", "scene.results.h5", "--analysis", "at_rest", "--format", "fmu", "-o", "again.fmu", cwd=robot.folder
-    )
-    assert (robot.folder / "again.fmu").read_bytes() == robot.path.read_bytes()
 
 
 def compiled(path):
@@ -309,19 +285,6 @@ def test_names_that_are_no_identifiers(tmp_path):
     assert unit.identifier == "robot_3_Gr__en__"
     assert [each.unit for each in (*unit.inputs, *unit.outputs, *unit.states)] == ["N", "m", "m", "m/s"]
     assert len({each.name for each in unit.variables}) == len(unit.variables)
-
-
-def test_units_of_every_type_of_joint():
-    """Joints with several coordinates have angles and ways among them."""
-    types = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
-    found = joint_units({"joint": [{"name": name[:2], "type": name} for name in types]})
-    ways = [name for name, unit in found.items() if unit == "m"]
-    assert ways == ["pr", "cy 2", "pl 1", "pl 2", "fr 1", "fr 2", "fr 3"]
-    angles = [name for name, unit in found.items() if unit == "rad"]
-    assert angles == [
-        *("re", "sc", "cy 1", "un 1", "un 2", "sp 1", "sp 2", "sp 3", "pl 3"),
-        *("fr 4", "fr 5", "fr 6"),
-    ]
 
 
 def test_what_is_refused(robot, ffrobot, tmp_path):

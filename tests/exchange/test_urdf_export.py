@@ -123,7 +123,7 @@ def rotation(e):
     return np.eye(3) + 2 * w * S + 2 * S @ S
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_random_trees(seed, tmp_path, ffrobot):
     """URDF → scene → URDF: the same moments, by Newton and Euler from either text."""
     rng = np.random.default_rng(seed)
