@@ -97,13 +97,6 @@ def test_a_sampled_loop_is_its_exact_discrete_model(delay, resolution):
     assert np.abs(record.readings[:, 0]).max() > 1e-3
 
 
-def test_units_of_commands_do_not_decide_on_the_discrete_model():
-    A, B = np.array([[0.0, 1.0], [-2.0, -0.1]]), np.array([[0.0], [3.0]])
-    plain, huge = (sampled(A, unit * B, T, 0.0) for unit in (1.0, 1e30))
-    np.testing.assert_allclose(huge.A, plain.A, rtol=1e-12)
-    np.testing.assert_allclose(huge.B, 1e30 * plain.B, rtol=1e-12)
-
-
 def test_commands_stop_at_the_limits_of_the_motors():
     outcomes = solve_scene(wheel(loop(controller=[PID], disturbance=blow()), joint={"moment_limit": 0.5}))
     record = outcomes.outcomes["loop"].details
@@ -209,17 +202,13 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
 
 
 @pytest.mark.parametrize(
-    ("body", "error", "expected"),
-    [
-        ("return np.zeros(3)", SolveError, "sample 0, t = 0 s: expected 1 finite commands"),
-        ("return y[99]", SolveError, "sample 0, t = 0 s: IndexError"),
-        ("return np.full(1, np.nan)", SolveError, "finite"),
-    ],
+    ("body", "expected"),
+    [("return np.full(3, np.nan)", "expected 1 finite commands"), ("return y[99]", "IndexError")],
 )
-def test_what_a_users_function_does_wrong_is_said(tmp_path, body, error, expected):
+def test_what_a_users_function_does_wrong_is_said(tmp_path, body, expected):
     file = tmp_path / "mine.py"
     file.write_text(f"import numpy as np\ndef controller(setup):\n    def act(k, y):\n        {body}\n    return act\n")
-    with python_allowed([tmp_path]), pytest.raises(error, match=expected):
+    with python_allowed([tmp_path]), pytest.raises(SolveError, match=f"sample 0, t = 0 s: {expected}"):
         solve_scene(wheel(loop(controller=[{"kind": "python", "python": f"{file}:controller"}])))
 
 
@@ -264,19 +253,13 @@ def test_slow_sampling_is_warned_of():
     ("keys", "expected"),
     [
         ({"delay": 0.6}, "expected a delay shorter than the run"),
-        ({"sample_time": 0.7}, "expected a sample_time of at most the run"),
         ({"sensor": [{"point": "w.rimm"}]}, 'found "w.rimm".*did you mean'),
-        ({"sensor": [{"joint": "P"}]}, 'expected one of the joints "O", found "P"'),
         ({"sensor": [{"pzt": "w"}]}, "expected a layout of patches"),
         ({"sensor": [{"joint": "O", "measure": "acceleration"}]}, "measure"),
         ({"controller": [{"kind": "joint-pid", "proportional": {"B": 1.0}}]}, 'found "B"'),
-        ({"controller": [{"kind": "pid"}]}, "joint-pid"),
         ({"controller": [{"kind": "python", "python": "nowhere.py:f"}]}, "expected an existing file"),
-        ({"controller": [{"kind": "python", "python": "nowhere.py"}]}, "FILE.py:FUNCTION"),
-        ({"feed_forward": "joints+pzt"}, "feed_forward"),
         ({"apply": "joints"}, 'expected the key "apply" only in kind = "forward", found kind = "closed-loop"'),
         ({"controller": [{"kind": "lqr", "time": 7.0}]}, "controller no. 1: time: expected at most .* ends, found 7.0"),
-        ({"tip": "w.tpi"}, "w.tpi"),
         ({"disturbance": [{"joint": "O", "moment": "1"}]}, "disturbances at points"),
     ],
 )
@@ -298,18 +281,9 @@ def test_keys_of_other_kinds_are_named_one_by_one():
     ]
 
 
-def test_keys_of_a_closed_loop_are_refused_elsewhere():
-    with pytest.raises(InputError, match='expected the key "delay" only in kind = "closed-loop"'):
-        make_scene(
-            name="x", gravity=[0.0, 0.0], body=[{"name": "a", "rigid": ROD}],
-            analysis=[{"name": "f", "kind": "forward", "end": 1.0, "output_step": 0.1, "delay": 0.1}],
-        )  # fmt: skip
-
-
 PATCHES = {
     "body": "link", "count": 10, "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9,
-    "d31": 110e-12,
-    "structural": False,
+    "d31": 110e-12, "structural": False,
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ def structured_bar(cell, across=2):
 
 
 @pytest.mark.parametrize("ending", ["step", "msh", "inp", "bdf", "vtk", "vtu"])
-@pytest.mark.parametrize("content", ["", "no mesh\n", "*NODE\n1, 0., 0.\n", "ISO-10303-21;\nHEADER;\n"])
+@pytest.mark.parametrize("content", ["", "*NODE\n1, 0., 0.\n"])
 def test_corrupt_files_are_refused(solid, mesh_part, tmp_path, ending, content, capfd):
     path = tmp_path / f"part.{ending}"
     path.write_text(content)
@@ -70,9 +70,10 @@ def write_mesh(path, order=1, hexahedra=False, version=4.1):
     return path
 
 
-@pytest.mark.parametrize("hexahedra", [False, True])
-@pytest.mark.parametrize("order", [1, 2, 20])
-@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize(
+    ("hexahedra", "order", "version"),
+    [(False, 1, 2.2), (False, 2, 4.1), (True, 1, 4.1), (True, 2, 2.2), (True, 20, 4.1)],
+)
 def test_gmsh_meshes_keep_their_groups(solid, mesh_part, tmp_path, hexahedra, order, version):
     path = write_mesh(tmp_path / "part.msh", order, hexahedra, version)
     part = mesh_part(solid(file=path, unit="mm"), (PlaceRecord(name="root", group="left"),))
@@ -128,22 +129,20 @@ def test_a_missing_group_is_told_with_those_there(solid, mesh_part, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["inp", "bdf", "vtk", "vtu", "med", "xdmf"])
-@pytest.mark.parametrize("kind", ["tetra", "tetra10", "hexahedron"])
+@pytest.mark.parametrize("kind", ["tetra10", "hexahedron"])
 def test_foreign_meshes(solid, mesh_part, tmp_path, ending, kind):
-    if (ending, kind) == ("bdf", "tetra10"):
-        pytest.skip("meshio 5.0 cannot write it")
-    box = structured_bar("tetrahedron" if "tetra" in kind else "hexahedron")
-    points, cells = box.points, box.cells
-    if kind == "tetra10":
-        points, cells = with_mid_sides(box)
-    meshio.Mesh(points, [(kind, cells)]).write(tmp_path / f"part.{ending}")
+    """Upper and lower face of curved tetrahedra are parabolas: ∫ 1 + 0.3 x² dx = 1.1; meshio 5.0 writes none in bdf."""
+    curved = kind == "tetra10" and ending != "bdf"
+    box = structured_bar("hexahedron" if kind == "hexahedron" else "tetrahedron", 1 if curved else 2)
+    points, cells = with_mid_sides(box, bend=0.3) if curved else (box.points, box.cells)
+    meshio.Mesh(points, [(kind if curved else kind.removesuffix("10"), cells)]).write(tmp_path / f"part.{ending}")
     part = mesh_part(solid(file=tmp_path / f"part.{ending}"))
-    assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
-    assert face_area(part, "tip") == pytest.approx(VOLUME, rel=1e-6)
+    assert part.degree == 1 + curved
+    assert integrate(part) == pytest.approx((1.1 if curved else 1.0) * VOLUME, rel=1e-6)
+    assert face_area(part, "tip") == pytest.approx((1.3 if curved else 1.0) * VOLUME, rel=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["TETRA", "VOXEL"])
-@pytest.mark.parametrize("compressed", ["", "ZLib", "LZ4"])
+@pytest.mark.parametrize(("kind", "compressed"), [("TETRA", ""), ("VOXEL", "ZLib"), ("TETRA", "LZ4")])
 def test_files_of_vtk_itself(solid, mesh_part, tmp_path, kind, compressed):
     """What VTK 9 and ParaView write: version 5.1 in binary form, or XML with appended data, with data of points."""
     pyvista = pytest.importorskip("pyvista")
@@ -182,9 +181,7 @@ def test_cells_that_meshio_leaves_out_are_not_dropped(tmp_path, monkeypatch):
         read_foreign(tmp_path / "part.vtu", "part")
 
 
-@pytest.mark.parametrize(
-    ("kind", "bend"), [("HEXAHEDRON", None), ("TETRAHEDRON", None), ("TETRAHEDRON", 0.0), ("TETRAHEDRON", 0.3)]
-)
+@pytest.mark.parametrize(("kind", "bend"), [("HEXAHEDRON", None), ("TETRAHEDRON", None), ("TETRAHEDRON", 0.3)])
 def test_cells_of_any_degree_of_vtk(solid, mesh_part, tmp_path, kind, bend):
     """As FEniCSx and ParaView write them; with 10 nodes the volume is that of parabolas: ∫ 1 + 0.3 x² dx = 1.1."""
     pyvista = pytest.importorskip("pyvista")
@@ -197,8 +194,7 @@ def test_cells_of_any_degree_of_vtk(solid, mesh_part, tmp_path, kind, bend):
     assert integrate(part) == pytest.approx((1.1 if bend else 1.0) * VOLUME, rel=1e-6)
 
 
-@pytest.mark.parametrize("compressed", ["ZLib", "LZ4"])
-def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path, compressed):
+def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path):
     """ParaView's blanking: meshio shows all cells, VTK's own reader the others."""
     pyvista = pytest.importorskip("pyvista")
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
@@ -207,7 +203,6 @@ def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path, compressed
     grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: box.cells}, box.points)
     grid.cell_data["vtkGhostType"] = np.repeat(np.array([0, 32], dtype=np.uint8), [30, 2])
     writer = vtkXMLUnstructuredGridWriter()
-    getattr(writer, f"SetCompressorTypeTo{compressed}")()
     writer.SetFileName(str(tmp_path / "part.vtu"))
     writer.SetInputData(grid)
     writer.Write()
@@ -215,11 +210,10 @@ def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path, compressed
         mesh_part(solid(file=tmp_path / "part.vtu"))
 
 
-@pytest.mark.parametrize("name", ["part.unv", "part.cdb", "part.k"])
-def test_unknown_endings_are_named(solid, mesh_part, tmp_path, name):
-    (tmp_path / name).write_text("*KEYWORD\n")
+def test_unknown_endings_are_named(solid, mesh_part, tmp_path):
+    (tmp_path / "part.k").write_text("*KEYWORD\n")
     with pytest.raises(InputError, match=r"its ending is not one of \.step, "):
-        mesh_part(solid(file=tmp_path / name))
+        mesh_part(solid(file=tmp_path / "part.k"))
 
 
 def with_mid_sides(box, bend=0.0):
@@ -227,46 +221,6 @@ def with_mid_sides(box, bend=0.0):
     points, cells = with_middles(box.points, box.cells)
     points[:, 1] *= 1 + bend * points[:, 0] ** 2
     return points, cells
-
-
-@pytest.mark.parametrize("ending", ["inp", "vtu"])
-def test_curved_tetrahedra_are_kept(solid, mesh_part, tmp_path, ending):
-    box = structured_bar("tetrahedron", 1)
-    points, cells = with_mid_sides(box, bend=0.3)
-    meshio.Mesh(points, [("tetra10", cells)]).write(tmp_path / f"part.{ending}")
-    part = mesh_part(solid(file=tmp_path / f"part.{ending}"))
-    assert part.degree == 2
-    # Upper and lower face are parabolas, up to what quadratic cells make of y z-independent: ∫ 1 + 0.3 x² dx = 1.1.
-    assert integrate(part) == pytest.approx(1.1 * VOLUME, rel=1e-6)
-
-
-ABAQUS = """*HEADING
-two cubes in a row
-*NODE, NSET=ALL
-{nodes}
-*ELEMENT, TYPE=C3D8, ELSET=ARM
-1, {first}
-*ELEMENT, TYPE=C3D8{second_set}
-2, {second}
-*NSET, NSET=LEFT
-{left}
-*ELSET, ELSET=HUB
-2
-"""
-
-
-@pytest.mark.parametrize("second_set", ["", ", ELSET=OTHER", ", ELSET=ARM"])
-def test_abaqus_sets_name_regions_and_faces(solid, mesh_part, tmp_path, second_set):
-    box = structured_box(1.0, (0.2, 0.2), (0.2, 0.2), (2, 1, 1), "hexahedron")
-    nodes = "\n".join(f"{k + 1}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(box.points))
-    first, second = (", ".join(str(node + 1) for node in cell) for cell in box.cells)
-    left = ", ".join(str(k + 1) for k in np.flatnonzero(box.points[:, 0] == 0))
-    text = ABAQUS.format(nodes=nodes, first=first, second=second, second_set=second_set, left=left)
-    (tmp_path / "part.inp").write_text(text)
-    part = mesh_part(solid(file=tmp_path / "part.inp"), (PlaceRecord(name="root", group="LEFT"),))
-    named = {name: part.points[part.corners[part.cell_tag == tag]][..., 0].max() for name, tag in part.regions.items()}
-    assert named["ARM"] == pytest.approx(0.5)
-    assert face_area(part, "root") == pytest.approx(0.04)
 
 
 @pytest.mark.parametrize(
