@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from checkpoints import check_table, peak, tip_error
+from reference_scenes import NIGHTLY
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,9 @@ METRICS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", METRICS)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.nightly] * (case in NIGHTLY)) for case in METRICS]
+)
 def test_closed_loops_of_the_readme(solved, case):
     """Metrics of all that are stable, one in each row."""
     file = solved(case).file
@@ -62,6 +65,7 @@ def test_forward_runs_keep_path_and_shape_of_fcid(solved, name):
     assert np.abs(fcid[f"{name}_forward/{tip}"][()] - fcid[f"{name}/{tip}"][()]).max() < 1e-10
 
 
+@pytest.mark.nightly
 def test_split_of_duties_stays_within_the_limits(solved):
     split = solved("two_link_split").file
     for body in ("link1", "link2"):
@@ -71,6 +75,7 @@ def test_split_of_duties_stays_within_the_limits(solved):
         assert np.all(split[f"split/feasibility/pzt/{body}/factor"][()] < 0.01)
 
 
+@pytest.mark.nightly
 def test_point_forces_reproduce_the_motion(solved):
     file = solved("two_link_points").file
     for source, forward in (("inverse", "points"), ("straight", "straight_points")):

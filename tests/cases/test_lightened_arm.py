@@ -5,6 +5,8 @@ import pytest
 
 from ffrobot.fe_models.modal_body_file import read_modal_body
 
+pytestmark = pytest.mark.nightly  # twelve seconds of solids from STEP, which are in arm_6r, too
+
 DENSITY, WIDTHS = 2700.0, {"upper_arm": 0.012, "forearm": 0.008}
 # make_parts.py: lengths, heights at root and tip in m, numbers of holes.
 MEASURES = {"upper_arm": (0.5, 0.060, 0.044, 7), "forearm": (0.4, 0.044, 0.030, 6)}

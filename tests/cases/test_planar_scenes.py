@@ -11,6 +11,7 @@ import ffrobot
 from ffrobot.common.rotations import exponential
 from ffrobot.mbs.model import system
 
+NIGHTLY = ("actuation points", "pieces under control")
 ATTRIBUTES = ("status", "check_point", "check_modes", "check_error", "check_status")
 
 
@@ -38,7 +39,9 @@ def solved(tables, path, compared=COMPARED):
         return about, numbers, {name: results.linear(name) for name in about if f"{name}/linear" in file}
 
 
-@pytest.mark.parametrize("feature", FEATURES)
+@pytest.mark.parametrize(
+    "feature", [pytest.param(name, marks=[pytest.mark.nightly] * (name in NIGHTLY)) for name in FEATURES]
+)
 def test_a_planar_scene_is_that_in_3d(feature, tmp_path, monkeypatch):
     """The equations in 3D are integrated as they are, without a projection on the plane in which the robot moves."""
     kind, tables, share = FEATURES[feature]

@@ -117,24 +117,6 @@ def test_with_other_steps_the_tolerance_is_left(solution, apply, tolerance, inte
     assert departure(inverse, back) < tolerance
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
-def test_auto_goes_on_with_the_integrator_of_the_inverse_run(solution, integrator):
-    """Its steps are known there, so that far less than the tolerance is left."""
-    inverse = inverse_of(solution.model, 1e-5, integrator=integrator)
-    back = replay_of(solution.model, inverse, "trajectory", 1e-5, integrator="auto")
-    assert back.statistics.integrator.name == integrator
-    assert departure(inverse, back) < 1e-9
-
-
-def test_motors_on_frames_need_other_modal_forces_for_the_same_motion(solution):
-    model = solution.model
-    on_frames = prepare_scene(scene(motors="frame"), Watcher()).model
-    inverse = inverse_of(on_frames, 1e-6, integrator="dop853")
-    modal, usual = (motor_forces_of(inverse_of(of, 1e-6)).modal["b0"] for of in (on_frames, model))
-    assert np.abs(modal - usual).max() > 0.1 * np.abs(usual).max()
-    assert departure(inverse, replay_of(on_frames, inverse, "joints+pzt", 1e-6, integrator="dop853")) < 1e-11
-
-
 def test_loads_that_jump(solution):
     """Steps of both runs end where the load jumps."""
     load = {"point": "b1.tip", "y": "where(t < 0.07, 0, 3)", "mx": "where(t < 0.11, 0.02, -0.03)"}

@@ -1,10 +1,9 @@
-"""Many numbers at once: the lightest cantilever in segments, against its closed form and against sampling."""
+"""Many numbers at once: the lightest cantilever in segments, against its closed form."""
 
 import numpy as np
 import pytest
 import tomli_w
 from beam_links import beam_link, rectangle
-from scipy.stats.qmc import LatinHypercube
 
 import ffrobot
 
@@ -49,19 +48,10 @@ def stepped(segments):
     }
 
 
-def lightest_sample(count):
-    """Of a Latin hypercube of so many designs those that keep the limit, by the closed form: the least Σ h."""
-    heights = LOW * (HIGH / LOW) ** LatinHypercube(8, seed=0).random(count)
-    return heights.sum(axis=1)[(flexibility(8) / heights**3).sum(axis=1) <= DEFLECTION].min(initial=np.inf)
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize("segments", [3, 8])
 def test_lightest_stepped_cantilever(tmp_path, segments):
-    """Σ h is least with Σ c/h³ = δ at h_k = c_k^¼ (Σ c^¼/δ)^⅓ (Svanberg 1987, with five segments).
-
-    Of eight, the best of 100 000 designs of a Latin hypercube is 8 % heavier; a grid with two values of each has 256.
-    """
+    """Σ h is least with Σ c/h³ = δ at h_k = c_k^¼ (Σ c^¼/δ)^⅓ (Svanberg 1987, with five segments)."""
     path = tmp_path / "scene.toml"
     path.write_text(tomli_w.dumps(stepped(segments)), encoding="utf-8")
     vary = [f"links.s{k}.geometry.section.height={LOW}:{HIGH}:log" for k in range(segments)]
@@ -75,5 +65,3 @@ def test_lightest_stepped_cantilever(tmp_path, segments):
     assert found.prices[0] == pytest.approx(-found.value / (3.0 * DEFLECTION), rel=1e-3)
     assert found.converged
     assert found.runs <= 150
-    if segments == 8:
-        assert lightest_sample(100_000) > 1.08 * best.sum()

@@ -36,10 +36,7 @@ def test_sensitivity(told, of, to, message):
     ("of", "spreads", "options", "message"),
     [
         ("peak of it all", [GOOD], [], '--of: expected "peak HISTORY"'),
-        ("mass", ["payload.0.masss=±2%"], [], 'expected a number at payload.0.masss, found none (did you mean "mass"'),
-        ("mass", ["payload.0.point=±2%"], [], "--spread: expected a number at payload.0.point, found 'arm.tip'"),
         ("mass", ["payload.1.mass=±2%"], [], '--spread: expected one of "0" in "payload.1.mass"'),
-        ("mass", ["payload.0.mass"], [], "--spread: expected KEY=±2%, KEY=±0.1"),
         ("mass", ["payload.0.mass=2%"], [], "--spread: expected KEY=±2%, KEY=±0.1"),
         ("mass", ["payload.0.mass=±0"], [], "with positive spreads"),
         ("mass", ["payload.0.mass=normal:-1"], [], "with positive spreads"),
@@ -90,7 +87,6 @@ def test_goals_that_are_no_numbers_are_told_after_one_run(ffrobot, write, of):
         ((*MASS, "--vary", "payload.0.mass=1:0.1"), "--vary: expected a lower bound and a higher one"),
         ((*MASS, "--vary", "payload.0.mass=0:1:log"), "--vary: expected bounds above 0"),
         ((*MASS, "--vary", "payload.0.mass=0.6:1"), "that hold the value where the search begins, 0.5, found 0.6:1"),
-        ((*MASS, "--vary", "payload.0.mas=0.1:1"), '--vary: expected a number at payload.0.mas, found none (did you'),
         ((*MASS, "--vary", "payload.0.mass in {}"), "--vary: expected rows of 1 value"),
         ((*MASS, "--vary", "payload.0.mass,gravity.1 in {1:2, 3}"), "--vary: expected rows of 2 values"),
         ((*MASS, *PAYLOAD, *PAYLOAD), "--vary: expected every key once, found payload.0.mass several times"),

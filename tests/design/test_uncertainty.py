@@ -129,8 +129,8 @@ def test_linear_goals(write, tmp_path):
 def test_sobol_indices_of_a_scene(write):
     """The moment is a sum: what a key does alone is all it does."""
     spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]
-    found = ffrobot.uncertainty(write(ARM), [f"peak {MOMENT}"], spreads, samples=24, indices=True)
-    assert found.runs == 1 + 12 * 4
+    found = ffrobot.uncertainty(write(ARM), [f"peak {MOMENT}"], spreads, samples=16, indices=True)
+    assert found.runs == 1 + 8 * 4
     parts = (SLOPES * [0.2 / sqrt(3.0), 0.025]) ** 2
     expected = parts / parts.sum()
     i = found.indices

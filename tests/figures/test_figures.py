@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ffrobot.cli import cli
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.joint import MotorLimits
 from ffrobot.pictures.figures.figure_file import Curve, FigureRecord
@@ -21,17 +20,10 @@ from ffrobot.results.file import Results
 CASES = Path(__file__).parents[2] / "cases"
 
 
-@pytest.fixture(scope="session")
-def solved(tmp_path_factory):
-    """Results of the slider-crank, in a folder without `figures.toml`."""
-    path = tmp_path_factory.mktemp("solved") / "scene.results.h5"
-    cli(["solve", str(CASES / "slider_crank" / "scene.toml"), "-o", str(path)], standalone_mode=False)
-    return path
-
-
 @pytest.fixture
-def results(solved, tmp_path):
-    return Path(shutil.copy(solved, tmp_path))
+def results(slider_crank, tmp_path):
+    """Of the slider-crank, in a folder without `figures.toml`."""
+    return Path(shutil.copy(slider_crank.folder / "scene.results.h5", tmp_path))
 
 
 def stems(paths):

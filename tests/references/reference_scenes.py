@@ -249,3 +249,8 @@ CASES = {
     if "[[analysis]]" in path.read_text(encoding="utf-8")
 }
 """Scene files of the cases."""
+NIGHTLY = {
+    "lightened_arm", "lightest_arm_solid", "soft_arm_tracking", "two_link_points", "two_link_rest_to_rest",
+    "two_link_solid", "two_link_split", "two_link_tracking",
+}  # fmt: skip
+"""Cases that take long, beside which there is a shorter one of the same kind."""

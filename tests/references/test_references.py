@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import reference_numbers
-from reference_scenes import CASES, MADE
+from reference_scenes import CASES, MADE, NIGHTLY
 
 import ffrobot
 
@@ -21,10 +21,9 @@ def meets_its_reference(name, found):
     assert not differing, f"{len(differing)} of {len(found)} numbers of {name} are not those of its reference:\n{worst}"
 
 
-LONG = "lightest_arm_solid"  # solids from STEP are in arm_6r, too
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.nightly] * (name == LONG)) for name in CASES])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.nightly] * (name in NIGHTLY)) for name in CASES]
+)
 def test_cases(name, solved):
     """Solved by commands, so that the memory of their meshes goes with them."""
     path = CASES[name]

@@ -6,6 +6,7 @@ from itertools import takewhile
 from pathlib import Path
 
 import pytest
+from reference_scenes import NIGHTLY
 from rich.console import Console
 
 from ffrobot.present.details import print_details
@@ -76,7 +77,7 @@ def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
 CASES = sorted(path.parent.name for path in (Path(__file__).parents[2] / "cases").glob("*/scene.toml"))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [case for case in CASES if case not in NIGHTLY])
 def test_every_case_has_a_summary_of_one_screen(case, solved):
     """With the verdicts of all analyses, of all motors, and warnings, or the number of those that had no room."""
     with Results(solved(case).folder / "scene.results.h5") as results:
