@@ -6,7 +6,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from small_robots import BEAM, CANTILEVER, FORCE, RHO, RIGID, SWING, E, L
+from small_robots import BEAM, CANTILEVER, FORCE, FREE, RHO, RIGID, SWING, E, L
 
 import ffrobot
 
@@ -171,37 +171,19 @@ def test_catalogue_beside_a_number(write):
 
 def test_places_of_patches(write, tmp_path):
     """Two patches where the largest voltage over a path is least: the same as `kind = "placement"` says of all sets."""
-    link = BEAM | {
-        "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-        "mesh": {"elements": 10},
-        "geometry": BEAM["geometry"] | {"section": {"shape": "rectangle", "height": 0.004, "width": 0.03}},
-    }
-    pzt = {
-        "body": "beam",
-        "centers": [0.1, 0.4],
-        "length": 0.1,
-        "width": 0.025,
-        "thickness": 0.75e-3,
-        "modulus": 63e9,
-        "d31": 110e-12,
-        "structural": False,
-    }
-    scene = {
-        "name": "placed",
-        "gravity": [0.0, 0.0],
+    section = {"shape": "rectangle", "height": 0.004, "width": 0.03}
+    link = BEAM | {"modes": FREE, "mesh": {"elements": 10}, "geometry": BEAM["geometry"] | {"section": section}}
+    patches = {
+        "body": "beam", "centers": [0.1, 0.4], "length": 0.1, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9,
+        "d31": 110e-12, "structural": False,
+    }  # fmt: skip
+    placed = {"kind": "placement", "about": "inverse", "placement": {"body": "beam", "criterion": "voltage"}}
+    scene = ARM | {
         "body": [{"name": "beam", "link": link}],
-        "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "beam.root"]}],
+        "joint": [SHOULDER | {"between": ["ground", "beam.root"]}],
         "trajectory": [{"name": "tip", "point": "beam.tip", "y": "0.1*sin(2*pi*t)"}],
-        "pzt": [pzt],
-        "analysis": [
-            {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.01},
-            {
-                "name": "placed",
-                "kind": "placement",
-                "about": "inverse",
-                "placement": {"body": "beam", "criterion": "voltage"},
-            },
-        ],
+        "pzt": [patches],
+        "analysis": [ARM["analysis"][0] | {"end": 0.5, "output_step": 0.01}, {"name": "placed", **placed}],
     }
     path = write(scene)
     with ffrobot.solve(path) as results:

@@ -123,14 +123,12 @@ def test_against_differences_by_hand(write, scene, keys):
 @pytest.mark.parametrize("step", [0.25, 0.05, 0.01])
 def test_the_derivative_of_a_peak_is_that_of_its_top(write, step):
     """τ = (I + m c²) θ̈ + m g c cos θ along a quintic: at its top, which no output hits, ∂τ/∂m = c² θ̈ + g c cos θ."""
-    inertia, c, m = 0.05, 0.3, 2.0
-    body = {"mass": m, "center": [c, 0.0], "inertia": inertia, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
-    scene = {
-        "name": "arm", "gravity": [0.0, -9.81], "body": [{"name": "arm", "rigid": body}],
-        "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    inertia, c, m = 0.05, 0.3, 2.0  # of ARM
+    scene = ARM | {
+        "payload": [],
         "trajectory": [{"name": "swing", "joint": "shoulder", "value": "1.3*(10*t**3 - 15*t**4 + 6*t**5)"}],
         "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": step}],
-    }  # fmt: skip
+    }
     t = np.linspace(0.0, 1.0, 2_000_001)
     theta, theta_ddot = 1.3 * (10 * t**3 - 15 * t**4 + 6 * t**5), 1.3 * (60 * t - 180 * t**2 + 120 * t**3)
     tau = (inertia + m * c**2) * theta_ddot + m * 9.81 * c * np.cos(theta)

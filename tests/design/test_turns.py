@@ -2,29 +2,16 @@
 
 import numpy as np
 import pytest
+import small_robots
 from scipy.optimize import minimize
 from small_robots import CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
 
-MASS, INERTIA, LOAD, LENGTH, G = 2.0, 0.05, 0.5, 0.6, 9.81
+MASS, INERTIA, LOAD, LENGTH, G = 2.0, 0.05, 0.5, 0.6, 9.81  # of small_robots.ARM
 AMPLITUDES, RATES, PHASES = np.array([1.0, 0.2]), np.pi * np.array([0.5, 1.5]), np.array([0.0, 0.7])
-ARM = {
-    "name": "arm",
-    "gravity": [0.0, -G],
-    "body": [
-        {
-            "name": "arm",
-            "rigid": {
-                "mass": MASS,
-                "center": [0.1, 0.1],
-                "inertia": INERTIA,
-                "points": {"root": [0.0, 0.0], "tip": [LENGTH, 0.0]},
-            },
-        }
-    ],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "payload": [{"point": "arm.tip", "mass": LOAD}],
+ARM = small_robots.ARM | {
+    "body": [{"name": "arm", "rigid": small_robots.RIGID | {"center": [0.1, 0.1]}}],
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": "sin(pi/2*t) + 0.2*sin(3*pi/2*t + 0.7)"}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 4.0, "output_step": 0.08}],
 }
