@@ -7,7 +7,6 @@ import re
 import h5py
 import numpy as np
 import pytest
-from beam_links import beam_link, circle
 
 import ffrobot
 
@@ -167,28 +166,6 @@ def test_beams(seed):
     check(drawn_beam(seed))
 
 
-@pytest.mark.parametrize("length", [7e-10, 7e-4, 0.7, 700.0, 7e5])
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-def test_bars_of_any_length_have_the_same_modes(condition, length):
-    """In SI; frequencies go with 1/length. A cantilever has of each bending family two shapes of loads at its tip."""
-    keys = beam_link(
-        length,
-        circle(length / 35),
-        10,
-        E=2.07e11,
-        nu=0.3,
-        rho=7850.0,
-        condition=condition,
-        name="bar",
-        modes={"count": 2, "family": "in-plane-bending"},
-    )
-    body = ffrobot.make_link(keys).body
-    keys["geometry"] |= {"length": 1.0, "section": {"shape": "circle", "diameter": 1 / 35}}
-    expected = ffrobot.make_link(keys).body.frequency / length
-    assert body.residual.tolist() == [0, 0, 1, 1]
-    np.testing.assert_allclose(body.frequency, expected, rtol=1e-9)
-
-
 def solid(condition, size, mesh, section, **more):
     return {
         "name": "link",
@@ -229,4 +206,4 @@ SOLIDS = {
 
 @pytest.mark.parametrize("keys", SOLIDS.values(), ids=SOLIDS)
 def test_solids(keys):
-    check(keys, {name: SYSTEMS[name] for name in ("mm", "µm, mg, ms")}, rounding=1e-7)
+    check(keys, {"µm, mg, ms": SYSTEMS["µm, mg, ms"]}, rounding=1e-7)
