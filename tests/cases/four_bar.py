@@ -1,7 +1,9 @@
-"""A four-bar linkage of rigid bars in the plane, as a planar scene and as one in 3D, with any keys of its joints."""
+"""Four-bar linkages of rigid bars: in the plane, as a planar scene and as one in 3D, and out of it."""
 
 import numpy as np
+import tables_3d
 from scenes_in_3d import joint_keys, rigid_keys
+from tables_3d import Y, Z, revolute
 
 from ffrobot.mbs.fields.spelling import place
 
@@ -59,3 +61,27 @@ def in_3d(of_joints, analyses, **tables):
         "joint": [joint_keys(joint) for joint in found["joint"]],
         "initial": {"joints": closed(1.0)},
     }
+
+
+def out_of_plane(value, *analyses, unit=1.0, **of_joints):
+    """Tables of a loop of revolute, universal, spherical and revolute joints, driven at A; lengths in a unit.
+
+    `of_joints`: more keys by joint.
+    """
+    lengths = {"crank": 0.1 * unit, "rod": 0.4 * unit, "rocker": 0.35 * unit}
+    bodies = [
+        tables_3d.rigid(name, 0.3, [0.02 * length**2] * 3, [0.4 * length, 0.01 * unit, 0.0], tip=[length, 0.0, 0.0])
+        for name, length in lengths.items()
+    ]
+    at = [0.35 * unit, 0.05 * unit, 0.1 * unit]
+    joints = [
+        revolute("A", "ground", "crank.root", motor=True),
+        tables_3d.joint("B", "universal", "crank.tip", "rod.root", axis=Z, second_axis=Y, motor=False),
+        revolute("D", "ground", "rocker.root", [0.2, -0.1, 1.0], at=at, motor=False),
+        tables_3d.joint("C", "spherical", "rod.tip", "rocker.tip"),
+    ]
+    return tables_3d.scene(
+        bodies, [joint | of_joints.get(joint["name"], {}) for joint in joints], *analyses,
+        gravity=[0.0, -9.81 * unit, 0.0], initial={"joints": {"A": 0.7, "B": [-0.4, 0.0], "D": 1.8}},
+        trajectory=[{"name": "turn", "joint": "A", "value": value}],
+    )  # fmt: skip

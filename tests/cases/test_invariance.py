@@ -6,10 +6,9 @@ a moment, a product of inertia, an order of rotations), and forces are no longer
 
 import numpy as np
 import pytest
-import tables_3d
+from four_bar import out_of_plane
 from moved_scenes import MIRROR, moved, tables_of, turning
 from rotations import random_rotation, rotation
-from tables_3d import Y, Z, revolute, rigid, scene
 
 import ffrobot
 
@@ -111,24 +110,9 @@ def test_bodies_in_another_order_move_as_before(case):
 
 
 def crank(unit):
-    """Of a rigid loop of revolute, universal, spherical and revolute joints: angles, and torque, in m, kg, s."""
-    lengths = {"crank": 0.1, "rod": 0.4, "rocker": 0.35}
-    bodies = [
-        rigid(name, 0.3, [0.02 * (length * unit) ** 2] * 3, [0.4 * length * unit, 0.0, 0.0], tip=[length * unit, 0, 0])
-        for name, length in lengths.items()
-    ]
-    at = [0.35 * unit, 0.05 * unit, 0.1 * unit]
-    joints = [
-        revolute("A", "ground", "crank.root", motor=True),
-        tables_3d.joint("B", "universal", "crank.tip", "rod.root", axis=Z, second_axis=Y, motor=False),
-        revolute("D", "ground", "rocker.root", [0.2, -0.1, 1.0], at=at, motor=False),
-        tables_3d.joint("C", "spherical", "rod.tip", "rocker.tip"),
-    ]
+    """Of a rigid loop: angles, and torque, in m, kg, s."""
     inverse = {"name": "inverse", "kind": "pcid", "end": 0.3, "output_step": 0.05, "tolerance": 1e-10}
-    turn = {"name": "turn", "joint": "A", "value": "0.7+0.9*(1-cos(3*t))"}
-    start = {"joints": {"A": 0.7, "B": [-0.4, 0.0], "D": 1.8}}
-    tables = scene(bodies, joints, inverse, gravity=[0.0, -9.81 * unit, 0.0], initial=start, trajectory=[turn])
-    with solved(tables) as results:
+    with solved(out_of_plane("0.7+0.9*(1-cos(3*t))", inverse, unit=unit)) as results:
         coordinates = np.column_stack([results[f"inverse/joints/{name}/coordinate"] for name in "ABD"])
         return coordinates, results["inverse/joints/A/moment"] / unit**2
 

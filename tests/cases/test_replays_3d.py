@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from four_bar import out_of_plane
 
 import ffrobot
 
@@ -104,36 +105,13 @@ def arm(name):
     return scene
 
 
-def four_bar():
-    """A loop of revolute, universal, spherical and revolute joints, driven at the crank."""
-    rng, c = np.random.default_rng(5), 0.7
-    crank, rod, rocker = (rigid(rng, name) for name in ("crank", "rod", "rocker"))
-    for body, length in ((crank, 0.1), (rod, 0.4), (rocker, 0.35)):
-        body["rigid"]["points"]["tip"], body["rigid"]["center"] = [length, 0.0, 0.0], [0.4 * length, 0.01, 0.0]
-    at = [0.35, 0.05, 0.1]
-    joints = [
-        {"name": "A", "type": "revolute", "between": ["ground", "crank.root"], "axis": [0, 0, 1], "motor": True}
-        | GEAR,
-        {"name": "B", "type": "universal", "between": ["crank.tip", "rod.root"], "axis": [0, 0, 1],
-         "second_axis": [0, 1, 0], "viscous_friction": 0.02},
-        {"name": "D", "type": "revolute", "between": ["ground", "rocker.root"], "axis": [0.2, -0.1, 1.0], "at": at,
-         "viscous_friction": 0.05},
-        {"name": "C", "type": "spherical", "between": ["rod.tip", "rocker.tip"]},
-    ]  # fmt: skip
-    return {
-        "name": "bar", "space": "spatial", "gravity": [0.0, -9.81, 0.0], "body": [crank, rod, rocker], "joint": joints,
-        "initial": {"joints": {"A": c, "B": [-0.4, 0.0], "D": 1.8}},
-        "trajectory": [{"name": "t", "joint": "A", "value": f"{c}+0.9*(1-cos(pi*t/{END}))"}],
-    }  # fmt: skip
-
-
 def solved(scene, ways, folder, steps=60):
     """By name of the analysis: datasets and attributes."""
     common = {"tolerance": TOLERANCE, "integrator": "dop853"}
     analyses = [{"name": "inverse", "kind": "pcid", "end": END, "output_step": END / steps, **common}]
     analyses += [{"name": way, "kind": "forward", "actuation": "inverse", "apply": way, **common} for way in ways]
     path = folder / "r.h5"
-    with ffrobot.solve(ffrobot.make_scene(**scene, analysis=analyses)) as results:
+    with ffrobot.solve(ffrobot.make_scene(**scene | {"analysis": analyses})) as results:
         results.save(path)
     found = {}
     with h5py.File(path) as file:
@@ -194,4 +172,7 @@ def test_arms(name, tmp_path):
 
 
 def test_a_loop(tmp_path):
-    compare(solved(four_bar(), ["joints", "trajectory"], tmp_path), ["joints", "trajectory"])
+    """Of revolute, universal, spherical and revolute joints."""
+    built = {"A": GEAR, "B": {"viscous_friction": 0.02}, "D": {"viscous_friction": 0.05}}
+    scene = out_of_plane(f"0.7+0.9*(1-cos(pi*t/{END}))", **built)
+    compare(solved(scene, ["joints", "trajectory"], tmp_path), ["joints", "trajectory"])

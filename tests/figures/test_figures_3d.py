@@ -128,29 +128,6 @@ def test_configurations_hold_every_link_at_every_time(arm):
             assert away.max() < (0.02 if axes is corner else 1e-12)  # tubes of 8 and 11 mm seen from the corner
 
 
-@pytest.mark.parametrize("s", [None, 3.0])
-def test_planar_bodies_are_drawn_where_they_were_solved(slider_crank, s):
-    """Ends of the crank (a line), corners of the rod (its section swept along the axis): in x and y of the figure."""
-    record = FigureRecord(name="p", kind="configurations", analysis="inverse", times=(0.05,), exaggeration=s)
-    with Results(slider_crank.folder / "scene.results.h5") as results:
-        (axes,) = draw(record, results).axes
-        (row,) = slider_crank.rows("inverse", [0.05])
-        pin, mid, away = (
-            results[f"inverse/points/{name}"][row]
-            for name in ("crank.tip/position", "rod.mid/position", "rod.mid/deflection")
-        )
-        angle, half = results["inverse/bodies/rod/angle"][row], results.modal_body("rod").stations.height.max() / 2
-    crank, rod, *_ = (one.get_segments() for one in axes.collections if isinstance(one, LineCollection))
-    np.testing.assert_allclose([crank[0][0], crank[-1][1]], [[0.0, 0.0], pin], rtol=0, atol=1e-12)
-    normal = np.array([-np.sin(angle), np.cos(angle)])
-    turned = np.array([normal[1] * away[0] + normal[0] * away[1], -normal[0] * away[0] + normal[1] * away[1]])
-    expected = mid + ((s or 1.0) - 1.0) * turned
-    off = np.abs((np.concatenate(rod) - expected) @ normal)
-    along = np.abs((np.concatenate(rod) - expected) @ [normal[1], -normal[0]])
-    assert along.min() < 1e-3
-    np.testing.assert_allclose(off[along < 1e-3], half, rtol=1e-3)
-
-
 def test_outline_of_a_surface_goes_around_its_opening():
     """Area by Gauss' theorem over the edges that are drawn: of a plate with a square hole, seen from its face."""
     x = np.arange(4.0)

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-import pyvista
 from PIL import Image
 from scipy.spatial.transform import Rotation
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from ffrobot.pictures.view import Options, view_file
 from ffrobot.results.file import Results
@@ -14,22 +12,12 @@ DIGITS = 2e-7  # numbers in the files have 7 digits; lengths are about 1 m
 
 
 @pytest.fixture(scope="module")
-def grids(arm_3r, tmp_path_factory):
-    """For five steps: time, points, point data, body numbers of the cells."""
+def grids(arm_3r, read, tmp_path_factory):
+    """For five steps: time, points, body numbers of the cells."""
     folder = tmp_path_factory.mktemp("view")
     viewed = view_file(arm_3r.folder / "scene.results.h5", folder, Options(frames=5, pictures=False))
     assert [path.name for path in viewed.paths] == ["inverse.vtkhdf"]
-    reader = vtkHDFReader()
-    reader.SetFileName(str(viewed.paths[0]))
-    reader.UpdateInformation()
-    found = []
-    for step in range(reader.GetNumberOfSteps()):
-        reader.SetStep(step)
-        reader.Update()
-        grid = pyvista.wrap(reader.GetOutputDataObject(0))
-        data = {name: np.array(grid.point_data[name]) for name in grid.point_data}
-        found.append((reader.GetTimeValue(), np.array(grid.points), data, np.array(grid.cell_data["body"])))
-    return found
+    return [(time, points, cells["body"]) for time, _, points, _, cells in read(viewed.paths[0])]
 
 
 def rings(points, count):
@@ -50,7 +38,7 @@ def parts(points, results):
 def test_tubes_are_where_they_were_solved(grids, arm_3r):
     with Results(arm_3r.folder / "scene.results.h5") as results:
         assert [time for time, *_ in grids] == [0.0, 0.15, 0.3, 0.45, 0.6]
-        for time, points, _, bodies in grids:
+        for time, points, bodies in grids:
             (row,) = arm_3r.rows("inverse", [time])
             column, upper, fore = parts(points, results)
             assert set(bodies) == {0, 1, 2}
