@@ -31,7 +31,7 @@ def link(condition, reference=None, pivot=None, **root):
     ]
     hole = [{"position": PLACE, "diameter": 2 * RADIUS}]
     keys = {"name": "part", "modes": {"count": 3}, "interface": places + ([{"name": "root"} | root] if root else [])}
-    made = solid_link(0.2, rectangle(0.03, 0.01), {"order": 2, "size": 0.02}, hole=hole, condition=condition, **keys)
+    made = solid_link(0.2, rectangle(0.03, 0.01), {"order": 2, "size": 0.03}, hole=hole, condition=condition, **keys)
     return made | {"reference": made["reference"] | told[0]}
 
 

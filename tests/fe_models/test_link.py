@@ -9,8 +9,7 @@ import pytest
 from solids import write_solid
 
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
-from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.link import make_link
 
 
 def test_up_to_date_links_are_not_computed_again(link_file):
@@ -25,13 +24,6 @@ def test_up_to_date_links_are_not_computed_again(link_file):
     path.write_text(path.read_text().replace("count = 10", "count = 9"))
     assert make_link(path).computed
     assert len(make_link(path).body.frequency) == 9
-
-
-def test_hash_depends_on_every_value(link_file):
-    base = input_hash(read_link(link_file()))
-    others = [{"length = 1.0": "length = 1.0000000001"}, {"count = 10": "indices = [1]"}, {'"link1"': '"link2"'}]
-    hashes = [input_hash(read_link(link_file(replace=change))) for change in others]
-    assert len({base, *hashes}) == 4
 
 
 @pytest.mark.parametrize("missing", ["dolfinx", "petsc4py"])
@@ -104,25 +96,3 @@ def test_a_truncated_output_is_made_again(link_file):
     output.write_bytes(output.read_bytes()[:3000])
     assert make_link(path).computed
     assert not make_link(path).computed
-
-
-def test_cache(link_file, cache):
-    path = link_file()
-    first = cached_modal_body(path)
-    assert first.computed
-    assert first.path.is_relative_to(cache / "ffrobot")
-    assert not path.with_suffix(".h5").exists()
-    assert not cached_modal_body(path).computed
-    first.path.write_bytes(b"damaged")
-    assert cached_modal_body(path).computed
-    assert not cached_modal_body(path).computed
-
-
-def test_cache_prefers_an_up_to_date_file_beside_the_link(link_file, cache):
-    path = link_file()
-    made = make_link(path)
-    assert cached_modal_body(path).path == made.path
-    assert not (cache / "ffrobot" / "links").exists()
-    made.path.write_bytes(b"damaged")
-    assert cached_modal_body(path).computed
-    assert made.path.read_bytes() == b"damaged"
