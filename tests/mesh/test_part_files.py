@@ -15,14 +15,18 @@ from ffrobot.mesh.mesh_files import read_foreign
 from ffrobot.mesh.records import PlaceRecord
 from ffrobot.mesh.structured import structured_box
 
+ENDINGS = ("step", "msh", "inp", "bdf", "vtk", "vtu")
+
 
 def structured_bar(cell, across=2):
     """Cells of a bar of the paper's section, 1 m long."""
     return structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, across, across), cell)
 
 
-@pytest.mark.parametrize("ending", ["step", "msh", "inp", "bdf", "vtk", "vtu"])
-@pytest.mark.parametrize("content", ["", "*NODE\n1, 0., 0.\n"])
+@pytest.mark.parametrize(
+    ("ending", "content"),
+    [(ending, "" if ending in ("step", "vtk") else "*NODE\n1, 0., 0.\n") for ending in ENDINGS],
+)
 def test_corrupt_files_are_refused(solid, mesh_part, tmp_path, ending, content, capfd):
     path = tmp_path / f"part.{ending}"
     path.write_text(content)
