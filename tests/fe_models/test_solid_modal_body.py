@@ -8,7 +8,6 @@ from solids import body_of, model_of, write_solid
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.solid.invariants import shape_integrals
-from ffrobot.fe_models.solid.strain_energy import gradients
 from ffrobot.mesh.compat import geometry_nodes, lagrange_element
 
 LENGTH, HEIGHT, WIDTH, RHO = 1.0, 0.015, 0.025, 7850.0
@@ -80,15 +79,6 @@ def test_square_section_bends_in_its_two_planes(tmp_path):
             assert u[2] < 1e-6 * u[1]
         if body.family[k] == "out-of-plane-bending":
             assert u[1] < 1e-6 * u[2]
-
-
-def test_gradients_of_a_linear_field_are_its_slopes(tmp_path):
-    model, _ = model_of(write_solid(tmp_path, cell="hexahedron", order=2, divisions=(4, 1, 1)))
-    slopes = np.arange(9.0).reshape(3, 3)
-    field = (model.x @ slopes.T).reshape(-1, 1)
-    for piece in gradients(model, field):
-        expected = np.broadcast_to(slopes.T[None, :, None, :, None], piece.values.shape)
-        np.testing.assert_allclose(piece.values, expected, atol=1e-9)
 
 
 def test_interface_masses_count_in_modes_and_integrals(tmp_path):
