@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ffrobot import InputError
 from ffrobot.exchange.part_draft import draft_link
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.mesh.gmsh_session import gmsh_session
@@ -103,16 +102,6 @@ def test_axes_of_a_fork_are_those_of_its_faces(tmp_path):
         np.abs([keys["geometry"][axis] for axis in ("x_axis", "y_axis")]), np.eye(3)[:2], atol=1e-9
     )
     np.testing.assert_allclose(np.abs(keys["interface"][1]["position"]), [0.25, 0, 0.01], atol=1e-9)
-
-
-def test_what_has_no_ends(tmp_path):
-    with gmsh_session():
-        gmsh.model.occ.addSphere(0, 0, 0, 100)
-        gmsh.model.occ.synchronize()
-        gmsh.write(str(tmp_path / "ball.step"))
-    part = inspect_part(tmp_path / "ball.step")
-    with pytest.raises(InputError, match="expected two bores across the part, or plane faces at both of its ends"):
-        draft_link(part, tmp_path / "ball.step", "ball", tmp_path)
 
 
 def test_the_command(tmp_path, ffrobot):

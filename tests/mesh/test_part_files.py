@@ -96,8 +96,10 @@ PARTITIONS = {
 }
 
 
-@pytest.mark.parametrize("partitions", PARTITIONS)
-@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize(
+    ("partitions", "binary"),
+    [("one file", 0), ("with copies at their faces", 0), ("with copies at their faces", 1), ("a file for each", 1)],
+)
 def test_partitions_of_gmsh(solid, mesh_part, tmp_path, partitions, binary):
     options, says = PARTITIONS[partitions]
     path = tmp_path / "part.msh"
