@@ -88,7 +88,9 @@ def drive_robot(
     controls = integration_controls(analysis, integrator)
     paths = model.scene.trajectory if any(row.is_trajectory for row in model.rows) else ()
     loads = (size for load in model.scene.load for size in load.components.values())
-    controls.stops = as_list(stops(times, paths, loads))
+    is_driven = bool(paths) and not any(node.body.n_modes for node in model.tree.nodes)
+    ends = stops(times, paths, loads, is_driven=is_driven)
+    controls.stops = as_list(ends)
     system.integrated.scene.watch_posture(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )
@@ -128,7 +130,7 @@ def drive_robot(
 
     @cache
     def look_closer() -> Outcome:
-        between, more = _between(system, *reached, found, control)
+        between, more = _between(system, *reached, ends, found, control)
         order = in_order(found.time, between.time)
         return _under(drives, found.among(between), np.concatenate([numbers, more])[order])
 
@@ -164,9 +166,12 @@ def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
 
 
 def _between(
-    system: MultibodySystem, times: Array, states: Array, found: Outcome, control: Control | None
+    system: MultibodySystem, times: Array, states: Array, ends: Array, found: Outcome, control: Control | None
 ) -> tuple[Outcome, Array]:
-    """The run at `times` (k,) of it, with `states` (k, n), and what a replay does there (T, numbers)."""
+    """The run at `times` (k,) of it, with `states` (k, n), and what a replay does there (T, numbers).
+
+    `ends` of steps, s, are among what is looked at.
+    """
     core, scene, _ = system.integrated
 
     def at(rows: Indices) -> _core.TreeRun:
@@ -176,7 +181,7 @@ def _between(
         held = zero_order_hold(system.model, control.commands)
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
-    some = some_of(len(times))
+    some = some_of(times, ends)
     run = at(some)
     motion, replayed = _motion(system, run, times[some]), run.replayed
     if (more := about_highest(some, motion.multipliers)).size:

@@ -224,7 +224,9 @@ class Outcome:
 
         @cache
         def look_closer() -> Outcome:
-            return at(path_times(self.time, self.model.scene.trajectory, self.analysis.last_time))
+            scene, shape = self.model.scene, (function for _, function, _ in self.analysis.prescribed())
+            loads = (size for load in scene.load for size in load.components.values())
+            return at(path_times(self.time, scene.trajectory, self.analysis.last_time, [*loads, *shape]))
 
         return replace(self, look_closer=look_closer)
 

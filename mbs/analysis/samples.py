@@ -1,7 +1,7 @@
 """Where a run is looked at between its outputs: what is largest in it does not depend on where these are.
 
 An integration keeps the ends of its steps, which resolve whatever rings above its tolerance, and times between them
-where steps are long. A prescribed motion is known at any time: it is looked at where its paths change.
+where steps are long. A prescribed motion is known at any time: it is looked at where its paths and loads change.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from ..solve.posture import misfits
 
 FEWEST = 2000  # intervals of a run
 KEPT = 16_384  # states of an integration at most
-LOOKED_AT = 2000  # of these, and all others next to the largest values
+LOOKED_AT = 2000  # of these, those at which steps have to end, and all others next to the largest values
 HIGHEST = 4  # local maxima of each quantity
 MOST = 20_000  # times of a prescribed motion
 RESOLVED = 1e-6  # of the largest value or rate of a path: what the trapezoidal rule may miss between two times
+SEEN = 1e-3  # likewise, of a load that steps do not feel: its peak is known
 ROUNDS = 30  # of halving
 SHORTEST = 1e-9  # of a run, between two times
 SAME = 1e-13  # of the latest time, by which equal ones differ at most
@@ -48,9 +49,11 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
     return (times[:reached], samples.states.reshape(len(times), -1)[:reached]) if reached else None
 
 
-def some_of(count: int) -> Indices:
-    """Numbers of some of `count` samples, the first and the last among them."""
-    return np.unique(np.append(np.arange(0, count, -(-count // LOOKED_AT)), count - 1))
+def some_of(times: Array, ends: Array) -> Indices:
+    """Numbers of some of the samples at `times` (k,), s: the first, the last, and those at which steps have to end."""
+    count = len(times)
+    at_ends = np.flatnonzero(np.isin(times, ends))
+    return np.unique(np.concatenate([np.arange(0, count, -(-count // LOOKED_AT)), at_ends, [count - 1]]))
 
 
 def about_highest(some: Indices, quantities: Array) -> Indices:
@@ -79,38 +82,54 @@ def in_order(outputs: Array, samples: Array) -> Indices:
     return rows[np.unique(times[rows], return_index=True)[1]]
 
 
-def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction]) -> Array:
+def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool) -> Array:
     """(n,) s within `times`, at which steps of integrations end.
 
     Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
-    and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far.
+    and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far or conditions change.
+    `is_driven`: steps do not feel loads, as paths alone move the robot, and end where loads have to be looked at.
     """
-    duration, found = times[-1] - times[0], [np.array(load.switches()) for load in loads]
+    ends, loads = times[[0, -1]], list(loads)
+    duration, found = ends[1] - ends[0], [np.zeros(0)]
+    for function in (*(target for path in paths for target in targets_of(path)), *loads):
+        pieces = np.union1d(np.clip(function.switches(), *ends), ends)
+        found += [pieces, _parts(pieces, np.diff(pieces) < BRIEF * duration)]
     for path in paths:
-        found += [np.array(target.switches()) for target in targets_of(path)]
         if path.path is not None and duration > 0.0:
             breaks = path.path.breaks
             way = np.abs(np.diff(path.path.sample(breaks), axis=0)).max(axis=1, initial=0.0)
             last = np.diff(breaks)
-            brief = (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0))
-            found.append(np.linspace(breaks[:-1][brief], breaks[1:][brief], PARTS + 1).ravel())
-    every = np.unique(np.concatenate([np.zeros(0), *found]))
+            found.append(
+                _parts(breaks, (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0)))
+            )
+    if is_driven and duration > 0.0:
+        grid = np.union1d(np.linspace(times[0], times[-1], FEWEST + 1), np.concatenate(found))
+        found += [np.setdiff1d(_resolved(load, grid, SEEN), grid) for load in loads]
+    every = np.unique(np.concatenate(found))
     return every[(every > times[0]) & (every < times[-1])]
 
 
-def path_times(times: Array, paths: Iterable[Trajectory], end: float) -> Array:
-    """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs."""
+def _parts(breaks: Array, chosen: Array) -> Array:
+    """Ends of the parts of `chosen` (n,) pieces between `breaks` (n + 1,), s."""
+    return np.linspace(breaks[:-1][chosen], breaks[1:][chosen], PARTS + 1).ravel()
+
+
+def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: Iterable[TimeFunction] = ()) -> Array:
+    """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs.
+
+    `others`: loads, and whatever else is prescribed.
+    """
     paths = list(paths)
+    functions = [*(target for path in paths for target in targets_of(path)), *others]
     found = _with_others(times, np.linspace(times[0], times[-1], FEWEST + 1))
-    for path in paths:
-        breaks = np.zeros(0) if path.path is None else path.path.breaks
-        breaks = np.unique(np.concatenate([breaks, *(target.switches() for target in targets_of(path))]))
-        found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
+    of_paths = (path.path.breaks for path in paths if path.path is not None)
+    breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *(function.switches() for function in functions)]))
+    found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
     moving = (found >= 0.0) & (found <= end)
     inside = found[moving]
     if len(inside) > 1:  # a run may end before the path begins
-        for target in (target for path in paths for target in targets_of(path)):
-            inside = _resolved(target, inside)
+        for function in functions:
+            inside = _resolved(function, inside)
     return np.union1d(found[~moving], inside)
 
 
@@ -127,14 +146,17 @@ def targets_of(path: Trajectory) -> tuple[TimeFunction, ...]:
     return (*path.components.values(), *(() if law is None else law.functions))
 
 
-def _resolved(target: TimeFunction, times: Array) -> Array:
-    """The times with others between them, where value or rate change more than their derivatives at both ends say."""
+def _resolved(target: TimeFunction, times: Array, share: float = RESOLVED) -> Array:
+    """The times with others between them, where value or rate change more than their derivatives at both ends say.
+
+    By a `share` of their size.
+    """
     value, rate, _ = target.sample(times)
     sizes = float(np.ptp(value)), float(np.abs(rate).max())
     for _ in range(ROUNDS):
         rough = np.zeros(len(times) - 1, dtype=bool)
         for order, size in enumerate(sizes):
-            rough |= misfits(target, times, order) > RESOLVED * size
+            rough |= misfits(target, times, order) > share * size
         rough &= np.diff(times) > SHORTEST * (times[-1] - times[0])
         if not rough.any() or len(times) + np.count_nonzero(rough) > MOST:
             break

@@ -174,3 +174,23 @@ def test_a_jolt_of_a_joint_that_only_motors_move():
     kinds = [{"analysis": [inverse | {"kind": kind}]} for kind in ("pcid", "motors-only")]
     by_inverse, by_motors = (motor(solve(scene | kind)).moment for kind in kinds)
     assert by_motors == pytest.approx(by_inverse, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+@pytest.mark.parametrize(
+    ("pulse", "square"),
+    [
+        ("where(t < 0.5011, 0, where(t < 0.5011 + {w}, 8, 0))", 1.0),
+        ("where(t < 0.5011, 0, where(t < 0.5011 + {w}, 8*sin(pi*(t - 0.5011)/{w}), 0))", 0.5),
+        ("where(t < {w}, 8*sin(pi*t/{w}), 0)", 0.5),
+        ("where(t <= 0.5011, 0, 8*exp(-(t - 0.5011)/{w}))", 0.5),
+        ("8*exp(-((t - 0.50113)/{w})**2)", np.sqrt(np.pi / 2)),
+    ],
+)
+@pytest.mark.parametrize("w", [1.7e-3, 1.5e-4])
+def test_a_pulse_of_a_load_between_outputs(kind, pulse, square, w):
+    """The motor alone bears a torque on its joint: its peak, and the RMS by ∫ of its square, 8² `square` w."""
+    load = [{"joint": "O", "moment": pulse.format(w=w)}]
+    found = motor(solve(rod({"value": "0.05*t"}, 0.1, kind, load=load)))
+    assert found.moment == pytest.approx(8.0, rel=1e-3)
+    assert found.rms_moment == pytest.approx(8.0 * np.sqrt(square * w), rel=0.02)
