@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -31,7 +31,7 @@ from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, check_point, claim_folder
 from ..sweep.variation import Variation
 from ..sweep.workers import Workers
-from .readings import Goal
+from .readings import Goal, Reading
 
 OUTPUTS = 1000  # at least, where goals are peaks or means over time: they do not depend on those of the scene
 ALGEBRAIC = ("static", "pcid")
@@ -66,11 +66,14 @@ def may_repeat(keys: Sequence[Key]) -> bool:
     return not any(key[0] == "analysis" for key in keys)
 
 
-def repeated_steps(results: Results, path: Path) -> dict[Key, Any] | None:
+def repeated_steps(results: Results, path: Path, readings: Iterable[Reading]) -> dict[Key, Any] | None:
     """Changes of a scene with which its integrations take the steps of a run again, whose `results` are at `path`.
 
-    None where one of them cannot be repeated; nothing where none is integrated, and differences are smooth anyway.
+    None where one of them cannot be repeated, or one of the `readings` lies between outputs, as runs that repeat steps
+    have outputs alone; nothing where none is integrated, and differences are smooth anyway.
     """
+    if any(reading.is_between for reading in readings):
+        return None
     about = {name: results.attributes(name) for name in results.analyses}
     stepping = [name for name in about if about[name]["steps"]]
     repeated = all(results.has(f"{name}/{DATASET}") for name in stepping)

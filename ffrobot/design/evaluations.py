@@ -207,7 +207,7 @@ class Evaluations:
         try:
             with design.results() as results:
                 readings = tuple(goal.read(results) for goal in self.problem.goals)
-                again = repeated_steps(results, design.folder / RESULTS)
+                again = repeated_steps(results, design.folder / RESULTS, readings)
                 found = Evaluated(place, design, readings, again=again)
         except InputError as error:
             if first:  # a goal that means nothing

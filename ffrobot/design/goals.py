@@ -60,6 +60,8 @@ def _of_scene(results: Results, variable: Variable) -> tuple[CatalogMotor, float
     return variable.motors[variable.rows.index(row)], row[0]
 
 
+UNCERTAIN = "uncertain, as outputs, which alone count here, miss a part of the history: take a smaller output_step"
+
 FORMS = (
     "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
     "frequency NUMBER BODY", "mass", "mass BODY", "motors mass", "motors cost",
@@ -78,13 +80,25 @@ class OfHistory(Goal):
 
     def read(self, results: Results) -> Reading:
         """Of the history's only column."""
+        history = self._history(results)
+        joined = " ".join(part for part in (history.unit, self.times) if part) if history.unit else ""
+        unit, value = {"W s": "J"}.get(joined, joined), self.reduce(history)
+        if self.reduce is _rms and history.is_missed:
+            return Reading(history.rms[1], unit, missed_by=value)
+        return Reading(value, unit, doubt=UNCERTAIN if self.reduce in (_mean, _integral) and history.is_missed else "")
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """Its value by results of a changed scene."""
+        history = self._history(results)
+        return Followed(history.rms[1] if nominal.is_between else self.reduce(history))
+
+    def _history(self, results: Results) -> History:
         history = read_history(results, self.name, f'"{self.text}"')
         if history.values.shape[1] > 1:
             raise InputError(
                 f'"{self.text}": expected one column, such as "{self.name}[0]", found {history.values.shape[1]}'
             )
-        joined = " ".join(part for part in (history.unit, self.times) if part) if history.unit else ""
-        return Reading(self.reduce(history), {"W s": "J"}.get(joined, joined))
+        return history
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, did_you_mean
-from ..common.peaks import top_at
+from ..common.peaks import shares, top_at
 from ..mbs.joints.joints import JOINT_TYPES
 from ..results.datasets import COLUMN
 from ..results.file import Results
@@ -41,7 +41,8 @@ class Reading:
         column, sign: of its history, and of the value there.
         mode: of a frequency, the family and its number in it.
         coarse: of a peak, its value by every second output; NaN of all else.
-        missed_by: of a peak between outputs, the largest value near them; NaN of all else.
+        missed_by: of a peak or RMS that outputs miss, what it is by these; NaN of all else.
+        doubt: why the value is uncertain; empty where it is not.
     """
 
     value: float
@@ -53,19 +54,20 @@ class Reading:
     mode: str = ""
     coarse: float = float("nan")
     missed_by: float = float("nan")
+    doubt: str = ""
 
     @property
     def is_between(self) -> bool:
-        """Whether it is a peak that outputs miss: it has no place, and is compared with those of other runs."""
+        """Whether outputs miss it: it has no place, and is compared with those of other runs."""
         return bool(np.isfinite(self.missed_by))
 
     @property
     def remark(self) -> str:
-        """That outputs miss a peak; empty where they do not."""
+        """What outputs miss; empty where that is nothing."""
         if not self.is_between:
-            return ""
+            return self.doubt
         found = f"found {self.missed_by:.6g} near outputs, {self.value:.6g} between them, which counts"
-        return f"{found}: with a smaller output_step histories have the peak, too"
+        return f"{found}: with a smaller output_step histories have it, too"
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,7 @@ POWER = "power"
 
 SAME = 1e-6  # of an output step: times that are one
 MISSED = 1e-3  # of a peak: how much larger values between outputs are that count as the peak
+MISSED_RMS = 0.05  # of a root mean square, likewise: both are sums over times that are not close everywhere
 SUPPORT = 6  # outputs that a value between outputs is made from
 
 
@@ -116,7 +119,8 @@ SUPPORT = 6  # outputs that a value between outputs is made from
 class History:
     """`values` (T, columns) at `time` (T,), s; of a vector its length, one column.
 
-    `largest`: of all columns and of all times that the run looked at; NaN where that is not known.
+    `largest`: of all columns and of all times that the run looked at; `rms` (2,): by outputs and by all these times, of
+    a motor's power those of its moment. NaN where that is not known.
     """
 
     name: str
@@ -124,6 +128,13 @@ class History:
     time: Array
     values: Array
     largest: float = float("nan")
+    rms: tuple[float, float] = (float("nan"), float("nan"))
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether outputs miss a part of it that counts, or count a part for too long."""
+        by_outputs, by_all = self.rms
+        return abs(by_all - by_outputs) > MISSED_RMS * max(by_all, by_outputs)
 
     def at(self, t: float, column: int, every: int = 1) -> float:
         """The value at t: that of an output, or of the polynomial through the six nearest (Lagrange).
@@ -171,7 +182,19 @@ def read_history(results: Results, name: str, option: str) -> History:
         values = values[:, k : k + 1]
     elif is_vector(results, found, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
-    return History(name, _unit(results, found), results.time(found), as_floats(values), float(peaks.max()))
+    rms = _rms(results, found.replace(f"/{POWER}", "/moment") if is_power else found, match and int(match["column"]))
+    return History(name, _unit(results, found), results.time(found), as_floats(values), float(peaks.max()), rms)
+
+
+def _rms(results: Results, name: str, column: int | None) -> tuple[float, float]:
+    """Of all columns together, or of one: by outputs, and by all times that the run looked at; NaN if not known."""
+    by_all = np.atleast_1d(results.attributes(name).get("rms", np.nan))
+    by_outputs = np.sqrt(shares(results.time(name)) @ results.data(name) ** 2)
+    if column is not None and len(by_all) == len(by_outputs):
+        by_all, by_outputs = by_all[column : column + 1], by_outputs[column : column + 1]
+    elif column is not None:
+        by_all = np.array([np.nan])  # that of a vector's length
+    return float(np.linalg.norm(by_outputs)), float(np.linalg.norm(by_all))
 
 
 def _known(results: Results) -> dict[str, str]:

@@ -168,7 +168,9 @@ class Sensitivity(Finding):
 
     def remarks(self) -> Iterator[str]:
         """What to mind about the numbers, and how they came about."""
-        for goal, row in zip(self.goals, self.entries, strict=True):
+        for goal, reading, row in zip(self.goals, self.readings, self.entries, strict=True):
+            if reading.remark:
+                yield f"note       {goal}: {reading.remark}"
             for key, one in zip(self.keys, row, strict=True):
                 yield from (f"note       {goal} by {key}: {text}" for text in one.notes)
         yield from failed_runs(self.failures, self.runs)
@@ -243,7 +245,8 @@ def _nominal(
     """The goals of the scene's own design, and what has its steps taken again."""
     design = designs.run_first(point)
     with design.results() as results:
-        return tuple(goal.read(results) for goal in goals), repeated_steps(results, design.folder / RESULTS)
+        readings = tuple(goal.read(results) for goal in goals)
+        return readings, repeated_steps(results, design.folder / RESULTS, readings)
 
 
 def _check_steps(designs: Designs, base: Base) -> None:

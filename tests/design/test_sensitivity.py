@@ -270,3 +270,30 @@ def test_a_count_has_no_derivative(write):
     with pytest.raises(ffrobot.InputError, match="expected keys that may be a little larger or smaller") as told:
         ffrobot.sensitivity(write(PLANE), ["rms joints.shoulder.moment"], ["links.arm.mesh.elements"])
     assert "expected a whole number" in str(told.value)
+
+
+@pytest.mark.parametrize("response", ["peak joints.shoulder.moment", "rms joints.shoulder.moment"])
+def test_what_outputs_miss_has_its_closed_form(write, response):
+    """A jolt of 3 ms in 20 s on an arm without gravity: τ = J θ̈, with J of the arm and of its payload."""
+    rate = np.pi / 3e-3
+    jolt = f"where(t < 10.0011, 0, where(t < 10.0041, 1e-4*sin({rate}*(t - 10.0011))**4, 0))"
+    scene = ARM | {"gravity": [0.0, 0.0], "trajectory": [{"name": "swing", "joint": "shoulder", "value": jolt}]}
+    scene["analysis"] = [{"name": "inverse", "kind": "pcid", "end": 20.0, "output_step": 0.05}]
+    found = ffrobot.sensitivity(write(scene), of=[response], to=["payload.0.mass"])
+    J = 0.05 + 2.0 * 0.3**2 + 0.5 * 0.6**2
+    assert found.logarithmic[0, 0] == pytest.approx(0.5 * 0.6**2 / J, rel=1e-6)
+    root = np.sqrt(3e-3 / 20.0 / 4)  # θ̈ = 4e-4 rate² (3 sin² cos² − sin⁴): the square of the last has the mean 1/4
+    of_acceleration = 1.0 if response.startswith("peak") else root
+    assert found.value[0] == pytest.approx(4e-4 * rate**2 * J * of_acceleration, rel=1e-2)
+    assert any("between them, which counts" in line for line in found.remarks())
+
+
+def test_means_that_outputs_miss_are_uncertain(write):
+    load = [{"joint": "shoulder", "moment": "where(t < 10.0011, 0, where(t < 10.0041, 8, 0))"}]
+    keys = {"gravity": [0.0, 0.0], "load": load, "trajectory": [{"name": "s", "joint": "shoulder", "value": "0.1*t"}]}
+    for end, told in ((20.0, True), (20.0041, True), (0.5, False)):
+        of = {"name": "inverse", "kind": "pcid", "end": end, "output_step": end / 10}
+        found = ffrobot.sensitivity(
+            write(ARM | keys | {"analysis": [of]}), of=["energy joints.shoulder"], to=["payload.0.mass"]
+        )
+        assert any("uncertain" in line for line in found.remarks()) is told
