@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from itertools import combinations
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..common.errors import InputError
 from ..mbs.scene.bodies import ROUNDING, RigidBody, tensor
 
 if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links, remarks on links without those of scenes
+    from ..actuation.patches.records import PztLayout
+    from ..common.arrays import Array
     from ..fe_models.link_records.link import BeamLink, Link
     from .scene import Scene
 
@@ -169,7 +172,7 @@ def _joints(scene: Scene) -> Iterator[str]:
 
 
 def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
-    """Patches larger than their face, or of another unit."""
+    """Patches larger than their face, of another unit, or on each other."""
     for layout in scene.pzt:
         label = f'pzt "{layout.label}"'
         if layout.modulus < SOFTEST_PATCH:
@@ -178,13 +181,39 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             yield f"{label}: a d31 of {layout.d31:g} m/V: units are SI; is it in pm/V?"
         if not _is_beam(link := links.get(layout.body)):
             continue
-        extents = max(one.height for one in link.sections), max(one.width for one in link.sections)
-        thick, wide = extents if layout.normal == "y" else extents[::-1]
-        face = np.pi * wide if link.shapes[0].shape != "rectangle" else wide
+        thick, face = _thickness_and_face(layout, link)
         if layout.width > face * (1.0 + ROUNDING):
             yield f"{label}: patches {layout.width:g} m wide on a face of {face:.3g} m: units are SI; is this in mm?"
         if (layers := layout.layers * layout.thickness) > thick:
             yield f"{label}: patches {layers:g} m thick on a link of {thick:g} m: units are SI; is this in mm?"
+
+    for first, second in combinations((one for one in scene.pzt if one.face is not None), 2):
+        from ..actuation.patches.patches import patch_edges
+
+        if first.body != second.body or first.normal != second.normal or not _is_beam(link := links.get(first.body)):
+            continue
+        is_one_face = "both" in (first.face, second.face) or first.face == second.face
+        begin, end = _shared(*(patch_edges(one, link.geometry.length) for one in (first, second)))
+        if is_one_face and end > begin and first.width + second.width > _thickness_and_face(first, link)[1]:
+            yield (
+                f'pzt "{first.label}", "{second.label}": patches on one place of "{first.body}", {begin:g} to'
+                f" {end:g} m, each computed as if it lay on the link itself: for a stack take layers"
+            )
+
+
+def _thickness_and_face(layout: PztLayout, link: BeamLink) -> tuple[float, float]:
+    """Of a link across the patches, and the width of the face that they lie on, m."""
+    extents = max(one.height for one in link.sections), max(one.width for one in link.sections)
+    thick, wide = extents if layout.normal == "y" else extents[::-1]
+    return thick, np.pi * wide if link.shapes[0].shape != "rectangle" else wide
+
+
+def _shared(first: Array, second: Array) -> tuple[float, float]:
+    """Begin and end, m, of the longest part that patches with these edges (k, 2) share; of none the end comes first."""
+    begins = np.maximum(first[:, None, 0], second[None, :, 0])
+    ends = np.minimum(first[:, None, 1], second[None, :, 1]) - ROUNDING
+    k = np.unravel_index(int(np.argmax(ends - begins)), ends.shape)
+    return float(begins[k]), float(ends[k])
 
 
 def _voltages(scene: Scene) -> Iterator[str]:

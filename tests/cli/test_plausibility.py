@@ -166,6 +166,29 @@ def test_flexible_scenes_in_3d(patch, interface, joints, expected):
     assert expected is None or expected in found[0]
 
 
+@pytest.mark.parametrize(
+    ("second", "told"),
+    [
+        ({}, True),
+        ({"centers": [0.34]}, True),
+        ({"centers": [0.40]}, False),
+        ({"face": "-y"}, False),
+        ({"face": "+z", "bends": "out-of-plane"}, False),
+        ({"width": 0.004}, False),
+    ],
+)
+def test_patches_on_each_other(second, told):
+    first = PATCH | {"centers": [0.3], "length": 0.1, "width": 0.014, "face": "+y", "name": "first"}
+    first = {key: value for key, value in first.items() if key != "count"}
+    link = LINK | {"geometry": LINK["geometry"] | {"section": {"shape": "rectangle", "height": 0.02, "width": 0.02}}}
+    scene = program.make_scene(
+        name="arm", space="spatial", gravity=[0.0, 0.0, 0.0], body=[{"name": "arm", "link": link}],
+        joint=[{"name": "hub", "type": "weld", "between": ["ground", "arm.root"]}],
+        pzt=[first, first | {"name": "second"} | second], analysis=[{"name": "still", "kind": "static"}],
+    )  # fmt: skip
+    assert any('"first", "second": patches on one place' in line for line in remarks(scene)) is told
+
+
 def test_outputs_that_do_not_fit_into_memory():
     """A link of four modes in 3D took 0.55 GB for 1e5 outputs, and over 12 GB for 1e7."""
     (remark,) = remarks_on_memory(10_000_001, 1, 16e9, "long")
