@@ -86,10 +86,11 @@ def drive_robot(
         known = earlier.statistics.integrator
         integrator = integrator._replace(name=known.name, reason=known.reason)
     controls = integration_controls(analysis, integrator)
-    paths = model.scene.trajectory if any(row.is_trajectory for row in model.rows) else ()
+    is_followed, is_replay = any(row.is_trajectory for row in model.rows), drives.replayed is not None
+    paths = model.scene.trajectory if is_followed or is_replay else ()
     loads = (size for load in model.scene.load for size in load.components.values())
-    is_driven = bool(paths) and not any(node.body.n_modes for node in model.tree.nodes)
-    ends = stops(times, paths, loads, is_driven=is_driven)
+    is_rigid = not any(node.body.n_modes for node in model.tree.nodes)
+    ends = stops(times, paths, loads, is_driven=is_rigid and is_followed, is_replay=is_rigid and is_replay)
     controls.stops = as_list(ends)
     system.integrated.scene.watch_posture(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Booleans, Indices, as_floats
 from .. import _core
 from .._core import TimeFunction
 from ..scene.analysis import IntegratedAnalysis
@@ -23,7 +23,8 @@ LOOKED_AT = 2000  # of these, those at which steps have to end, and all others n
 HIGHEST = 4  # local maxima of each quantity
 MOST = 20_000  # times of a prescribed motion
 RESOLVED = 1e-6  # of the largest value or rate of a path: what the trapezoidal rule may miss between two times
-SEEN = 1e-3  # likewise, of a load that steps do not feel: its peak is known
+SEEN = 1e-3  # likewise, of rigid robots
+MOST_BEND = 4.0  # see `_bends`
 ROUNDS = 30  # of halving
 SHORTEST = 1e-9  # of a run, between two times
 SAME = 1e-13  # of the latest time, by which equal ones differ at most
@@ -82,18 +83,21 @@ def in_order(outputs: Array, samples: Array) -> Indices:
     return rows[np.unique(times[rows], return_index=True)[1]]
 
 
-def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool) -> Array:
+def stops(
+    times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool, is_replay: bool
+) -> Array:
     """(n,) s within `times`, at which steps of integrations end.
 
     Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
     and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far or conditions change.
-    `is_driven`: steps do not feel loads, as paths alone move the robot, and end where loads have to be looked at.
+    Steps of rigid robots may be as long as the run. `is_driven`: paths alone move the robot, and steps end where its
+    forces have to be looked at. `is_replay`: forces follow from paths that steps do not know, and end where these bend.
     """
-    ends, loads = times[[0, -1]], list(loads)
+    ends, paths, loads = times[[0, -1]], list(paths), list(loads)
+    targets = [target for path in paths for target in targets_of(path)]
     duration, found = ends[1] - ends[0], [np.zeros(0)]
-    for function in (*(target for path in paths for target in targets_of(path)), *loads):
-        pieces = np.union1d(np.clip(function.switches(), *ends), ends)
-        found += [pieces, _parts(pieces, np.diff(pieces) < BRIEF * duration)]
+    for function in (*targets, *loads):
+        found += [ends, _brief_parts(function, ends)]
     for path in paths:
         if path.path is not None and duration > 0.0:
             breaks = path.path.breaks
@@ -104,12 +108,36 @@ def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunctio
             )
     if is_driven and duration > 0.0:
         grid = np.union1d(np.linspace(times[0], times[-1], FEWEST + 1), np.concatenate(found))
-        found += [np.setdiff1d(_resolved(load, grid, SEEN), grid) for load in loads]
+        found += [np.setdiff1d(_resolved(function, grid, SEEN), grid) for function in (*targets, *loads)]
+    if is_replay and duration > 0.0:
+        found += [_bends(target, np.linspace(times[0], times[-1], FEWEST + 1)) for target in targets]
     every = np.unique(np.concatenate(found))
     return every[(every > times[0]) & (every < times[-1])]
 
 
-def _parts(breaks: Array, chosen: Array) -> Array:
+def _brief_parts(function: TimeFunction, ends: Array) -> Array:
+    """Times (n,) s from ends[0] to ends[1] at which conditions of the function change, and parts of brief pieces."""
+    pieces = np.union1d(np.clip(function.switches(), *ends), ends)
+    return np.union1d(pieces, _parts(pieces, np.diff(pieces) < BRIEF * np.ptp(ends)))
+
+
+def _bends(target: TimeFunction, grid: Array) -> Array:
+    """Times (n,) s of the grid and between them, so that no step from one to the next passes more than half a period.
+
+    That is h ∫ |f''| ≤ 4 of accelerations f over their range, as of the loads that steps know of (`step_limit.h`).
+    """
+    times = _resolved(target, grid, SEEN)
+    f = np.nan_to_num(target.sample(times)[2])
+    bend = np.concatenate([[0.0], np.abs(np.diff(np.diff(f) / np.diff(times))), [0.0]]).cumsum()
+    most, found, last = MOST_BEND * float(np.ptp(f)), [], 0
+    for k in range(1, len(times)):
+        if (bend[k] - bend[last]) * (times[k] - times[last]) > most:
+            last = max(last + 1, k - 1)
+            found.append(times[last])
+    return np.array(found)
+
+
+def _parts(breaks: Array, chosen: Booleans) -> Array:
     """Ends of the parts of `chosen` (n,) pieces between `breaks` (n + 1,), s."""
     return np.linspace(breaks[:-1][chosen], breaks[1:][chosen], PARTS + 1).ravel()
 
@@ -123,7 +151,8 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
     functions = [*(target for path in paths for target in targets_of(path)), *others]
     found = _with_others(times, np.linspace(times[0], times[-1], FEWEST + 1))
     of_paths = (path.path.breaks for path in paths if path.path is not None)
-    breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *(function.switches() for function in functions)]))
+    of_pieces = (_brief_parts(function, times[[0, -1]]) for function in functions)
+    breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *of_pieces]))
     found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
     moving = (found >= 0.0) & (found <= end)
     inside = found[moving]

@@ -194,3 +194,31 @@ def test_a_pulse_of_a_load_between_outputs(kind, pulse, square, w):
     found = motor(solve(rod({"value": "0.05*t"}, 0.1, kind, load=load)))
     assert found.moment == pytest.approx(8.0, rel=1e-3)
     assert found.rms_moment == pytest.approx(8.0 * np.sqrt(square * w), rel=0.02)
+
+
+BRIEF_STEP = "where(t < 0.5011, 0, where(t < 0.5011 + {w}, 1e-4*(10*{u}**3 - 15*{u}**4 + 6*{u}**5), 1e-4))"
+
+
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+@pytest.mark.parametrize("w", [3e-3, 3e-4, 5e-5])
+def test_a_brief_motion_is_followed_by_a_replay(kind, w):
+    """The torque of a quintic between two outputs, in the peaks and in a simulation under it."""
+    path = {"value": BRIEF_STEP.format(w=w, u=f"((t - 0.5011)/{w})")}
+    replayed_as_followed(rod(path, 0.1, kind), QUINTIC * 1e-4 / w**2 * J, 1e-4)
+
+
+@pytest.mark.parametrize("w", [0.2, 0.02, 2e-3])
+def test_a_smooth_motion_in_a_long_run_is_followed_by_a_replay(w):
+    """θ = (1 + tanh((t − 12.7 s)/w))/4 in 20 s: |θ̈| is at most 1/(3 √3 w²)."""
+    scene = rod({"value": f"(1 + tanh((t - 12.7)/{w}))/4"}, 0.1)
+    scene["analysis"][0]["end"] = 20.0
+    replayed_as_followed(scene, J / (3 * np.sqrt(3) * w**2), 0.5)
+
+
+def replayed_as_followed(scene, peak, way):
+    scene["analysis"].append({"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints"})
+    results = solve(scene)
+    assert motor(results).moment == pytest.approx(peak, rel=1e-3)
+    reached = results["replay/joints/O/coordinate"]
+    assert reached[-1] == pytest.approx(way, rel=1e-6)
+    assert np.abs(reached - results["inverse/joints/O/coordinate"]).max() < 1e-6 * way
