@@ -128,6 +128,14 @@ def test_the_points_accelerometer_feels_the_blow():
     assert record.readings[20, column] == pytest.approx(0.0, abs=0.2)
 
 
+@pytest.mark.parametrize("lasts", [1e-3, 2e-5])
+def test_brief_disturbances_are_felt(lasts):
+    """Without control, I γ̇ = 0.3 m · 5 N for as long as it lasts, between two of the samples."""
+    push = [{"point": "w.rim", "y": f"where(t < 0.2031, 0, where(t < {0.2031 + lasts!r}, 5, 0))"}]
+    run = solve_scene(wheel(loop(disturbance=push, feed_forward="none", tip="w.rim"))).outcomes["loop"]
+    assert run.v[-1, 0] == pytest.approx(0.3 * 5.0 * lasts / INERTIA, rel=1e-6)
+
+
 def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     built = {"gear_ratio": 30.0, "rotor_inertia": 1e-3, "viscous_friction": 0.2, "coulomb_friction": 0.5}
     solution = solve_scene(two_rods(first=built, second=built))
