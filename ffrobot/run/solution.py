@@ -34,7 +34,8 @@ from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
-from ..mbs.scene.analysis import Analysis
+from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
+from ..mbs.solve.limits import left_ranges
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody, remarks_on_parts, rigid_in_words
@@ -176,6 +177,9 @@ class AnalysisResult:
             *unresolved_gears(self.motion.gears),
         )
         texts = (*texts, *self.run.details.warnings)
+        if not isinstance(self.analysis, IntegratedAnalysis) and len(self.run.time):
+            of = self.histories.run
+            texts = (*texts, *left_ranges(of.model, None, of.time, of.q, of.v))
         if self.motion.is_prescribed:
             texts = (*texts, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
         return texts if missed is None else (*texts, missed.in_words)

@@ -2,7 +2,7 @@
 
 Those of the tree are watched by the core while it integrates, between outputs, too. Others are looked at in outputs:
 joints at which loops are cut have no coordinate in the tree, and those of planar joints that lead backwards are no
-entries of the state.
+entries of the state. Of a motion that the core does not integrate all are looked at, at all times that are given.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from ..joints.joint import JointRecord
 from ..model.cut import cut_motions
 from ..model.model import Model
 from ..model.tree import KinematicTree, Node
+
+ROUNDING = 1e-12  # of the largest value of a coordinate
 
 Seen = tuple[float, float, float | None]
 """Least and largest value, and when the range was left first, s."""
@@ -62,16 +64,17 @@ def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
         scene.add_limit(one.v, *one.limits)
 
 
-def left_ranges(model: Model, found: Sequence[Seen], times: Array, q: Array, v: Array) -> Iterator[str]:
+def left_ranges(model: Model, found: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
     """A warning for each coordinate that left its position_limit: when it first did, and how far it goes.
 
-    `found` is what the core has seen of `watched`; the others are looked at in outputs at `times` (T,): `q` (T, n_q),
-    `v` (T, n_v).
+    `found` is what the core has seen of `watched`, None of a motion without the core; the others are looked at in
+    outputs at `times` (T,): `q` (T, n_q), `v` (T, n_v).
     """
-    seen = [(one.joint, one.number, one.seen(values)) for one, values in zip(watched(model.tree), found, strict=True)]
-    for joint, number, values in _sampled(model, times, q, v):
-        lowest, highest = joint.position_limits[number]
-        outside = times[(values < lowest) | (values > highest)]
+    of_core = zip(watched(model.tree), found, strict=True) if found is not None else ()
+    seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
+    for joint, number, values in _sampled(model, times, q, v, every=found is None):
+        (lowest, highest), rounding = joint.position_limits[number], ROUNDING * np.abs(values).max()
+        outside = times[(values < lowest - rounding) | (values > highest + rounding)]
         seen.append((joint, number, (values.min(), values.max(), outside[0] if outside.size else None)))
     for joint, number, (least, largest, left_at) in seen:
         (lowest, highest), unit = joint.position_limits[number], joint.units[number]
@@ -91,10 +94,15 @@ def _is_sampled(node: Node) -> bool:
     return node.backwards and node.joint.type == "planar"
 
 
-def _sampled(model: Model, times: Array, q: Array, v: Array) -> Iterator[tuple[JointRecord, int, Array]]:
-    """Coordinates (T,) that the core does not watch, of joints with limits: in the tree, and where loops are cut."""
+def _sampled(
+    model: Model, times: Array, q: Array, v: Array, *, every: bool
+) -> Iterator[tuple[JointRecord, int, Array]]:
+    """Coordinates (T,) that the core does not watch, of joints with limits: in the tree, and where loops are cut.
+
+    `every`: of the tree all.
+    """
     for node in model.tree.nodes:
-        if _is_limited(node.joint) and _is_sampled(node):
+        if _is_limited(node.joint) and (every or _is_sampled(node)):
             yield from ((node.joint, number, values) for number, values in enumerate(node.coordinates(q).T))
     if any(map(_is_limited, model.tree.cut_joints)):
         for one, motion in zip(model.cut, cut_motions(model.tree, model.cut, q, v, times), strict=True):
