@@ -129,18 +129,6 @@ def test_wrong_derivatives_of_a_compiled_function(tmp_path):
         swing(function)
 
 
-def test_errors_of_a_function_come_through():
-    def breaks(t):
-        if 0.031 < t < 0.039:  # no output time
-            raise ZeroDivisionError("in my function")
-        return sine(t)
-
-    with pytest.raises(ZeroDivisionError, match="in my function") as error:
-        ffrobot.solve(swing(breaks))
-    (note,) = error.value.__notes__
-    assert "breaks, a function of the scene, at t = 0.03" in note
-
-
 def test_pandas_view():
     results = ffrobot.solve(swing())
     frame = results.frame("inverse")

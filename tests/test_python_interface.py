@@ -4,7 +4,6 @@ import subprocess
 import sys
 from importlib.metadata import version
 
-import h5py
 import numpy as np
 import pytest
 import tomli_w
@@ -55,20 +54,6 @@ def test_scene_made_in_python_is_the_scene_of_a_file(folder, results):
         np.testing.assert_array_equal(values, results.columns("inverse")[name])
 
 
-def test_results_in_memory_are_those_of_a_file(folder, results, tmp_path):
-    stored = ffrobot.solve(swing(folder), tmp_path / "r.h5")
-    assert list(folder.glob("*.results.h5")) == []
-    with h5py.File(tmp_path / "r.h5") as file:
-        moment = file["inverse/joints/shoulder/moment"][()]
-    for holder in (results, stored):
-        np.testing.assert_array_equal(holder["inverse/joints/shoulder/moment"], moment)
-        np.testing.assert_array_equal(holder.data("inverse/joints/shoulder/moment")[:, 0], moment)
-    assert results.time("inverse")[-1] == 0.02
-    assert results.modal_body("arm").mode_count == 3 + 2
-    ffrobot.write_report([tmp_path / "r.h5"], tmp_path / "r.html")
-    assert (tmp_path / "r.html").is_file()
-
-
 def test_link_in_the_scene_is_that_of_its_file(folder, results):
     """Under the body's name where it has none, and in TOML as in Python."""
     keys = LINK | {"geometry": LINK["geometry"] | {"length": np.float64(0.6)}}
@@ -93,16 +78,6 @@ def test_link_made_of_a_dictionary(folder, tmp_path):
     assert again[0].path.parent.name == "links"
     with pytest.raises(ffrobot.InputError, match=r"<link made in Python>: modes\.count: expected a whole number"):
         ffrobot.make_link(LINK | {"modes": {"count": "three"}})
-
-
-def test_mistakes_in_a_link_of_a_scene(folder):
-    keys = LINK | {"mesh": {"element": 10}}
-    with pytest.raises(ffrobot.InputError) as error:
-        swing(folder, body=[{"name": "arm", "link": keys}])
-    assert str(error.value).endswith(
-        '<scene made in Python>: body "arm": link: mesh.element: expected one of the keys elements, nodes, found an'
-        ' unknown key (did you mean "elements"?)'
-    )
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from beam_links import link_keys, rectangle
 
 from ffrobot import make_scene
 from ffrobot.fe_models.link import make_link
-from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import prepare_scene, solve_scene
 
@@ -70,15 +69,6 @@ def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):
     with h5py.File(BytesIO(results_image(solution))) as file:
         assert file["run/bodies/arm/modal"].shape == (11, in_plane)
         assert file["run/bodies/arm/modal_transform"].shape == (14, in_plane)
-
-
-def test_rigid_bodies_have_no_modal_coordinates(folder):
-    solution = prepare_scene(arm(folder, "bending"))
-    stick, flexible = (node.body for node in solution.model.tree.nodes)
-    assert stick.n_modes == 0
-    assert MultibodySystem(solution.model).plane.model.n_v == 1 + 1 + flexible.n_modes
-    assert "modal coordinates of stick, rigid" in solution.omissions
-    assert any(line.startswith("axial deformation of arm") for line in solution.omissions)
 
 
 def test_terms_that_vanish_are_named(folder):
