@@ -2,13 +2,17 @@
 
 import json
 import re
+import runpy
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
+import h5py
 import numpy as np
 import pytest
-from checkpoints import CASES
+from checkpoints import CASES, reference
 from rigid_robots import moments, numbers
 
 from ffrobot.common.rotations import exponential, of_quaternion
@@ -109,3 +113,54 @@ def test_straight_links_need_the_moments_of_a_rigid_robot(arm):
         friction = dynamics[:, 0] * v[:, k] + dynamics[:, 1] * np.tanh(v[:, k] / 0.01)
         expected = np.array([found[name] for name in JOINTS]) + friction
         np.testing.assert_allclose(tau[:, k], expected, atol=2e-3 * np.abs(tau).max())
+
+
+@pytest.fixture(scope="module")
+def behind_gears(arm, ffrobot):
+    """The groups of the scenes of behind_gears.py by their names."""
+    subprocess.run([sys.executable, CASE / "behind_gears.py", arm.folder], check=True)
+    groups = {}
+    for name in ("gears", "swift", "slower", "shaped"):
+        ffrobot.ok("solve", arm.folder / f"{name}.toml")
+        groups[name] = h5py.File(arm.folder / f"{name}.results.h5")[name]
+    return groups
+
+
+def after_path(group):
+    """Times (T,) and places (T, 3) of the tool, mm, once the motors stand still."""
+    late = group["time"][()] >= group["trajectories/waist"].attrs["end"]
+    return group["time"][late], 1e3 * group["points/flange.tool/position"][late]
+
+
+@pytest.mark.nightly
+def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
+    """At the start, in equilibrium: τ = k (θ_m − γ); motors are where the path has them."""
+    for joint, (stiffness, *_) in runpy.run_path(str(CASE / "behind_gears.py"))["GEARS"].items():
+        entry = behind_gears["gears"][f"joints/{joint}"]
+        twist = entry["motor_angle"][0] - entry["coordinate"][0]
+        assert stiffness * twist == pytest.approx(entry["moment"][0], rel=1e-6, abs=1e-4)
+
+
+@pytest.mark.nightly
+def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears):
+    """Zero crossings of the fastest direction of swing, about those along the path."""
+    t, place = after_path(behind_gears["slower"])
+    swing = place - place.mean(axis=0)
+    along = swing @ np.linalg.svd(swing)[2][0]
+    rises = np.flatnonzero((along[1:] > 0) & (along[:-1] <= 0))
+    crossings = t[rises] - along[rises] * np.diff(t)[rises] / np.diff(along)[rises]
+    frequency = (len(crossings) - 1) / (crossings[-1] - crossings[0])
+    lowest, second = behind_gears["shaped"]["trajectories/waist"].attrs["shaper_frequency"]
+    assert 0.93 * lowest < frequency < 1.07 * second  # means along the path, over which they change by 7 %
+
+
+@pytest.mark.nightly
+def test_distance_of_the_figure(arm, ffrobot):
+    """deviation.csv, which the figure shows, is what hold_joints.py makes: joints where those of the rigid arm are."""
+    subprocess.run([sys.executable, CASE / "hold_joints.py", arm.folder], check=True)
+    ffrobot.ok("solve", arm.folder / "held.toml")
+    table = reference("arm_6r/deviation.csv")
+    with h5py.File(arm.folder / "held.results.h5") as file:
+        way, _ = deviation(file["held"])
+        rows = np.abs(file["held/time"][:, None] - np.array(table["t"], dtype=float)).argmin(axis=0)
+    np.testing.assert_allclose(way[rows], np.array(table["held"], dtype=float), atol=0.02 * way.max())

@@ -1,9 +1,15 @@
 """An arm whose links come from STEP files with lightening holes."""
 
+import subprocess
+import sys
+
+import gmsh
 import numpy as np
 import pytest
+from checkpoints import CASES
 
 from ffrobot.fe_models.modal_body_file import read_modal_body
+from ffrobot.mesh.gmsh_session import gmsh_session
 
 pytestmark = pytest.mark.nightly  # twelve seconds of solids from STEP, which are in arm_6r, too
 
@@ -43,6 +49,21 @@ def test_mass_is_that_of_the_drawing(bodies, name):
     np.testing.assert_allclose(
         bodies[name].first_moment, [DENSITY * WIDTHS[name] * first, 0, 0], rtol=0, atol=1e-4 * mass * 0.5
     )
+
+
+def test_the_script_draws_the_parts(tmp_path):
+    """make_parts.py, and the parts beside it, have the volumes of the drawing, mm³."""
+    case = CASES / "lightened_arm"
+    script = tmp_path / "make_parts.py"
+    script.write_bytes((case / script.name).read_bytes())
+    subprocess.run([sys.executable, script], check=True, capture_output=True)
+    for path in [folder / f"{name}.step" for name in MEASURES for folder in (tmp_path, case)]:
+        with gmsh_session():
+            gmsh.model.occ.importShapes(str(path))
+            (solid,) = gmsh.model.occ.getEntities(3)
+            assert gmsh.model.occ.getMass(*solid) == pytest.approx(
+                1e9 * WIDTHS[path.stem] * plate(path.stem)[0], rel=1e-6
+            )
 
 
 def test_the_load_keeps_to_its_line(arm):
