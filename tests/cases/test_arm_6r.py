@@ -162,5 +162,5 @@ def test_distance_of_the_figure(arm, ffrobot):
     table = reference("arm_6r/deviation.csv")
     with h5py.File(arm.folder / "held.results.h5") as file:
         way, _ = deviation(file["held"])
-        rows = np.abs(file["held/time"][:, None] - np.array(table["t"], dtype=float)).argmin(axis=0)
+        rows = np.abs(file["held/time"][()][:, None] - np.array(table["t"], dtype=float)).argmin(axis=0)
     np.testing.assert_allclose(way[rows], np.array(table["held"], dtype=float), atol=0.02 * way.max())

@@ -28,14 +28,6 @@ def test_log_file_keeps_the_runs_in_order(ffrobot, case_copy):
     assert done.stderr.count('did you mean "kind"?') == 2  # once for each analysis
 
 
-def test_log_file_that_cannot_be_written(ffrobot, case_copy):
-    scene = case_copy("slider_crank")
-    done = ffrobot("solve", scene, "--log-file", scene.parent / "no_such_folder" / "run.log")
-    assert done.returncode == 2
-    assert "No such file" in done.stderr
-    assert not scene.with_suffix(".results.h5").exists()
-
-
 def test_a_log_that_cannot_be_written_ends_with_one_message(two_link_copy, ffrobot):
     """The command itself goes on."""
     folder = two_link_copy()

@@ -48,7 +48,7 @@ width = 0.02
 def test_two_processes_make_the_same_file(ffrobot, link_on_two, tmp_path, condition):
     """Also sections, faces, patches and stresses, to which cells of both contribute."""
     link = write_solid(tmp_path, length=0.3, condition=condition, order=2, count=4, more=ALL_THAT_CELLS_ARE_SUMMED_FOR)
-    link.write_text(link.read_text().replace("divisions = [36, 1, 1]", "size = 0.02"))
+    link.write_text(link.read_text().replace("divisions = [36, 1, 1]", "size = 0.03"))
     one, two = tmp_path / "one.h5", tmp_path / "two.h5"
     assert ffrobot("link", link, "-o", one).returncode == 0
     done = link_on_two(link, "-o", two)

@@ -38,13 +38,6 @@ def test_order(offsets, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.5)
 
 
-def test_polynomials_are_exact():
-    x = 0.3 * CENTRAL
-    powers = np.arange(7)
-    found = [derivative(x, x**power).value for power in powers]
-    np.testing.assert_allclose(found, powers == 1, atol=1e-13)
-
-
 @pytest.mark.parametrize("h", [0.2, 0.05, 0.01, 1e-4])
 def test_the_estimate_is_no_less_than_the_error(h):
     x = h * CENTRAL

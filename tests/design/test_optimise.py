@@ -317,14 +317,13 @@ def test_peaks_between_outputs_count(write):
     assert power.value == pytest.approx(expected, rel=5e-3)
 
 
-def test_spreads_of_peaks_between_outputs(write):
+@pytest.mark.parametrize("how", [{"by": "gradients"}, pytest.param({"samples": 8}, marks=pytest.mark.nightly)])
+def test_spreads_of_peaks_between_outputs(write, how):
     """Of that torque by an uncertain rotor, in which it is linear."""
-    path, spread = write(JOLTED), ["joint.shoulder.rotor_inertia=normal:10%"]
-    for how in ({"by": "gradients"}, {"samples": 8}):
-        found = ffrobot.uncertainty(path, [MOTOR], spread, **how)
-        assert found.statistics.mean[0] == pytest.approx((J / 50 + 2e-5 * 50) * MOST, rel=5e-3)
-        assert found.statistics.deviation[0] == pytest.approx(0.1 * 2e-5 * 50 * MOST, rel=0.15)
-        assert "between them, which counts" in found.notes[0]
+    found = ffrobot.uncertainty(write(JOLTED), [MOTOR], ["joint.shoulder.rotor_inertia=normal:10%"], **how)
+    assert found.statistics.mean[0] == pytest.approx((J / 50 + 2e-5 * 50) * MOST, rel=5e-3)
+    assert found.statistics.deviation[0] == pytest.approx(0.1 * 2e-5 * 50 * MOST, rel=0.15)
+    assert "between them, which counts" in found.notes[0]
 
 
 def test_short_blows_count(write):

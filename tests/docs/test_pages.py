@@ -12,8 +12,8 @@ import pytest
 from forked_commands import LIMIT
 
 DOCS = Path(__file__).parents[2] / "docs"
-# What their commands do has tests of its own: studies, solids, resumed runs.
-LONG = {"design", "long_runs", "motor_sizing", "solid"}
+# What their commands do has tests of its own: studies, solids, resumed runs, paths.
+LONG = {"design", "long_runs", "machine_paths", "motor_sizing", "solid"}
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)

@@ -18,7 +18,7 @@ from ffrobot.pictures.figures.shared import bending_points
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.motion import targets
 from ffrobot.pictures.report import write_report
-from ffrobot.pictures.report.charts import MAX_POINTS, history_charts, kept_outputs
+from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
 from ffrobot.pictures.report.runs import distinct_parts, runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.results.file import Results
@@ -183,13 +183,6 @@ def test_page_says_what_the_summary_says(two_link_page, results):
             assert line.strip().removeprefix(f"{one.name}: ") in shown
     for text in (text for texts in results.warnings.values() for text in texts):
         assert text in shown
-
-
-def test_curves_keep_all_their_points(results):
-    """Plotly would leave out points that it takes for straight."""
-    lines = [trace for chart in history_charts([results]) for trace in chart.traces if trace["mode"] == "lines"]
-    assert lines
-    assert all(trace["line"]["simplify"] is False for trace in lines)
 
 
 def test_points_that_the_reference_condition_holds_have_no_curve(two_link, tmp_path):
