@@ -62,6 +62,15 @@ def test_warm_start_does_not_change_the_answer():
     np.testing.assert_allclose(warm, cold, atol=1e-9)
 
 
+def test_within_the_limits_the_unlimited_solution_is_taken():
+    rng = np.random.default_rng(8)
+    Phi = rng.standard_normal((6, 9))
+    F = history(rng, 30, 6, 1.0)
+    V = allocation(Phi, np.full(9, 1e3)).solve(F)
+    np.testing.assert_allclose(V, F @ np.linalg.pinv(Phi).T, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(allocation(Phi, np.full(9, np.inf)).solve(F), V, rtol=1e-11, atol=1e-13)
+
+
 @pytest.mark.parametrize("Phi", [np.zeros((3, 4)), np.ones((3, 4)), np.outer([1e-9, 1.0, 1e9], np.arange(1.0, 5.0))])
 def test_degenerate_patches_still_get_voltages(Phi):
     """Patches that do nothing, or all the same: some voltages within the limits, with the least residual there is."""

@@ -97,6 +97,13 @@ def test_a_sampled_loop_is_its_exact_discrete_model(delay, resolution):
     assert np.abs(record.readings[:, 0]).max() > 1e-3
 
 
+def test_units_of_commands_do_not_decide_on_the_discrete_model():
+    A, B = np.array([[0.0, 1.0], [-2.0, -0.1]]), np.array([[0.0], [3.0]])
+    plain, huge = (sampled(A, unit * B, T, 0.0) for unit in (1.0, 1e30))
+    np.testing.assert_allclose(huge.A, plain.A, rtol=1e-12)
+    np.testing.assert_allclose(huge.B, 1e30 * plain.B, rtol=1e-12)
+
+
 def test_commands_stop_at_the_limits_of_the_motors():
     outcomes = solve_scene(wheel(loop(controller=[PID], disturbance=blow()), joint={"moment_limit": 0.5}))
     record = outcomes.outcomes["loop"].details

@@ -6,6 +6,7 @@ from beam_links import beam_link, paper_link, tube
 from patches_on_links import CERAMIC
 
 import ffrobot
+from ffrobot.actuation.motors import path_jump
 from ffrobot.actuation.patches.link_patches import link_patches, with_count
 from ffrobot.run.solve import solve_scene
 
@@ -151,6 +152,17 @@ def test_predicted_shift_of_the_tip_is_what_happens():
     )
 
 
+def test_predicted_shift_of_an_inclined_tip():
+    """The shift across the link is the deflection that unmet modal forces leave."""
+    solution = arm(trajectory={"point": "link.tip", "y": "0.1*sin(2*t)"})
+    result, body = solution.analyses["motion"], solution.bodies["link"].carrying
+    unmet = result.actuation.unmet["link"]
+    deflection = -(unmet @ body.modal_transform / body.stiffness) @ body.points["tip"].translation[1]
+    theta = result.motion.angle("link")
+    expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta), 0 * theta])
+    np.testing.assert_allclose(result.predicted_shift["link.tip"], expected, atol=1e-9 * np.abs(expected).max())
+
+
 def test_rms_and_shares_of_time_by_hand():
     """τ = m g L/2 + J θ̈ at θ ≈ 0 over whole periods; speed 0.2 |cos 2t| against a limit of 0.1: beyond for 2/3."""
     solution = arm(
@@ -164,6 +176,18 @@ def test_rms_and_shares_of_time_by_hand():
     assert motor.rms_moment == pytest.approx(np.hypot(m * 9.81 / 2, swing / np.sqrt(2)), rel=1e-6)
     assert motor.share_beyond == pytest.approx(2 / 3, abs=2e-3)
     assert not motor.has_spike
+
+
+@pytest.mark.parametrize(
+    ("value", "jump"),
+    [
+        ("0.1*t**2", "acceleration"),  # from rest at t = 0 with 0.2 rad/s² at once
+        ("0.1*sin(2*t)**2*t**2", ""),
+    ],
+)
+def test_jump_of_a_path_is_seen(value, jump):
+    result = arm(trajectory={"joint": "O", "value": value}).analyses["motion"]
+    assert path_jump(result.motion, result.analysis, 0) == jump
 
 
 def test_short_peaks_of_motors_only_are_laid_to_the_jerk():

@@ -157,6 +157,17 @@ def test_both_faces_driven_apart_are_the_layout_on_both():
     np.testing.assert_allclose(apart[0], both[0], atol=1e-9 * np.abs(both[0]).max())
 
 
+def test_overlap_of_layouts_is_shared():
+    """Of patches that overlap in part each stretch has its own composite section: curvatures add up to the tip."""
+    h, b = 0.006, 0.014
+    body = link(rectangle(h, b), 8)
+    long, short = layout(name="long", face="both"), layout(name="short", bends="out-of-plane", face="both",
+                                                           centers=[0.16], length=0.08)  # fmt: skip
+    together = tip(body, [long, short])[0]
+    alone = tip(body, [long])[0] + tip(body, [short])[0]  # planes do not feel each other
+    np.testing.assert_allclose(together, alone, rtol=1e-7, atol=1e-12)
+
+
 def test_round_links_do_not_mix_their_planes():
     """Frequencies in the two planes are equal; patches in one leave the other's modes alone, payload or not."""
     body = link(TUBE)

@@ -5,6 +5,7 @@ import pytest
 from beam_links import beam_link, rectangle
 
 import ffrobot as library
+from ffrobot.actuation import feasibility
 from ffrobot.run.solve import solve_scene
 
 GEARED = {"gear_ratio": 80.0, "rotor_inertia": 2e-5}
@@ -95,6 +96,14 @@ def test_moments_repeated(run, point):
     assert about.point == point
     assert error[: len(error) // 3].max() == pytest.approx(about.moments_repeated, rel=0.35)
     assert about.moments_repeated > 3e-4
+
+
+def test_moments_repeated_by_few_instants(monkeypatch):
+    """What they find is what all instants find."""
+    monkeypatch.setattr(feasibility, "ROWS", 100_000)
+    every = found(one()).moments_repeated
+    monkeypatch.setattr(feasibility, "ROWS", 12)
+    assert found(one()).moments_repeated == pytest.approx(every, rel=1e-3)
 
 
 def test_angles_kept():

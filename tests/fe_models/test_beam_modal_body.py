@@ -187,3 +187,17 @@ def test_extents_and_rigidities_of_the_sections(modal_body):
     np.testing.assert_allclose(stations.out_of_plane_rigidity, E * 0.015 * 0.025**3 / 12, rtol=1e-14)
     J = 0.025 * 0.015**3 * (1 / 3 - 0.21 * 0.6 * (1 - 0.6**4 / 12))
     np.testing.assert_allclose(stations.torsional_rigidity, E / 2.6 * J, rtol=4e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "factor"),
+    [
+        (("2.068427e11", "1e-30"), (1e-30 / 2.068427e11) ** 0.5),
+        (("height = 0.015", "height = 1e-30"), 1e-30 / 0.015),
+        (("height = 0.015", "height = 1e-20"), 1e-20 / 0.015),
+    ],
+)
+def test_no_value_is_too_small(modal_body, change, factor):
+    """Frequencies of bending go with the height, and with the root of E."""
+    expected = modal_body().frequency * factor
+    np.testing.assert_allclose(modal_body(replace=dict([change])).frequency, expected, rtol=1e-8)

@@ -96,6 +96,12 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (TWO.format(""), "one connected part, found 2"),  # they touch, and nothing ties them
         (TWO.format("") + SURFACES.replace("S5", "S3") + "*Tie, name=g\nDOWN, UP\n", "nodes of DOWN where"),
         (TWO.format("").replace("0.1, 0.", "0.1, 0.01") + SURFACES + "*Tie, name=g\nDOWN, UP\n", "cannot be tied"),
+        (TWO.format("").replace("H-2", "H-1"), "instances with unique names, found H-1"),
+        (PART[: PART.index("{}")], "expected \\*END PART or \\*END INSTANCE, found the end"),
+        (PLAIN.replace("*NODE", "*NODE, SYSTEM=S"), r"\*NODE, line 1: expected SYSTEM=R or C, found S"),
+        (PLAIN + "*NGEN\n1, 5, 1\n", r"\*NGEN, line \d+: expected nodes and elements one by one"),
+        (PLAIN + elements(CELLS[:1, ::-1]), "elements with unique numbers, found 1 again"),
+        (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4, 5, 6, 7, 8, 9\n", "expected 8 nodes of an element, found 9"),
         (TWO.format("").replace("0., 0.1, 0.", "0., 0.1, 0., 0., 0., 0., 90."), r"\*INSTANCE, line \d+: "),
         (PLAIN + "*INCLUDE, INPUT=nowhere.txt\n", "expected a file to include, found none called nowhere.txt"),
         (PLAIN + "*INCLUDE, INPUT=part.inp\n", "files that do not include themselves"),

@@ -132,6 +132,13 @@ def test_parts_that_meet_without_sharing_nodes_are_told(box):
         check_connected(apart, "here")
 
 
+def test_parts_that_meet_in_an_edge_only_are_told():
+    box = structured_box(1.0, (1.0, 1.0), (1.0, 1.0), (2, 2, 1), "hexahedron")
+    two = replace(box, cells=box.cells[[0, 3]], cell_tag=np.zeros(2, dtype=np.int32))
+    with pytest.raises(InputError, match="found 2: 1 elements"):
+        check_connected(two, "here")
+
+
 @pytest.mark.parametrize(("cell", "degree"), [(c, d) for c in ("tetrahedron", "hexahedron") for d in (1, 2)])
 def test_jacobians_are_derivatives_of_the_position(cell, degree):
     nodes = reference_nodes(cell, degree)
