@@ -203,11 +203,3 @@ def test_a_kind_is_a_file_and_an_entry(tmp_path):
 def test_a_type_of_joint_is_a_file_and_an_entry(tmp_path):
     entry = "    RevoluteJoint\n", "    RevoluteJoint\n    | __import__('slot').SlotJoint\n"
     solved_with(entry, joints, ("slot", SLOT), QUICK_RETURN, tmp_path)
-
-
-def test_every_kind_says_what_it_is():
-    """A record's kind is its own, and it can be run."""
-    records = kinds.KINDS.records()
-    assert [kind.kind_name() for kind in records] == list(kinds.KINDS.modules)
-    assert len(records) == 9
-    assert all("run" in vars(kind) for kind in records)

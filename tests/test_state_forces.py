@@ -67,15 +67,6 @@ def test_compiled_is_python(compiled_spring, integrator):
     assert np.ptp(by_core[:, 1]) > 1e-3  # it moves
 
 
-def test_moment_of_the_function_is_that_of_a_load():
-    """The third number is a moment on the section."""
-    hold = {"name": "turn", "joint": "O", "value": "0.4"}
-    analysis = {"name": "held", "kind": "pcid", "end": 0.1}
-    with_moment = scene(lambda t, x, v: (0.0, 0.0, 3.0 + t), joint=HINGE, trajectory=[hold], analysis=analysis)
-    moment = ffrobot.solve(with_moment)["held/joints/O/moment"]
-    np.testing.assert_allclose(moment, -3.0 - np.linspace(0.0, 0.1, 11), rtol=1e-12)
-
-
 AT = np.array([0.6, 0.1, -0.2])
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
 
