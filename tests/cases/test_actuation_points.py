@@ -55,11 +55,6 @@ def test_forces_along_three_axes_carry_an_arm(case_copy):
 MISTAKES = {
     "axis of the plane": ('body = "fore"\naxial = ["tip"]', "axial: expected no such key .* along x, y and z"),
     "point that is none": ('body = "fore"\nx = ["top"]', r'expected a point of the body \(.*tip.*\), found "top"'),
-    "two alike": (
-        'body = "fore"\ny = ["tip", "tip"]',
-        "y: expected points apart from each other, found two at tip and tip",
-    ),
-    "places on a rigid body": ('body = "column"\nx = [0.1]', "expected points of the rigid body by name"),
     "body that is none": ('body = "hand"', 'expected one of the bodies "column", "upper", "fore", found "hand"'),
     "twice": ('body = "fore"\n[[actuation_points]]\nbody = "fore"', "expected one table for each body, found 2"),
     "on another body": ('body = "upper"', r"expected \[\[actuation_points\]\] on every body that trajectories drive"),

@@ -12,14 +12,9 @@ import h5py
 import pytest
 from loops import OWN_CONTROLLER
 
-import ffrobot as ffrobot_library
-from ffrobot import InputError
 from ffrobot.common.tables import as_csv
-from ffrobot.common.toml_files import read_text
-from ffrobot.fe_models.modal_body_file import read_modal_body
 
 SHORT = {"end = 1.0": "end = 0.004"}
-HIDE = "import sys; sys.modules[{!r}] = None; sys.argv[0] = 'ffrobot'; from ffrobot.cli import main; main()"
 NAMES = ["$\\bad{$ $x_1^{", "<b>größe& <script>", "関節 🤖", "[red]{{ 7*7 }}%s", "_a", "e\u0301\u202e"]
 
 
@@ -95,21 +90,6 @@ def test_output_that_goes_nowhere(solved, ffrobot):
     full, closed, silent = info("> /dev/full"), info(">&-"), info(">&- 2>&-")
     assert (full.returncode, full.stderr) == (1, "ffrobot: standard output: No space left on device\n")
     assert (closed.returncode, closed.stderr, silent.returncode) == (0, "", 0)
-
-
-@pytest.mark.parametrize(
-    ("library", "command", "extra"),
-    [("matplotlib", ("plot", "scene.results.h5"), "plot"), ("jinja2", ("report", "scene.results.h5"), "plotly jinja2")],
-)
-def test_library_that_is_not_installed(solved, ffrobot, library, command, extra):
-    done = subprocess.run(
-        [sys.executable, "-c", HIDE.format(library), *command], cwd=solved, env=ffrobot.environment,
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 1
-    (message,) = done.stderr.splitlines()
-    assert f"needs {library}, which is not installed: pip install" in message
-    assert extra in message
 
 
 @pytest.mark.parametrize(
@@ -216,17 +196,6 @@ def test_pipes_and_devices_are_refused(refused, two_link_copy, arguments):
     os.mkfifo(folder / "pipe")
     what = "pipe: expected a regular file, found a pipe (FIFO)" if "pipe" in arguments else "found a device"
     assert what in refused(folder, *arguments, timeout=60)
-
-
-def read_text_of(path):
-    return read_text(path, "file")
-
-
-@pytest.mark.parametrize("read", [ffrobot_library.load_scene, ffrobot_library.Results, read_modal_body, read_text_of])
-def test_pipes_in_python(read, tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(InputError, match="pipe"):
-        read(tmp_path / "pipe")
 
 
 def test_cells_that_spreadsheets_would_run():

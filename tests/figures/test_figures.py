@@ -156,13 +156,3 @@ def test_times_at_a_limit_are_shaded():
     (shade,) = axes.collections
     (span,) = shade.get_paths()
     assert [span.vertices[:, 0].min(), span.vertices[:, 0].max()] == pytest.approx([0.5, 1.0])
-
-
-def test_voltages_beyond_the_limits_are_at_none():
-    """Required ones of 400 V only pass 200 V, which one of the outputs meets."""
-    time = np.linspace(0.0, 1.0, 101)
-    results = SimpleNamespace(data=lambda _: 400.0 * time[:, None], time=lambda _: time)
-    axes = new_axes("")[1]
-    record = FigureRecord(name="v", curves=(Curve(data="v", label="patch"),), y_label="voltage (V)", limits=(-200, 200))
-    draw_time_history(axes, record, results)
-    assert not axes.collections

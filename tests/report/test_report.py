@@ -14,8 +14,6 @@ from ffrobot.cli import cli
 from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
-from ffrobot.pictures.figures.shared import bending_points
-from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.motion import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
@@ -183,19 +181,3 @@ def test_page_says_what_the_summary_says(two_link_page, results):
             assert line.strip().removeprefix(f"{one.name}: ") in shown
     for text in (text for texts in results.warnings.values() for text in texts):
         assert text in shown
-
-
-def test_points_that_the_reference_condition_holds_have_no_curve(two_link, tmp_path):
-    """Of a solid their deflection is rounding; that is written here to the tip of a simply supported link."""
-    path = tmp_path / "scene.results.h5"
-    path.write_bytes((two_link.folder / "scene.results.h5").read_bytes())
-    with h5py.File(path, "r+") as file:
-        file["inverse/points/link1.tip/deflection"][...] = 1e-17
-    seal(path)
-    with Results(path) as results:
-        bending = ["link1.mid", "link2.mid", "link2.tip"]
-        assert bending_points(results) == bending_points(results, "inverse") == bending
-        names = {record.name for record in standard_figures(results)}
-        assert {name for name in names if name.startswith("deflection_")} == {f"deflection_{one}" for one in bending}
-        told = {what for _, what, *_ in peaks_table(runs([results])).rows if what.startswith("deflection of")}
-        assert told == {f"deflection of {one}" for one in bending}
