@@ -31,7 +31,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from bench.hand_written import TIME, evaluation_seconds, general_state, start_at_rest
+from bench.hand_written import TIME, evaluation_seconds, general_state
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.fcid import Fcid
@@ -80,12 +80,6 @@ def scene(case_copy):
     head = path.read_text(encoding="utf-8").split("[[analysis]]")[0]
     path.write_text(head + INVERSE, encoding="utf-8")
     return path
-
-
-def test_right_hand_side(benchmark, scene):
-    model = context_of(scene).model
-    assert (model.tree.n_v, len(model.rows)) == (22, 2)
-    benchmark(evaluation_seconds, start_at_rest(model), 0.0, EVALUATIONS)
 
 
 def test_pcid_of_one_second(benchmark, scene):

@@ -18,8 +18,9 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 PROJECTION, MASSES, LOADS = "mbs/model/projection.py", "mbs/model/masses.py", "mbs/quantities/link_loads.py"
-PATCHES, CORE = "actuation/patches", "mbs/core"
-STIFFENED = "tests/mbs/recursion/test_space.py"
+PATCHES, RESULTS, CORE, MBS = "actuation/patches/", "ffrobot/results/", "mbs/core", "tests/mbs/"
+RECURSION, INTEGRATE = f"{CORE}/recursion/", f"{CORE}/integrate/"
+ABA, SPACE = RECURSION + "constrained_aba/", MBS + "recursion/test_space.py"
 PROJECTED = "tests/mbs/test_projection.py tests/mbs/test_projected_trees.py"
 POINTS = "tests/cases/test_actuation_points.py"
 ARM = "tests/references/test_references.py::test_made_scenes[arm]"
@@ -42,145 +43,51 @@ FAULTS = [
     Fault(PROJECTION, "(1.0 - ALONG)[:, None] * at.rotation", "ALONG[:, None] * at.rotation", ARM),
     Fault(PROJECTION, "ALONG[:, None] * kept.S_bar,", "ALONG[:, None] * kept.S_bar[[1, 0, 2]],", PROJECTED),
     Fault(PROJECTION, "return as_floats(moved + _keeping_shapes(I - moved))", "return as_floats(moved)", PROJECTED),
-    Fault(
-        MASSES,
-        "np.eye(body.n_modes) + mass * Phi.T",
-        "np.eye(body.n_modes) - mass * Phi.T",
-        "tests/mbs/test_body.py",
-    ),
-    Fault(MASSES, "E = 0.5 * np.trace(inertia)", "E = np.trace(inertia)", "tests/mbs/test_body.py"),
-    Fault(
-        LOADS,
-        "force = -payload.mass * (of_point.a",
-        "force = payload.mass * (of_point.a",
-        "tests/test_mode_acceleration.py",
-    ),
-    Fault(LOADS, "left -= wrench @", "left += wrench @", "tests/mbs/test_link_loads.py"),
-    Fault("ffrobot/results/peaks.py", "motion.space.along(acting.force)", "motion.space.along(-acting.force)", ARM),
-    Fault("ffrobot/results/motion.py", "function.sample(inside)[0]", "function.sample(inside)[1]", ARM),
-    Fault(
-        "ffrobot/results/peaks.py",
-        "largest(time, column) for column in columns.T",
-        "largest(time, column) for column in columns.T[::-1]",
-        ARM,
-    ),
-    Fault(
-        "ffrobot/results/motion.py",
-        "(moved.modal, moved.modal_velocity))",
-        "(moved.modal_velocity, moved.modal))",
-        REDUCED,
-    ),
-    Fault(
-        "actuation/points.py",
-        "unmet = Q_a - np.einsum",
-        "unmet = Q_a + np.einsum",
-        POINTS,
-    ),
+    Fault(MASSES, "np.eye(body.n_modes) + mass * Phi.T", "np.eye(body.n_modes) - mass * Phi.T", MBS + "test_body.py"),
+    Fault(MASSES, "E = 0.5 * np.trace(inertia)", "E = np.trace(inertia)", MBS + "test_body.py"),
+    Fault(LOADS, "force = -payload.mass * (of_point.a",
+          "force = payload.mass * (of_point.a", "tests/test_mode_acceleration.py"),
+    Fault(LOADS, "left -= wrench @", "left += wrench @", MBS + "test_link_loads.py"),
+    Fault(RESULTS + "peaks.py", "motion.space.along(acting.force)", "motion.space.along(-acting.force)", ARM),
+    Fault(RESULTS + "motion.py", "function.sample(inside)[0]", "function.sample(inside)[1]", ARM),
+    Fault(RESULTS + "peaks.py", "largest(time, column) for column in columns.T",
+          "largest(time, column) for column in columns.T[::-1]", ARM),
+    Fault(RESULTS + "motion.py", "(moved.modal, moved.modal_velocity))",
+          "(moved.modal_velocity, moved.modal))", REDUCED),
+    Fault("actuation/points.py", "unmet = Q_a - np.einsum", "unmet = Q_a + np.einsum", POINTS),
     Fault("actuation/points.py", "[:, 6:] += held", "[:, 6:] -= held", POINTS),
-    Fault(
-        f"{PATCHES}/records.py",
-        "np.array([modulus * d31 / thickness, 0.0])",
-        "np.array([modulus * d31, 0.0])",
-        "tests/actuation/test_patches.py",
-    ),
-    Fault(
-        f"{PATCHES}/records.py",
-        "s * c**3 - (2 * S_22",
-        "s * c**3 + (2 * S_22",
-        "tests/actuation/test_patched_links_3d.py",
-    ),
-    Fault(f"{PATCHES}/patches.py", "required = F_p @", "required = 2.0 * F_p @", PATCHED),
-    Fault(
-        "actuation/control/lqr.py",
-        "np.eye(len(R)) + B.T @ X @ B, B.T",
-        "np.eye(len(R)), B.T",
-        "tests/actuation/test_closed_loop.py",
-    ),
-    Fault(
-        "actuation/control/margins.py",
-        'record.rate == "measured"',
-        'record.rate != "measured"',
-        "tests/actuation/test_margins.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/inverse/newton_euler.cpp",
-        "node.rotor_turns * A[Space::axis] + node",
-        "node",
-        "tests/mbs/test_inverse.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/inverse/newton_euler.cpp",
-        "component *= action.sign;",
-        "component *= 1;",
-        "tests/mbs/test_path_forces_on_bodies.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/spatial/stiffening.cpp",
-        "orthonormal_fields.L(1 + c, f)",
-        "orthonormal_fields.L(1 + (c + 1) % 3, f)",
-        STIFFENED,
-    ),
-    Fault(
-        f"{CORE}/integrate/dop853.cpp",
-        "2 * way - (last + first)",
-        "1 * way - (last + first)",
-        "tests/mbs/test_integrator.py",
-    ),
-    Fault(
-        f"{CORE}/integrate/generalized_alpha.cpp",
-        "rate_ - value_;",
-        "rate_ + value_;",
-        "tests/mbs/test_integrator.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/planar/stiffening.cpp",
-        "products[1] - center.y() * products[0];",
-        "products[1] + center.y() * products[0];",
-        "tests/mbs/test_projected_trees.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/constrained_aba/joint_elimination.h",
-        "M[f] = (N * (N - c) * J) * U_by_D;",
-        "M[f] = (N * N * J) * U_by_D;",
-        "tests/mbs/test_core_is_oracle.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/inverse/observe.cpp",
-        "to.J(2, 2) += s.p_p;",
-        "to.J(2, 2) += 0;",
-        "tests/mbs/test_projection.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/inverse/motors.cpp",
-        "tau = motor.sign * Q_[motor.coordinate],",
-        "tau = Q_[motor.coordinate],",
-        "tests/mbs/test_prescribed.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/constrained_aba/joint_elimination.h",
-        "      A[2] += node.lead * A[5];",
-        "      A[2] -= node.lead * A[5];",
-        "tests/mbs/recursion/test_space.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/constrained_aba/multipliers.h",
-        "      x[r] -= factor[k * m + r] * x[k];",
-        "      x[r] -= factor[r * m + k] * x[k];",
-        "tests/mbs/recursion/test_space.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/motion/motion_norm.cpp",
-        "frequency > 0 ? 1 / frequency : 0",
-        "frequency > 0 ? 1 / (frequency * frequency) : 0",
-        "tests/mbs/recursion/test_norm.py",
-    ),
-    Fault(
-        f"{CORE}/recursion/motion/newton_system.cpp",
-        "f -= factors.S.cwiseProduct(y);",
-        "f += factors.S.cwiseProduct(y);",
-        "tests/mbs/recursion/test_newton.py",
-    ),
-]
+    Fault(PATCHES + "records.py", "np.array([modulus * d31 / thickness, 0.0])",
+          "np.array([modulus * d31, 0.0])", "tests/actuation/test_patches.py"),
+    Fault(PATCHES + "records.py", "s * c**3 - (2 * S_22",
+          "s * c**3 + (2 * S_22", "tests/actuation/test_patched_links_3d.py"),
+    Fault(PATCHES + "patches.py", "required = F_p @", "required = 2.0 * F_p @", PATCHED),
+    Fault("actuation/control/lqr.py", "np.eye(len(R)) + B.T @ X @ B, B.T",
+          "np.eye(len(R)), B.T", "tests/actuation/test_closed_loop.py"),
+    Fault("actuation/control/margins.py", 'record.rate == "measured"',
+          'record.rate != "measured"', "tests/actuation/test_margins.py"),
+    Fault(RECURSION + "inverse/newton_euler.cpp", "node.rotor_turns * A[Space::axis] + node",
+          "node", MBS + "test_inverse.py"),
+    Fault(RECURSION + "inverse/newton_euler.cpp", "component *= action.sign;",
+          "component *= 1;", MBS + "test_path_forces_on_bodies.py"),
+    Fault(RECURSION + "spatial/stiffening.cpp", "orthonormal_fields.L(1 + c, f)",
+          "orthonormal_fields.L(1 + (c + 1) % 3, f)", SPACE),
+    Fault(INTEGRATE + "dop853.cpp", "2 * way - (last + first)", "1 * way - (last + first)", MBS + "test_integrator.py"),
+    Fault(INTEGRATE + "generalized_alpha.cpp", "rate_ - value_;", "rate_ + value_;", MBS + "test_integrator.py"),
+    Fault(RECURSION + "planar/stiffening.cpp", "products[1] - center.y() * products[0];",
+          "products[1] + center.y() * products[0];", MBS + "test_projected_trees.py"),
+    Fault(ABA + "joint_elimination.h", "M[f] = (N * (N - c) * J) * U_by_D;",
+          "M[f] = (N * N * J) * U_by_D;", MBS + "test_core_is_oracle.py"),
+    Fault(RECURSION + "inverse/observe.cpp", "to.J(2, 2) += s.p_p;", "to.J(2, 2) += 0;", MBS + "test_projection.py"),
+    Fault(RECURSION + "inverse/motors.cpp", "tau = motor.sign * Q_[motor.coordinate],",
+          "tau = Q_[motor.coordinate],", MBS + "test_prescribed.py"),
+    Fault(ABA + "joint_elimination.h", "      A[2] += node.lead * A[5];", "      A[2] -= node.lead * A[5];", SPACE),
+    Fault(ABA + "multipliers.h", "      x[r] -= factor[k * m + r] * x[k];",
+          "      x[r] -= factor[r * m + k] * x[k];", SPACE),
+    Fault(RECURSION + "motion/motion_norm.cpp", "frequency > 0 ? 1 / frequency : 0",
+          "frequency > 0 ? 1 / (frequency * frequency) : 0", MBS + "recursion/test_norm.py"),
+    Fault(RECURSION + "motion/newton_system.cpp", "f -= factors.S.cwiseProduct(y);",
+          "f += factors.S.cwiseProduct(y);", MBS + "recursion/test_newton.py"),
+]  # fmt: skip
 
 
 def main() -> None:

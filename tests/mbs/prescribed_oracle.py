@@ -27,10 +27,10 @@ RANK = 1e-10  # of the largest singular value
 
 
 def residuals(motion):
-    """Of the first instant M v̇ − Q + C_vᵀλ, and C̈ less what targets ask for, both relative to their largest terms."""
-    state, at = accelerated(motion), motion.time[:1]
-    needed, at_rest = (required_forces(motion.model, state._replace(a=a), at)[0] for a in (state.a, 0 * state.a))
-    of_rows = motion.rows[1][0].T @ motion.multipliers[0]
+    """M v̇ − Q + C_vᵀλ, and C̈ less what targets ask for, the largest, both relative to their largest terms."""
+    state, at = accelerated(motion), motion.time
+    needed, at_rest = (required_forces(motion.model, state._replace(a=a), at) for a in (state.a, 0 * state.a))
+    of_rows = np.einsum("tji,tj->ti", motion.rows[1], motion.multipliers)
     forces = max(np.abs(x).max(initial=0.0) for x in (needed - at_rest, at_rest, of_rows))
     accelerations = max(np.abs(state.a).max(), np.abs(state.v).max() ** 2, 1.0)
     left = row_accelerations(motion.model, state, at)

@@ -116,7 +116,7 @@ def test_frame_along_the_chord(name):
 
 
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-@pytest.mark.parametrize("name", ["B", "D", "F", "G", "I"])
+@pytest.mark.parametrize("name", ["B", "F", "G"])
 def test_order_in_the_load(name, condition):
     """What is left out is of third order: halved loads have an eighth of the error, in positions and rotations."""
     case, errors = CASES[name], []
@@ -126,28 +126,3 @@ def test_order_in_the_load(name, condition):
         found = tip_at_rest(body(case.section, case.nu, condition), *load)
         errors.append([np.linalg.norm(a - b) for a, b in zip(found, exact, strict=True)])
     assert np.all(np.log2(np.divide(*errors)) > 2.9)
-
-
-def test_mass_beside_the_axis():
-    """As part of the link, four points that turn with its tip: what they move by in second order, by differences."""
-    strip = body((4, 20), 0.33)
-    mass, arm = 0.4, np.array([0.02, 0.06, -0.03])
-    spread = np.array([[0.01, 0.02, 0.0], [0.0, -0.01, 0.03]])
-    ends = np.concatenate([spread, -spread])
-    E_center = mass / 4 * ends.T @ ends
-    at = strip.points["tip"]
-    loaded = strip.stiffening.with_payload("tip", at.position, at.rotation, mass, arm, E_center)
-    p, h = np.random.default_rng(7).normal(size=strip.n_modes) / np.sqrt(strip.stiffness), 1e-2
-
-    def places(q):
-        tip = bent_section(strip, "tip", q)
-        return tip.u + Rotation.from_rotvec(tip.phi).apply(arm + ends)
-
-    def curvature(h):
-        return (places(h * p) + places(-h * p) - 2 * places(0 * p)) / (2 * h**2)
-
-    second = (4 * curvature(h / 2) - curvature(h)) / 3
-    change = {key: -0.5 * p @ (getattr(loaded, key) - getattr(strip.stiffening, key)) @ p for key in ("K_s", "K_x")}
-    np.testing.assert_allclose(change["K_s"], mass / 4 * second.sum(axis=0), rtol=1e-6)
-    moments = mass / 4 * np.einsum("ik,il->kl", places(0 * p), second)
-    np.testing.assert_allclose(change["K_x"], moments, rtol=1e-6, atol=1e-6 * np.abs(moments).max())

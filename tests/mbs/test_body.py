@@ -10,7 +10,7 @@ from random_mechanisms import random_beam, stiffened
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential
-from ffrobot.mbs.model.body import bent_section, from_modal_body, rigid_body
+from ffrobot.mbs.model.body import bent_section, from_modal_body
 from ffrobot.mbs.model.masses import with_payload
 
 
@@ -25,32 +25,12 @@ def test_straight_line_of_mass_has_inertia_about_its_axis():
     assert not np.any(np.abs(body.S_bar_kl[2, 2][np.ix_(torsion, torsion)]) > 1e-12)
 
 
-def test_all_of_the_kinetic_energy_is_positive():
-    """M of the straight link, its frame held nowhere, has no singular direction."""
-    body = from_modal_body("upper", modal_body("links/upper.toml"))
-    s = body.first_moment
-    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
-    m, J, h = body.mass * np.eye(3), body.inertia, body.spin
-    M = np.block([[m, -cross, body.S_bar], [cross, J, h], [body.S_bar.T, h.T, np.eye(body.n_modes)]])
-    scale = 1 / np.sqrt(np.diag(M))
-    assert np.linalg.eigvalsh(scale[:, None] * M * scale).min() > 1e-4
-
-
 def test_beam_of_an_earlier_version_is_refused_with_the_way_out():
     link = replace(modal_body("links/upper.toml"), J_spin=None, h_spin=None, S_spin=None)
     with pytest.raises(InputError, match=r'body "upper": expected .* inertia of the beam .* with `ffrobot link`'):
         from_modal_body("upper", link)
     whole = replace(link, kind="solid")  # integrated over its volume: nothing is missing
     assert from_modal_body("upper", whole).inertia[0, 0] == pytest.approx(link.second_moment[1, 1] * 2, abs=1e-15)
-
-
-def test_rigid_body_about_its_origin():
-    """Steiner's theorem, with products of inertia."""
-    inertia, c = np.array([[0.3, 0.02, 0.01], [0.02, 0.4, -0.03], [0.01, -0.03, 0.5]]), np.array([0.1, -0.2, 0.3])
-    body = rigid_body("b", 2.0, c, inertia, {"root": np.zeros(3), "tip": np.array([0.4, 0, 0])})
-    np.testing.assert_allclose(body.inertia, inertia + 2.0 * (c @ c * np.eye(3) - np.outer(c, c)), rtol=1e-14)
-    np.testing.assert_allclose(body.points["mid"].position, [0.2, 0, 0])
-    assert body.n_modes == 0
 
 
 @pytest.mark.parametrize(("center", "bent"), [((0.03, -0.02, 0.05), 0.0), ((0.0, 0.0, 0.0), 1.0)])

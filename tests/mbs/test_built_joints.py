@@ -115,3 +115,10 @@ def test_equilibrium_knows_neither_rotors_nor_friction():
 def test_bad_keys_are_refused(keys, expected):
     with pytest.raises(InputError, match=expected):
         checked_scene([revolute("O", "ground", "a.root") | keys])
+
+
+@pytest.mark.parametrize(("closed", "driven"), [(False, ["O", "A"]), (True, [])])
+def test_motors_are_in_all_joints_of_open_chains(closed, driven):
+    joints = [revolute("O", "ground", "a.root"), revolute("A", "a.tip", "b.root")]
+    scene = checked_scene(joints + [revolute("B", "b.tip", "ground", at=(1.0, 0.0))] * closed, bodies=("a", "b"))
+    assert [joint.name for joint in scene.motor_joints] == driven

@@ -85,18 +85,3 @@ def test_vibrations_grow_or_decay_as_they_do_however_long_the_interval(zeta):
         s = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
         np.testing.assert_allclose(size, abs(pade(s)), rtol=1e-7)
         assert np.all(np.sign(np.round(size - 1, 10)) == np.sign(-zeta))
-
-
-def test_equations_without_numbers_are_reported():
-    problem = dichotomy()
-    broken = Problem(
-        lambda t, p, v, a: np.full_like(p, np.nan), problem.derivatives, SIGMA, 1.0, problem.start, problem.end
-    )
-    assert not collocate(broken, np.linspace(0, 2, 11), zero).converged
-
-
-@pytest.mark.parametrize("guess", [0.0, 5.0])
-def test_linear_equations_take_one_iteration_whatever_the_guess(guess):
-    found = collocate(dichotomy(), np.linspace(0, 2, 21), lambda t: (np.full((len(t), 2), guess), *zero(t)[1:]))
-    assert found.converged
-    assert found.iterations <= 3

@@ -66,16 +66,3 @@ def test_strain_energy_converges_from_below(count):
     assert (part < 1 + 1e-4).all()  # strains are taken as constant over a 32nd of a piece
     assert (part > 1 - {4: 0.06, 8: 0.004}[count]).all()
     assert part[0] == pytest.approx(1.0, abs=1e-4)
-
-
-def test_what_is_spread_is_gathered():
-    *_, found = divided("simply-supported", 4)
-    np.testing.assert_allclose(found.gathered @ found.spread, np.eye(MODES), atol=1e-12)
-
-
-def test_a_link_may_have_more_modes_than_its_pieces():
-    """Ten modes in two pieces of three: what the pieces can do is gathered, and found again."""
-    _, whole, pieces, found = divided("cantilever", 2, modes=10)
-    total = sum(piece.spatial.n_modes for piece in pieces)
-    assert total < whole.n_modes
-    np.testing.assert_allclose(found.spread @ found.gathered, np.eye(total), atol=1e-8)

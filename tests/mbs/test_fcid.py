@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import zoo
 from links import arm, arm_links, quintic, ritz_link
-from mechanisms import make_model, pcid, relative, revolute
+from mechanisms import make_model, relative, revolute
 from oracle_runs import run
 from patch_sets import Patches
 
@@ -12,7 +12,6 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.replay import supplied
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.fields.waypoints import spline
 
 TIMES = np.linspace(0.0, 0.2, 5)
 
@@ -103,24 +102,6 @@ def test_static_shape_sags_as_in_closed_form():
     assert np.abs(outcome.F_p).max() < 1e-11 * mass * 9.81
 
 
-def test_static_shape_needs_only_what_its_own_motion_takes():
-    """Inertia of p̈ is all that is left where loads vary slowly: orders of magnitude below links held straight."""
-    model = arm(arm_links(EI=3e4))
-    static, zero = (
-        run(model, Fcid(name="f", kind="fcid", shape=shape, end=1.0, output_step=0.01)) for shape in ("static", "zero")
-    )
-    assert np.abs(static.F_p).max() < 1e-3 * np.abs(zero.F_p).max()
-
-
-def test_a_spline_is_exact_for_polynomials_of_its_degree():
-    t = np.linspace(0.0, 2.0, 30)
-    (function,) = spline(t, (t**5 - 3 * t**2)[:, None])
-    for at in (0.0, 0.37, 1.234, 2.0):
-        np.testing.assert_allclose(
-            function(at), (at**5 - 3 * at**2, 5 * at**4 - 6 * at, 20 * at**3 - 6), rtol=1e-8, atol=1e-8
-        )
-
-
 def test_static_shape_of_links_that_are_too_soft():
     with pytest.raises(
         SolveError, match=r'analysis "fcid": no static shape was found at t = 0 s: the links are too soft'
@@ -134,13 +115,6 @@ def test_too_few_trajectories_are_refused():
         run(model, fcid("zero"))
 
 
-def test_more_expressions_than_modes_are_refused():
-    model = arm()
-    expressions = tuple(parse_expression("0") for _ in range(4))
-    with pytest.raises(InputError, match=r"modal.link2: expected at most 3 expressions, one for each mode, found 4"):
-        run(model, fcid("given", modal={"link2": expressions}))
-
-
 def test_a_shape_out_of_reach_is_an_error():
     """A second link bent by metres: its tip is farther from the elbow than the first link can make up for."""
     model = arm()
@@ -149,15 +123,3 @@ def test_a_shape_out_of_reach_is_an_error():
         SolveError, match=r"no posture was found at t = .*: the prescribed shape takes the trajectories"
     ):
         run(model, fcid("given", modal=modal))
-
-
-def test_pcid_and_fcid_meet_in_stiff_links():
-    """The moments of PCID come to those of FCID as 1/ω, the vibration that a jump of the jerk leaves: as EI^(−1/2)."""
-    differences = []
-    for EI in (3e3, 3e4):
-        model = arm(arm_links(EI=EI), initial={"state": "static", "angles": {"link1": 0.4, "link2": 1.3}})
-        free = run(model, pcid(output_step=0.05))
-        held = run(model, Fcid(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
-        differences.append(relative(held.tau, free.tau))
-    assert differences[1] == pytest.approx(differences[0] / np.sqrt(10), rel=0.3)
-    assert differences[1] < 1e-3

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from links import arm, ritz_link
+from links import ritz_link
 from oracle_3d import body_mass_matrix
 
 from ffrobot.common.rotations import exponential
-from ffrobot.mbs.model.truncation import loaded_points
 from ffrobot.mbs.model.truncation import with_fewer_modes as with_fewer_modes
 
 POINTS = ["root", "tip"]
@@ -36,15 +35,3 @@ def test_equations_are_those_of_the_body_restricted_to_fewer_shapes(whole):
     np.testing.assert_allclose(body.damping, body.reduction.T.T @ whole.damping @ body.reduction.T, atol=1e-12)
     K_tip, K_of_all = (of.stiffening.K_points["tip"][0] for of in (body, whole))
     np.testing.assert_allclose(p @ K_tip @ p, (T[6:, 6:] @ p) @ K_of_all @ (T[6:, 6:] @ p), rtol=1e-12)
-
-
-def test_nothing_is_done_where_nothing_is_saved(whole):
-    assert with_fewer_modes(whole, 6, POINTS) is whole
-    assert with_fewer_modes(whole, 99, POINTS) is whole
-    assert with_fewer_modes(whole, 4, []).n_modes == 4
-
-
-def test_loads_count_where_something_acts():
-    scene = arm(load=[{"point": "link1.mid", "y": "1.0"}]).scene
-    assert loaded_points(scene, "link1") == ["root", "tip", "mid"]
-    assert loaded_points(scene, "link2") == ["root", "tip"]

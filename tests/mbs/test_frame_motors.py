@@ -11,7 +11,6 @@ from random_mechanisms import random_tree
 
 import ffrobot
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.drives import Drive, Drives
 from ffrobot.mbs.model.known_motion import required_forces
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.solve.linearisation import LinearEquations
@@ -47,21 +46,6 @@ def test_generalized_forces_are_the_virtual_work_of_the_frames(turned):
     np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
     modal = ~model.tree.joint_columns
     assert np.abs(expected[modal]).max() > 1e-3 * MOMENT
-
-
-def test_sections_have_no_part_of_it():
-    """The same moment on sections acts along the joint alone."""
-
-    def along(model):
-        direction = np.zeros(model.tree.n_v)
-        direction[model.tree.nodes[1].v] = 1.0
-        return Drives(along=(Drive(direction, _core.TimeFunction.constant(MOMENT)),))
-
-    model, state = state_of(False, along)
-    (found,) = required_forces(model, state, np.array([0.1]))
-    expected = np.zeros(model.tree.n_v)
-    expected[model.tree.nodes[1].v] = MOMENT
-    np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
 
 
 @pytest.mark.parametrize("turned", [False, True])

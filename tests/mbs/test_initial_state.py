@@ -100,24 +100,6 @@ def test_robot_without_equilibrium_is_refused():
         initial_state(model.model)
 
 
-def test_guesses_of_joints_are_those_of_bodies():
-    """The same configuration; the second joint is named from the outside in."""
-    sides = {"O": ("ground", "crank.root"), "A": ("rod.root", "crank.tip")}
-    joints = [revolute(name, *between) for name, between in sides.items()]
-    rods = [rod("crank", 0.2, 1.0), rod("rod", 0.5, 1.5)]
-    of_bodies = {"angles": {"crank": 0.9, "rod": -0.3}, "rates": {"crank": 2.0, "rod": -1.0}}
-    of_joints = {
-        "joints": {"O": 0.9, "A": 1.2},
-        "joint_rates": {"O": 2.0, "A": 3.0},
-    }
-    mixed = {"angles": {"crank": 0.9}, "joints": {"A": 1.2}, "rates": {"crank": 2.0}, "joint_rates": {"A": 3.0}}
-    models = [make_model(rods, joint=joints, initial=initial).model for initial in (of_bodies, of_joints, mixed)]
-    states = [undeformed_posture(model) for model in models]
-    for state in states[1:]:
-        np.testing.assert_allclose(state.q, states[0].q, atol=1e-14)
-        np.testing.assert_allclose(state.v, states[0].v, atol=1e-14)
-
-
 def test_a_guess_of_a_way_places_what_slides():
     """Along the axis of a rod that turns, forwards and backwards named; bodies that joints leave out follow on."""
     rods = [rod("arm", 1.0, 1.0), rod("slide", 0.5, 1.5)]

@@ -24,10 +24,10 @@ def inverse(model, **keys):
 
 METHODS = _core.MethodKind
 TOLERANCES = {
-    "dop853": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
-    "dopri5": (1e-3, 1e-4, 1e-5),
-    "radau": (1e-2, 1e-3, 1e-4, 1e-5),
-    "generalized-alpha": (1e-2, 3e-3, 1e-3),
+    "dop853": (1e-4, 1e-6, 1e-8),
+    "dopri5": (1e-3, 1e-5),
+    "radau": (1e-2, 1e-5),
+    "generalized-alpha": (1e-2, 3e-3),
 }
 
 
@@ -70,8 +70,8 @@ def test_errors_of_all_reported_quantities_are_within_the_tolerance(tight, integ
 
 
 # The factors by which the integrators tighten the tolerance (`error_share`) were found with `arm()`. These arms had no
-# part in that: links, path and start by seed, the last two of them the worst of 11 … 29.
-HELD_OUT = (11, 12, 20, 29)
+# part in that: links, path and start by seed, the worst two of 11 … 29.
+HELD_OUT = (20, 29)
 
 
 def held_out(seed):
@@ -100,17 +100,6 @@ def test_errors_of_arms_that_nothing_was_tuned_with(seed):
         assert ratios["lambda_"] > 0.001, (integrator, ratios)
 
 
-def test_newton_s_method_of_radau_hardly_iterates_and_keeps_its_matrix():
-    """Three slopes an iteration, two for the step's end: under 13 a step are little more than three iterations.
-
-    What is rejected are two or three of the first steps, whose size is sought from the distance of outputs down, here
-    as at any tolerance from 1e-3 to 1e-6; none after the first 5 ms.
-    """
-    outcome = inverse(arm(initial={"angles": ANGLES, "state": "static"}), tolerance=1e-4, integrator="radau")
-    assert outcome.statistics.rejected <= 3
-    assert outcome.statistics.evaluations < 13 * outcome.statistics.steps
-
-
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_stiff_links_at_rest_do_not_hold_implicit_steps(integrator):
     """Twelve modes a link, up to 34 krad/s, none of which is felt at a percent.
@@ -134,31 +123,11 @@ def test_radau_damps_away_what_rings_below_the_tolerance():
     assert relative(outcome.lambda_, exact.lambda_) < 1e-4
 
 
-def test_outputs_between_steps_are_as_good_as_outputs_at_steps(tight):
-    """At t = 0.5 s the dense output of a run to 1 s, against a run whose last step ends there."""
-    tolerance = 1e-6
-    half = inverse(arm(), end=0.5, output_step=0.5, tolerance=tolerance, integrator="dop853")
-    whole = inverse(arm(), tolerance=tolerance, integrator="dop853")
-    middle = np.flatnonzero(tight.time == 0.5)[0]
-    for name in ("q", "lambda_"):
-        peak = np.abs(getattr(tight, name)).max()
-        exact = getattr(tight, name)[middle]
-        assert relative(getattr(half, name)[-1], exact, peak) < tolerance
-        assert relative(getattr(whole, name)[middle], exact, peak) < tolerance
-
-
-def test_output_times_do_not_steer_the_steps():
-    few, many = (inverse(arm(), output_step=step, tolerance=1e-6, integrator="dop853") for step in (0.1, 0.001))
-    assert few.statistics.steps == many.statistics.steps
-    np.testing.assert_allclose(few.q, many.q[::100], rtol=0, atol=1e-13)  # the times differ in their last bit
-
-
 @pytest.mark.parametrize("integrator", TOLERANCES)
 def test_constraints_hold_at_every_output(integrator):
     """Position, velocity and acceleration level, relative to 1 + coordinates, rates, accelerations; however coarse."""
-    for tolerance in TOLERANCES[integrator][:2]:
-        outcome = inverse(arm(), output_step=0.001, tolerance=tolerance, integrator=integrator)
-        assert outcome.motion.violation.max() < 1e-11
+    outcome = inverse(arm(), output_step=0.001, tolerance=TOLERANCES[integrator][0], integrator=integrator)
+    assert outcome.motion.violation.max() < 1e-11
 
 
 def test_a_run_ends_at_max_steps_and_says_so():
@@ -177,17 +146,7 @@ def test_generalized_alpha_says_that_a_tolerance_is_beyond_it():
         run(model, analysis).check_completed()
 
 
-def test_where_steps_collapse_does_not_depend_on_max_steps():
-    path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-0.12*sin(100*t)", "y": f"{TIP[1]!r}"}
-    model = arm(gravity=(0.0, 0.0), trajectory=[path])
-    keys = {"end": 0.2, "tolerance": 1e-8, "integrator": "generalized-alpha"}
-    runs = [run(model, pcid(max_steps=most, **keys)) for most in (50_000, 1_000_000)]
-    assert [run.status for run in runs] == ["step underflow"] * 2
-    assert runs[0].statistics.steps == runs[1].statistics.steps
-    assert runs[0].statistics.time_reached == runs[1].statistics.time_reached
-
-
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, TIGHTEST_TOLERANCE])
+@pytest.mark.parametrize("tolerance", [1e-6, TIGHTEST_TOLERANCE])
 def test_a_start_at_rest_costs_no_more_steps_than_the_motion(tolerance):
     """Vibration starts from nothing there: its rounding once drove the step below any size."""
     initial = {"angles": ANGLES, "state": "static"}

@@ -1,9 +1,8 @@
-"""Inverse dynamics by the equations of each body, energies and momentum, against the recursion: random trees."""
+"""Random trees in 3D: forces, accelerations, energies and reactions of the core against the equations of each body."""
 
 import numpy as np
 import pytest
 from body_equations import (
-    Accelerated,
     absolute_accelerations,
     accelerated,
     body_forces,
@@ -13,91 +12,37 @@ from body_equations import (
     required_forces,
 )
 from checkpoint_scenes import as_scene, tree_model
-from moving_trees import NOW, SMALL, moving
+from moving_trees import SMALL, moving
+from prescribed_oracle import residuals
 from random_mechanisms import TYPES, random_tree
 from tree_reactions import carried, needed
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.drives import Drive, Drives
-from ffrobot.mbs.model.gears import gear_forces, with_compliance
-from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.quantities.motion import RobotMotion, totals
 from ffrobot.mbs.quantities.reactions import reactions
-from ffrobot.mbs.solve.integrators import METHODS
-
-ONE = _core.TimeFunction.constant(1.0)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_gears_that_give_take_no_force(turned):
-    """Outputs of gears hang on sections that modes move and turn, and carry the spin of their rotors alone."""
-    rng, keys = np.random.default_rng(5), {"rotor_inertia": 0.02, "gear_ratio": 7.0, "stiffness": 9.0, "damping": 0.6}
-    for kinds in (("rigid",), ("beam",), ("solid",), ("supported beam",)):
-        plain, tables = as_scene(random_tree(rng, ["revolute"] * 3, kinds, chain=True, size=SMALL), turned)
-        model = with_compliance(tree_model(plain, [table | keys for table in tables]))
-        tree = model.tree
-        q, v = SMALL * rng.standard_normal(tree.n_q), rng.standard_normal(tree.n_v)
-        system, load = MultibodySystem(model), rng.standard_normal(tree.n_v)
-        of_gears = gear_forces(tree, q[None], v[None])[0]
-        a, _ = system.core.evaluate(q, v, np.zeros(0), load + of_gears, None)
-        state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
-        left = required_forces(model, state, NOW)[0] - load
-        np.testing.assert_allclose(left, 0, atol=1e-10 * np.abs(a).max())
-        assert len(tree.gears) == 3
-        assert np.abs(of_gears).max() > 0.1
-        controls = _core.IntegrationControls(
-            tolerance=1e-6, max_steps=1, methods=[(METHODS["dop853"], 1.0, 0.0)], spectral_radius=0.8
-        )
-        scene = MultibodySystem(model, Drives(along=(Drive(load, ONE),))).scene
-        run = _core.tree_motion(system.core, scene, [0.0], q, v, controls, lambda t: True)
-        np.testing.assert_allclose(run.accelerations[0], a, atol=1e-12 * np.abs(a).max())
-
 
 FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5}
 ROTOR = {"rotor_inertia": 0.02, "gear_ratio": 7.0}
-
-
-@pytest.mark.parametrize(
-    ("joint", "as_built"),
-    [
-        ("screw", {}),
-        ("cylindrical", {}),
-        ("prismatic", ROTOR),
-        ("revolute", ROTOR),
-        ("revolute", ROTOR | {"stiffness": 9.0, "damping": 0.6}),
-    ],
-    ids=["screw", "cylindrical", "prismatic with rotor", "revolute with rotor", "compliant gear"],
-)
-def test_the_core_finds_the_same_forces(joint, as_built):
-    """Rotors, gears and friction, at accelerations that nothing makes: the equations of each body against the core."""
-    rng = np.random.default_rng(TYPES.index(joint))
-    for kinds in (("rigid",), ("beam",), ("solid",), ("supported beam",)):
-        plain, tables = as_scene(random_tree(rng, [joint] * 3, kinds, chain=True, size=SMALL), False)
-        model = with_compliance(tree_model(plain, [table | FRICTION | as_built for table in tables]))
-        tree, system = model.tree, MultibodySystem(model)
-        q, v, a = SMALL * rng.standard_normal(tree.n_q), *rng.standard_normal((2, tree.n_v))
-        state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
-        expected = required_forces(model, state, NOW)
-        found = system.core.required_forces(system.scene, NOW, q[None], v[None], a[None])
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
+GEAR = {"stiffness": 9.0, "damping": 0.6}
 AS_BUILT = {
-    "revolute": FRICTION | ROTOR | {"stiffness": 9.0, "damping": 0.6},
+    "revolute": FRICTION | ROTOR,
     "prismatic": FRICTION | ROTOR,
     "cylindrical": FRICTION,
     "screw": FRICTION,
+    "universal": FRICTION,
 }
-LOAD = {"x": "3", "y": "t - 2", "mz": "0.7"}  # N, N·m
+LOAD = {"x": "3", "y": "t - 2", "mx": "0.2*t", "mz": "0.7"}  # N, N·m
+KINDS = ("rigid", "solid", "beam", "supported beam", "stiffened solid", "stiffened beam")
 
 
-def anything_moving(rng, joint, turned):
+def anything_moving(rng, joint, turned, gear):
     """A loaded tree of bodies of all kinds with what joints of this type have, at accelerations that nothing makes."""
-    kinds = ("rigid", "beam") if joint == "free" else ("rigid", "solid", "beam", "supported beam")
+    kinds = ("rigid", "beam") if joint == "free" else KINDS
     plain, tables = as_scene(random_tree(rng, [joint] * 4, kinds, size=SMALL), turned)
     body = plain.bodies[2]
     load = {"point": f"{body.name}.{next(iter(body.points))}"} | LOAD
-    tables = [table | AS_BUILT.get(joint, {}) for table in tables]
+    tables = [table | AS_BUILT.get(joint, {}) | gear for table in tables]
     model = with_compliance(tree_model(plain, tables, load=[load]))
     tree, times = model.tree, np.array([0.0, 0.4])
     q = tree.integrate(np.tile(tree.at_rest({}), (2, 1)), SMALL * rng.standard_normal((2, tree.n_v)))
@@ -105,19 +50,29 @@ def anything_moving(rng, joint, turned):
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
-@pytest.mark.parametrize("joint", TYPES)
-def test_energies_and_momentum_are_those_of_the_bodies(joint, turned):
-    motion = anything_moving(np.random.default_rng(50 + TYPES.index(joint)), joint, turned)
-    of_core, expected = totals(motion), (energies(motion), momentum(motion))
-    for found, wanted in zip(of_core, expected, strict=True):
+@pytest.mark.parametrize(
+    ("joint", "gear"), [*((joint, {}) for joint in TYPES), ("revolute", GEAR)], ids=[*TYPES, "compliant gear"]
+)
+def test_trees_of_every_joint(joint, gear, turned):
+    motion = anything_moving(np.random.default_rng(50 + TYPES.index(joint)), joint, turned, gear)
+    check_equations(motion)
+    for found, wanted in zip(totals(motion), (energies(motion), momentum(motion)), strict=True):
         for key, values in vars(wanted).items():
             np.testing.assert_allclose(vars(found)[key], values, rtol=0, atol=1e-12 * np.abs(values).max(), err_msg=key)
+    check_carried(motion)
+    if joint != "free":
+        check_points(motion)
 
 
-@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
-@pytest.mark.parametrize("joint", TYPES)
-def test_joints_carry_what_bodies_need(joint, turned):
-    check_carried(anything_moving(np.random.default_rng(70 + TYPES.index(joint)), joint, turned))
+def check_equations(motion):
+    """Forces that the motion takes; accelerations that the core finds instead leave none."""
+    system, state = motion.system, (motion.q, motion.v)
+    expected = required_forces(motion.model, accelerated(motion), motion.time)
+    found = system.core.required_forces(system.scene, motion.time, *state, motion.a)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    run = _core.tree_outputs(system.core, system.scene, motion.time.tolist(), np.hstack(state))
+    free = RobotMotion(motion.model, motion.time, *state, run.accelerations, run.multipliers)
+    assert residuals(free)[0] < 1e-12
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -136,10 +91,8 @@ def check_carried(motion):
             np.testing.assert_allclose(values, getattr(of_joint, part), rtol=0, atol=1e-12 * size, err_msg=name)
 
 
-@pytest.mark.parametrize("joint", [type_ for type_ in TYPES if type_ != "free"])
-def test_loads_at_points_are_what_bodies_need(joint):
+def check_points(motion):
     """All that acts at the points of a body moves it, and its frame and modes as they do."""
-    motion = anything_moving(np.random.default_rng(90 + TYPES.index(joint)), joint, turned=True)
     tree, state = motion.model.tree, accelerated(motion)
     of_bodies = body_forces(state, motion.model.scene.gravity)
     mechanism = mechanism_of(tree, np.zeros(3))

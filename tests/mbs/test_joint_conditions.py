@@ -243,7 +243,7 @@ def test_frequencies_and_compliance_of_two_links_against_an_assembly_to_1e_8():
             np.testing.assert_allclose(C, exact, atol=1e-8 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize(("condition", "frequency"), [("locked", 1.0), ("locked", 4.0), ("compliant", 1.0)])
+@pytest.mark.parametrize(("condition", "frequency"), [("locked", 4.0), ("compliant", 1.0)])
 def test_frequency_response_against_time_integration(condition, frequency):
     """A small oscillating force at the tip; after the transient the amplitude of the tip is |H|."""
     path = "motor" if condition == "compliant" else "joint"
@@ -253,14 +253,14 @@ def test_frequency_response_against_time_integration(condition, frequency):
         {"arm": thin(0.5, 10, 3, damping={"ratio": 0.2})}, [pin("O", "ground", "arm.root", **gear)],
         payload=[{"point": "arm.tip", "mass": 0.1}], load=[{"point": "arm.tip", "y": f"{force}*sin({omega}*t)"}],
         trajectory=[{"name": "held", path: "O", "value": "0"}],
-        analysis=[{"name": "shaken", "kind": "pcid", "end": 12.0, "output_step": 0.01, "tolerance": 1e-8}],
+        analysis=[{"name": "shaken", "kind": "pcid", "end": 7.0, "output_step": 0.01, "tolerance": 1e-8}],
     )  # fmt: skip
     with solve(robot) as results:
         time, y = results["shaken/time"], results["shaken/points/arm.tip/position"][:, 1]
     model = prepare_scene(robot).model
     found = PoseEvaluator(model, undeformed_posture(model).q, "arm.tip", count=1, omega=np.array([omega]))
     expected = found.at(undeformed_posture(model).q)[f"joints_{condition}/response"][0, 1]
-    late = time > 10.0
+    late = time > 5.0
     waves = np.column_stack([np.sin(omega * time), np.cos(omega * time)])[late]
     amplitude = np.linalg.norm(np.linalg.lstsq(waves, y[late], rcond=None)[0]) / force
     assert amplitude == pytest.approx(expected, rel=1e-5)

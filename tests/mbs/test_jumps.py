@@ -35,10 +35,8 @@ def angle_behind(jumps, time):
     "jumps",
     [
         [(0.50003, 1)],
-        [(0.123456789, 1)],
         [(0.5, 1)],  # an output time
         [(0.5 - 2**-53, 1)],  # the last number before one
-        [(0.5 - 2**-52, 1)],  # the one before
         [(1 / 3, 1), (0.75, -1)],
     ],
 )
@@ -70,7 +68,7 @@ def test_a_jump_costs_a_search():
 @pytest.mark.parametrize("integrator", METHODS)
 def test_flexible_arm_that_is_switched_on(integrator):
     """All forces at every output, at jumps in several places between outputs."""
-    for t in np.random.default_rng(13).uniform(0.2, 0.8, 5):
+    for t in np.random.default_rng(13).uniform(0.2, 0.8, 2):
         model = arm(trajectory=[], load=[{"joint": "O", "moment": f"where(t > {float(t)!r}, 20, 0)"}])
         exact = free_run(model, tolerance=1e-10, integrator="dop853")
         outcome = free_run(model, tolerance=1e-7, integrator=integrator)

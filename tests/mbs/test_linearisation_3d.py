@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from moving_trees import moving
 from random_mechanisms import TYPES
-from rotations import logarithm
 
-from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import StateFunction
 from ffrobot.mbs.model.model import row_values
@@ -114,47 +112,3 @@ def test_the_motion_itself_is_one_of_the_motions_beside_it(joint, loops):
     terms = [found.M @ jerk, found.D @ (signs * a[s]), found.K @ (signs * v[s])]
     np.testing.assert_allclose(sum(terms), 0, atol=1e-9 * max(np.abs(term).max() for term in terms))
     np.testing.assert_allclose(found.force, 0, atol=1e-9 * max(1.0, np.abs(found.M @ a[s]).max()))
-
-
-@pytest.mark.parametrize("types", [["free", "revolute"], ["spherical", "universal"], ["free"], ["revolute"] * 3])
-def test_motions_beside_a_motion(types):
-    """Of two motions that begin beside each other, orientations among them, along the body's own axes."""
-    rng = np.random.default_rng(len(types))
-    motion, system = moving(rng, types, ("beam",))
-    tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
-    linearisation = LinearEquations(motion.model, q)
-    found = linearisation.at(0.0, q, v, motion.a[0])
-    s, h, epsilon = linearisation.independent, 2e-4, 3e-5
-    signs = found.transformation[s].diagonal()
-    ds, ds_dot = rng.standard_normal((2, len(s)))
-    dq, dv = found.transformation @ ds, found.transformation @ ds_dot + found.transformation_rate @ ds
-    times = h * np.arange(7)
-    controls = _core.IntegrationControls(
-        tolerance=1e-13, max_steps=100000, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=1.0
-    )
-
-    def states(size):
-        start = tree.integrate(q, size * dq), v + size * dv
-        run = _core.tree_motion(system.core, system.scene, list(times), *start, controls, lambda t: True)
-        return run.states[:, : tree.n_q]
-
-    beside = [states(size) for size in (epsilon, -epsilon)]
-    path = np.array([_difference(tree, one, other)[s] for one, other in zip(*beside, strict=True)]) / (2 * epsilon)
-    derivatives = np.polyfit(times / h, signs * path, 6)
-    np.testing.assert_allclose(derivatives[-2] / h, ds_dot, rtol=0, atol=1e-6 * np.abs(ds_dot).max())
-    expected = -np.linalg.solve(found.M, found.D @ ds_dot + found.K @ ds)
-    np.testing.assert_allclose(2 * derivatives[-3] / h**2, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
-
-
-def _difference(tree, q1, q0):
-    """Increment along v from q0 to q1, both beside each other."""
-    found = np.zeros(tree.n_v)
-    for node in tree.nodes:
-        found[node.p_v] = q1[node.p_q] - q0[node.p_q]
-        own, straight = (q1[node.q], q0[node.q]), max(0, node.joint.q_count - 4)
-        if node.joint.q_count == node.joint.freedoms:
-            found[node.v] = own[0] - own[1]
-            continue
-        R1, R0 = (of_quaternion(x[straight:]) for x in own)
-        found[node.v] = np.concatenate([own[0][:straight] - own[1][:straight], logarithm(R0.T @ R1)])
-    return found

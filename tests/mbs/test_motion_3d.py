@@ -6,7 +6,7 @@ from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
 
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.quantities.motion import RobotMotion, continuous
+from ffrobot.mbs.quantities.motion import RobotMotion
 from ffrobot.run.bodies import load_bodies
 
 CLOSE = 2e-9  # of the peak: the digits in which two step sizes of the numbers agree
@@ -46,10 +46,3 @@ def test_motors_between_frames(name):
     for body, values in motion.motor_forces.modal.items():
         if values.shape[1]:
             close(values, [sample["bodies"][body]["modal_force_frame"] for sample in data["samples"]])
-
-
-def test_quaternions_do_not_jump():
-    angle = np.linspace(0, 4 * np.pi, 50)
-    e = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
-    jumping = e * np.where(e[:, :1] < 0, -1.0, 1.0)
-    np.testing.assert_allclose(continuous(jumping), e, atol=1e-15)

@@ -21,8 +21,8 @@ def arm(folder, **trajectory):
     )
 
 
-@pytest.mark.parametrize("value", [0.1, 0.3, 1.0, 0.001, -0.7, 1e-6])
-@pytest.mark.parametrize("rows", [3, 5, 11, 101, 1001])
+@pytest.mark.parametrize("value", [0.3, -0.7, 1e-6])
+@pytest.mark.parametrize("rows", [3, 101, 1001])
 def test_a_joint_held_by_waypoints_stands_still(tmp_path, value, rows):
     lines = [f"{t:.10g},{value}" for t in np.linspace(0.0, 0.1, rows)]
     (tmp_path / "held.csv").write_text("\n".join(["t,value", *lines]) + "\n", encoding="utf-8")

@@ -6,9 +6,9 @@ from math import inf
 import numpy as np
 import pytest
 
-from ffrobot.mbs.fields.motion_laws import Limits, averaged_step, law_in, law_within, polynomial_law
+from ffrobot.mbs.fields.motion_laws import Limits, law_in, law_within, polynomial_law
 from ffrobot.mbs.fields.paths import RESIDUAL, Legs, impulses, path_of, shaped
-from ffrobot.mbs.fields.piecewise import Piecewise, superposed
+from ffrobot.mbs.fields.piecewise import Piecewise
 
 LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]
 
@@ -67,23 +67,9 @@ def test_s_curve_takes_the_time_of_the_textbook(distance, duration):
     assert law_within(distance, Limits(1.5, 6.0, 50.0), "s-curve", 2).end == pytest.approx(duration, rel=1e-12)
 
 
-def test_s_curve_of_given_duration_has_seven_equal_segments():
-    np.testing.assert_allclose(law_in(7.0, "s-curve", 2).breaks, np.arange(8.0), atol=1e-12)
-
-
 def test_polynomial_of_smoothness_2_is_the_quintic():
     t = np.linspace(0, 1, 31)
     np.testing.assert_allclose(polynomial_law(2).sample(t)[:, 0], t**3 * (10 - 15 * t + 6 * t**2), atol=1e-15)
-
-
-def test_averaged_step_is_the_moving_average_of_the_one_before():
-    """Against a running mean of samples."""
-    T, dt = np.array([0.4, 0.25, 0.1]), 1e-4
-    t = np.arange(-0.5, 1.5, dt)
-    before, after = (averaged_step(times).sample(t)[:, 0] for times in (T[:2], T))
-    window = round(T[2] / dt)
-    mean = np.convolve(before, np.ones(window) / window)[: len(t)]
-    np.testing.assert_allclose(after[window:], mean[window:], atol=2 * dt)
 
 
 def test_path_stops_at_its_places_and_holds_there():
@@ -116,24 +102,6 @@ def test_blended_corner_stays_within_its_triangle_and_the_limits():
     peaks = [np.linalg.norm(passing.sample(over(passing, 20001), k), axis=1).max() for k in (1, 2, 3)]
     ratios = np.array(peaks) / limits.by_order
     assert ratios.max() == pytest.approx(1.0, abs=1e-3)  # found by sampling
-
-
-def test_stretch_is_of_legs_not_of_holds():
-    one, two = (path_of(legs([[0], [1], [0]], holds=(0.5,), stretch=stretch)) for stretch in (1.0, 2.0))
-    assert (one.end, two.end) == (pytest.approx(2.5), pytest.approx(4.5))
-
-
-def test_superposition_is_the_sum():
-    generator = np.random.default_rng(3)
-    motions = []
-    for _ in range(4):
-        breaks = np.cumsum(generator.uniform(0.1, 0.5, 4))
-        motions.append(Piecewise(breaks, generator.normal(size=(3, generator.integers(1, 6), 2))))
-    weights = [0.3, -1.0, 2.0, 0.5]
-    total, t = superposed(motions, weights), np.linspace(-0.2, 2.5, 997)
-    for order in (0, 1, 2):
-        expected = sum(w * m.sample(t, order) for w, m in zip(weights, motions, strict=True))
-        np.testing.assert_allclose(total.sample(t, order), expected, atol=1e-10)
 
 
 def residual(sequence, frequency, damping_ratio):

@@ -51,7 +51,7 @@ def motor(results):
 
 
 @pytest.mark.parametrize("kind", ["pcid", "fcid"])
-@pytest.mark.parametrize("step", [0.5, 0.1, 0.01])
+@pytest.mark.parametrize("step", [0.5, 0.01])
 def test_a_quintic_has_its_closed_form_at_any_output_step(kind, step):
     """τ = J θ̈ at most 10/√3 J/T², at (3 − √3)/6 T; θ̇ 15/8; RMS of θ̈ over the run √(120/7)."""
     found = motor(solve(rod({"via": [0.0, 1.0], "duration": 1.0, "smoothness": 2}, step, kind)))
@@ -89,7 +89,7 @@ def test_peaks_of_a_ringing_arm_are_those_of_a_hundred_times_as_many_outputs(spa
     moment = np.abs(fine["inverse/joints/O/moment"])
     power = np.abs(fine["inverse/joints/O/moment"] * fine["inverse/joints/O/rate"])
     deflection = np.linalg.norm(fine["inverse/points/arm.tip/deflection"], axis=1)
-    for step in (0.5, 0.25, 0.05):
+    for step in (0.5, 0.05):
         results = solve(flexible(step, space))
         one, found = results.verdict["inverse"], motor(results)
         assert not one.feasible
@@ -100,18 +100,6 @@ def test_peaks_of_a_ringing_arm_are_those_of_a_hundred_times_as_many_outputs(spa
         assert one.deflection[0] == pytest.approx(deflection.max(), rel=1e-5)
         peak = results.attributes("inverse/joints/O/moment")["peak"]
         assert peak == found.moment > np.abs(results["inverse/joints/O/moment"]).max() * 1.02
-
-
-@pytest.mark.parametrize("space", [False, True], ids=["2D", "3D"])
-def test_a_resumed_run_may_end_before_its_next_output(tmp_path, space):
-    scene, results = flexible(0.5, space), tmp_path / "arm.results.h5"
-    scene["analysis"][0] |= {"max_steps": 30}
-    ends = []
-    for resume in (False, True):
-        with pytest.raises(ffrobot.SolveError, match="too many steps") as caught:
-            ffrobot.solve(ffrobot.make_scene(**scene), results, resume=resume)
-        ends.append(float(str(caught.value).partition("ended at t = ")[2].partition(" s")[0]))
-    assert 0.0 < ends[0] < ends[1] < 0.5
 
 
 def test_looking_between_outputs_leaves_the_outputs_as_they_are():

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_chains import closed_chain
 from moving_trees import SMALL, moving
 from prescribed_oracle import Motor, prescribed_motion, split
 from random_mechanisms import TYPES
@@ -20,7 +19,6 @@ from ffrobot.mbs.model.rows import ConstraintRow
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.model.tree import Section
 from ffrobot.mbs.scene.loads import Load
-from ffrobot.mbs.solve.servo import Servo
 
 TIMES = np.array([0.0, 0.01, 0.01, 0.05])
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -154,7 +152,7 @@ CASES += [(["revolute"] * 6, 1, 0), (["revolute", "prismatic", "spherical", "rev
 
 
 @pytest.mark.parametrize(("types", "loops", "count_more"), CASES, ids=str)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_core_finds_the_motion_and_forces_of_numpy(seed, types, loops, count_more):
     model, motors, modes, near = drawn(seed, types, loops, count_more)
     driven = in_core(model, motors)
@@ -233,21 +231,6 @@ def test_motion_ends_where_a_path_leaves_the_reach():
     np.testing.assert_allclose(apart[2], one_by_one[0], atol=1e-13)
 
 
-@pytest.mark.parametrize(("types", "loops"), [(["revolute"] * 3, 0), (["revolute"] * 6, 1), (["spherical"] * 2, 0)])
-def test_forces_of_paths_are_split_as_in_numpy(types, loops):
-    """−C_sᵀλ_s of any multipliers, and of any generalized forces what motors and loops leave."""
-    model, motors, modes, near = drawn(5, types, loops, count_more=1)
-    driven, expected = in_core(model, motors), prescribed_motion(model, modes, TIMES, near)
-    rng = np.random.default_rng(0)
-    multipliers, wanted = (rng.standard_normal((len(TIMES), k)) for k in (len(model.rows), model.tree.n_v))
-    of_paths = -np.einsum("tij,ti->tj", expected.C_v[:, ~model.loop_rows], multipliers[:, ~model.loop_rows])
-    found = driven.path_forces(TIMES.tolist(), expected.q, multipliers)
-    np.testing.assert_allclose(found, of_paths, rtol=0, atol=1e-12 * np.abs(of_paths).max())
-    tau, loads, left = split(model, expected._replace(required=wanted), motors)
-    for x, y in zip(driven.split(expected.q, wanted), (tau, left, loads), strict=True):
-        np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))
-
-
 def with_friction(model):
     """In all joints that have one coordinate."""
     friction, tree = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5}, copy.copy(model.tree)
@@ -301,30 +284,3 @@ def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops,
         for rows in (slice(0, n), slice(n, None)):
             largest = np.abs(by_differences[rows]).max()
             np.testing.assert_allclose(exact[rows], by_differences[rows], rtol=0, atol=1e-8 * largest)
-
-
-@pytest.mark.parametrize("cut", ["j2", "j4"])
-def test_motors_of_planar_joints_in_loops_go_with_the_redefined_output(cut):
-    """Their coordinates are those on the path with a share of the deflections; loops stay closed."""
-    rng, factor = np.random.default_rng(4), 0.6
-    chain = closed_chain(rng, ("planar", "universal", "cylindrical", "universal"), ("beam",), size=SMALL)
-    chain.tables["j1"]["motor"] = True
-    model = chain.model(cut)
-    q = chain.position(model)
-    model = following(rng, model, q)
-    near, tree = np.tile(q, (len(TIMES), 1)), model.tree
-    modal = np.concatenate([np.r_[node.p_q] for node in tree.nodes]).astype(int)
-    modes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None] * rng.standard_normal((3, len(TIMES), len(modal)))
-    modes[0] += q[modal]
-    servo = Servo(model, 1.0, factor, TIMES, near, "", lambda: True)
-    found, on_path = servo.motion.motion(TIMES, *modes, near), prescribed_motion(model, factor * modes, TIMES, near)
-    node = tree.nodes[tree.carried["j1"]]
-    assert len(model.motors["j1"]) == 3
-    for name, columns in (("q", node.q), ("v", node.v), ("a", node.v)):
-        expected = getattr(on_path, name)[:, columns]
-        np.testing.assert_allclose(getattr(found, name)[:, columns], expected, atol=1e-10 * np.abs(expected).max())
-    np.testing.assert_allclose(found.q[:, modal], modes[0], atol=1e-14)
-    C, C_v = row_values(model, found.q, TIMES)
-    assert np.abs(C[:, model.loop_rows]).max() < 1e-10
-    assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, model.loop_rows]).max() < 1e-9
-    assert np.abs(found.q - on_path.q).max() > 1e-3

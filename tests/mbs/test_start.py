@@ -43,12 +43,6 @@ def test_paths_take_all_freedom(name, freedom):
     assert list(check_path(model, undeformed_posture(model).q, 1.0)) == []
 
 
-def test_loops_are_cut_at_the_spherical_joint():
-    model = model_of("slider_crank_3d")
-    assert [joint.name for joint in model.tree.loops] == ["rod_tip"]
-    assert [row.kind for row in model.rows] == ["point"] * 4
-
-
 @pytest.mark.parametrize(
     ("of_joints", "cut"),
     [

@@ -7,7 +7,7 @@ import pytest
 
 from ffrobot.fe_models.modal_body import StressPoint
 from ffrobot.mbs.quantities import stress
-from ffrobot.mbs.quantities.stress import body_stress, has_stresses, mode_displacement, von_mises
+from ffrobot.mbs.quantities.stress import body_stress, mode_displacement, von_mises
 
 
 def textbook(s):
@@ -44,19 +44,6 @@ def part(points=(), surface=0, modes=4):
 P = np.random.default_rng(2).normal(size=(23, 4))
 
 
-def test_points():
-    body = part(["a", "b"])
-    found = body_stress(body, mode_displacement(P))
-    assert found.surface is None
-    for name, point in found.points.items():
-        for t in range(len(P)):
-            expected = body.stress[name].stress @ P[t]
-            np.testing.assert_allclose(point.stress[t], expected, rtol=1e-13)
-            assert point.von_mises[t] == pytest.approx(textbook(expected))
-    value, k, name = found.largest()
-    assert value == max(found.points[n].von_mises.max() for n in ("a", "b")) == found.points[name].von_mises[k]
-
-
 @pytest.mark.parametrize("chunk", [1.0, 1e3, 1e9])
 def test_surface_whatever_the_chunks(chunk, monkeypatch):
     monkeypatch.setattr(stress, "CHUNK_BYTES", chunk)
@@ -66,9 +53,3 @@ def test_surface_whatever_the_chunks(chunk, monkeypatch):
         everywhere = [textbook(modal @ P[t]) for modal in body.surface_stress]
         assert surface.von_mises_max[t] == pytest.approx(max(everywhere))
         np.testing.assert_array_equal(surface.position_of_max[t], body.mesh.points[np.argmax(everywhere)])
-
-
-def test_nothing_asked_for_is_nothing_known():
-    assert not has_stresses(part())
-    assert has_stresses(part(["a"]))
-    assert has_stresses(part(surface=3))

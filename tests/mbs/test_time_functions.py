@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs._core import Op, TimeFunction
+from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.fields.expressions import ExpressionError, parse_expression
 from ffrobot.mbs.fields.functions import check_domain
 from ffrobot.mbs.fields.waypoints import load_waypoints
@@ -130,12 +130,6 @@ def test_units_are_factors():
     assert parse_expression("750*mm*t")(2.0)[:2] == pytest.approx((1.5, 0.75), rel=1e-15)
 
 
-def test_sample_is_the_call_at_each_time():
-    function = parse_expression("exp(sin(t))")
-    times = np.linspace(0, 2, 7)
-    np.testing.assert_array_equal(function.sample(times), np.array([function(t) for t in times]).T)
-
-
 BAD_EXPRESSIONS = [
     ("", 1, "empty"),
     ("t +", None, "syntax"),
@@ -194,31 +188,6 @@ def test_everything_else_is_refused_at_once(text, position, says):
     assert len(str(caught.value)) < 400
 
 
-def test_long_sums_are_not_deep():
-    text = "+".join(f"{k}*t" for k in range(400))
-    assert parse_expression(text)(1.0) == pytest.approx((400 * 399 / 2, 400 * 399 / 2, 0.0))
-
-
-def test_line_breaks_are_blanks():
-    assert parse_expression("\n t +\n 1\n")(2.0)[0] == 3.0
-
-
-@pytest.mark.parametrize(
-    ("ops", "constants"),
-    [([], []), ([Op.add], []), ([Op.time, Op.time], []), ([Op.constant], []), ([Op.time], [1.0]), ([Op.time] * 65, [])],
-)
-def test_core_refuses_malformed_programs(ops, constants):
-    with pytest.raises(ValueError, match="expression"):
-        TimeFunction.expression(ops, constants)
-
-
-def test_core_refuses_malformed_polynomials():
-    one = np.ones((1, 1))
-    for breaks, coefficients in [([0.0], np.ones((0, 1))), ([1.0, 0.0], one), ([0.0, 1.0], one * np.nan)]:
-        with pytest.raises(ValueError, match="polynomial"):
-            TimeFunction.polynomial(np.array(breaks), coefficients)
-
-
 def test_polynomial_pieces_and_range():
     # t² on [0, 1], then 1 + 2s + 3s² with s = t − 1.
     function = TimeFunction.polynomial(np.array([0.0, 1.0, 3.0]), np.array([[1.0, 0.0, 0.0], [3.0, 2.0, 1.0]]))
@@ -247,16 +216,6 @@ def test_waypoints_reproduce_a_quintic_at_rest_at_both_ends(tmp_path):
     np.testing.assert_allclose(x.sample(t), exact, atol=1e-9)
     np.testing.assert_allclose(y.sample(t), [2 + 0 * t, 0 * t, 0 * t], atol=1e-9)
     np.testing.assert_allclose([x(-0.5), x(1.5)], [[0, 0, 0], [1, 0, 0]], atol=1e-12)  # held before and after
-
-
-def test_waypoints_pass_through_and_are_smooth(tmp_path):
-    times, values = [0.0, 0.3, 0.7, 1.0, 2.0], [0.0, 1.0, -1.0, 0.5, 0.0]
-    rows = "".join(f"{t},{v}\n" for t, v in zip(times, values, strict=True))
-    (function,) = load_waypoints(write(tmp_path / "path.csv", "t,value\n" + rows)).spline().functions()
-    np.testing.assert_allclose(function.sample(np.array(times))[0], values, atol=1e-12)
-    for inner in times[1:-1]:
-        np.testing.assert_allclose(function(inner - 1e-9), function(inner + 1e-9), atol=1e-4)
-    np.testing.assert_allclose([function(0.0)[1:], function(2.0)[1:]], 0.0, atol=1e-9)
 
 
 def test_rows_that_repeat_are_a_hold(tmp_path):
@@ -291,11 +250,6 @@ def test_bad_waypoints_name_file_and_line(tmp_path, text, says):
     with pytest.raises(InputError, match=says) as caught:
         load_waypoints(write(tmp_path / "path.csv", text))
     assert "path.csv" in str(caught.value)
-
-
-def test_missing_waypoints(tmp_path):
-    with pytest.raises(InputError, match="not found"):
-        load_waypoints(tmp_path / "none.csv")
 
 
 def test_check_domain_names_the_first_bad_time():

@@ -8,8 +8,6 @@ from scipy.spatial.transform import Rotation
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.body import bent_section
-from ffrobot.mbs.solve.poses import PoseEvaluator
-from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
 RPY = (0.4, -0.7, 1.1)
@@ -127,16 +125,6 @@ def test_compliance_at_a_tool_beyond_the_tip():
     np.testing.assert_allclose(found, own @ C @ own.T, rtol=1e-8, atol=1e-14)
 
 
-def test_a_map_and_static_have_one_compliance_at_a_tool():
-    scene = strip(gravity=[0.0, -9.81])
-    with solve(scene) as results:
-        static = results["rest/joints_locked/compliance/strip.nose"][0]
-    model = prepare_scene(scene).model
-    pose = PoseEvaluator(model, q := undeformed_posture(model).q, "strip.nose", count=2, omega=np.zeros(0)).at(q)
-    np.testing.assert_allclose(pose["joints_locked/compliance"], static, rtol=1e-7, atol=1e-14)
-    np.testing.assert_allclose(pose["place"], (LENGTH + BEYOND) * np.array([np.cos(0.4), np.sin(0.4)]), rtol=1e-12)
-
-
 @pytest.mark.parametrize("arm", [(0.0, 0.0, 0.2), (0.1, -0.05, 0.15)])
 def test_the_bent_place_of_a_tool_is_exact_to_second_order(arm):
     """With geometric stiffening, u = u_tip + exp(φ~) d but for terms of third order: an eighth of half the bending."""
@@ -155,21 +143,6 @@ def test_the_bent_place_of_a_tool_is_exact_to_second_order(arm):
         tip, nose = (bent_section(body, name, size * p) for name in ("tip", "nose"))
         off.append(np.linalg.norm(nose.u - tip.u - Rotation.from_rotvec(tip.phi).apply(arm)))
     assert off[1] < 0.14 * off[0]
-
-
-def test_a_tool_on_a_link_in_pieces():
-    """Where the tip is, in the same axes."""
-    paths = {"trajectory": [{"name": "swing", "joint": "hub", "value": "0.4 + 0.2*t**3"}],
-             "analysis": [{"name": "move", "kind": "pcid", "end": 0.2, "output_step": 0.02}]}  # fmt: skip
-    places = []
-    for pieces in (None, 3):
-        more = {} if pieces is None else {"pieces": pieces}
-        body = {"name": "strip", "link": link(), **more}
-        path = {"name": "tool", "point": "strip.nose", "y": "0.33 + 0.1*t**3"}
-        with solve(strip(body=[body], **(paths | {"trajectory": [path]}))) as results:
-            places.append(results["move/points/strip.nose/position"])
-    np.testing.assert_allclose(places[0], places[1], atol=1e-5)
-    np.testing.assert_allclose(places[1][:, 1], 0.33 + 0.1 * np.linspace(0, 0.2, 11) ** 3, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.stable_inversion import invert
 from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, track
-from ffrobot.mbs.solve.tracking_intervals import SETTLED, graded, settled, start_breaks
+from ffrobot.mbs.solve.tracking_intervals import SETTLED, graded, settled
 from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
@@ -177,10 +177,6 @@ def test_bounds_of_zeros():
     assert found.voltages.max() == pytest.approx(200.90, abs=1e-2)
     assert found.zeros[found.voltages.argmax()].real == pytest.approx(-64.405, abs=1e-3)
     assert found.voltages.max() < 200.0 * track(problem, graded(0.0, 0.5, 64)).share
-    servo, Phi_V = arm(4, 10, 1.0)
-    problem = asked_of_arm(servo, Phi_V, "least-voltage", 200.0, is_free=True)
-    found = bounds_of_zeros(servo, problem, linearise(servo, 1.0), (0.0, 0.0), np.full(20, 200.0))
-    assert found.voltages.max() == pytest.approx(4.310, abs=1e-3)
 
 
 def test_prices_of_limits():
@@ -198,16 +194,6 @@ def test_prices_of_limits():
     assert min(prices[0].min(), costs[2] - costs[1], costs[4] - costs[3]) >= 0
 
 
-def test_a_path_that_is_slowed_down():
-    """Twice the time: the values of the path, half its rates, and zeros that belong to its time."""
-    servo, _ = strip(2, 0.8)
-    slower, times = servo.slowed(2.0), np.linspace(0.0, 0.8, 57)
-    (old,), (new,) = list(servo.targets()), [row.target for row in slower.model.rows if row.target is not None]
-    for k, (a, b) in enumerate(zip(old.function.sample(times), new.sample(2 * times), strict=True)):
-        assert np.abs(b - a / 2**k).max() < 1e-9 * np.abs(a).max()
-    assert slower.end == pytest.approx(1.6)
-
-
 SLOWEST = 65.0  # 1/s, of the strip's zeros: −64.405 and 67.248
 
 
@@ -222,18 +208,6 @@ def test_least_voltage_settles():
     assert 32 < len(found.voltage.x) < 100
     assert found.share < first.share
     assert 200.0 * found.share * (1 - found.doubt) < 53.6848 < 200.0 * found.share
-    assert found.doubt < 3 * SETTLED
-
-
-def test_doubt_of_the_least_voltage():
-    """A mesh three times as fine, without the effort's share: within the doubt."""
-    T = 0.6
-    servo, Phi_V = strip(3, T)
-    problem = replace(asked(servo, Phi_V, (0.0, T), "least-voltage", 200.0), rate=SLOWEST)
-    found = settled(problem, graded(0.0, T, 32), lambda: True)
-    finest = track(problem, graded(0.0, T, 200))
-    assert finest.converged
-    assert found.share * (1 - found.doubt) < finest.share < found.share
     assert found.doubt < 3 * SETTLED
 
 
@@ -272,15 +246,6 @@ def test_prescribed_shape_is_feasible(count, by_shape, least):
     assert 200.0 * share < V_max / 3
 
 
-def test_least_voltage_of_many_motions():
-    """Section 3, T = 0.5 s with 10 ms before and after: 146 V. V(t) is not unique there, and steps would wander."""
-    servo, Phi_V = strip(4, 0.5)
-    problem = asked(servo, Phi_V, (-0.01, 0.51), "least-voltage", 200.0, is_free=True)
-    found = track(problem, start_breaks(-0.01, 0.5, 0.51, 64))
-    assert found.converged
-    assert 200.0 * found.share == pytest.approx(146.0, rel=1e-2)
-
-
 def test_least_effort():
     """Checkpoint 3, at 140 intervals."""
     servo, Phi_V = strip(4, 0.7)
@@ -312,21 +277,3 @@ def test_without_voltage_motors_alone_carry():
     torques = [servo.forces(times, *(curve(times, k) for k in range(3)))[1] for curve in (found.curve, inverted.curve)]
     assert np.abs(torques[0] - torques[1]).max() < 1e-9  # other collocation points: falls with the mesh's tolerance
     assert np.abs(found.voltage(breaks)).max() < 1e-6
-
-
-def test_slopes_of_torques():
-    """Dual numbers against differences, in which r is linear in p̈ and quadratic in ṗ."""
-    servo, _ = strip(3, 0.8)
-    rng = np.random.default_rng(0)
-    times = np.array([0.1, 0.4, 0.7])
-    p, v, a = (size * rng.standard_normal((3, 3)) for size in (1e-3, 1e-2, 1.0))
-    h = 1e-6
-    for k, slope in zip((2, 1, 0), servo.slopes(times, p, v, a), strict=True):
-        for mode in range(3):
-            moved = []
-            for sign in (1, -1):
-                state = [p.copy(), v.copy(), a.copy()]
-                state[k][:, mode] += sign * h
-                moved.append(np.concatenate(servo.forces(times, *state), axis=1))
-            expected = (moved[0] - moved[1]) / (2 * h)
-            assert np.abs(slope[:, :, mode] - expected).max() < 1e-6 * max(1.0, np.abs(slope).max())

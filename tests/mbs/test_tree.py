@@ -54,7 +54,7 @@ def test_jacobians_by_differences(turned):
 
 def test_rows_of_loops_hold_where_the_oracle_has_them():
     """Joints that close loops are where they happen to be: their rows are zero, and as many as the oracle has."""
-    for seed in range(8):
+    for seed in range(3):
         tree = random_tree(np.random.default_rng(seed), ["revolute", "spherical", "cylindrical"], loops=2)
         if any(joint.type == "screw" for joint in tree.loops):
             continue

@@ -41,18 +41,6 @@ def zero_shape():
     return Fcid(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01)
 
 
-def test_steep_but_smooth():
-    inverse(moved("1.2+0.05*tanh((t-0.5037)/1e-3)"), tolerance=1e-4).check_completed()
-
-
-def test_waypoints_with_a_corner(tmp_path):
-    """The spline through them rounds it off."""
-    (tmp_path / "path.csv").write_text("t,x,y\n0,1.2,0.9\n0.5,1.4,0.9\n1,1.4,0.7\n")
-    path = {"name": "tip", "point": "link2.tip", "waypoints": str(tmp_path / "path.csv")}
-    model = arm(trajectory=[path], initial={"angles": {"link1": -0.2, "link2": 1.4}})
-    inverse(model, tolerance=1e-5).check_completed()
-
-
 @pytest.mark.parametrize(
     ("moment", "says"),
     [("1/(0.5-t)", ""), ("sqrt(0.5-t)", 'load on "O", moment, has no finite value'), ("exp(exp(20*t))", "")],

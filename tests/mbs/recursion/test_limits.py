@@ -99,16 +99,6 @@ def test_an_excursion_within_one_step(method):
     assert least == pytest.approx(-START, abs=tolerance * START)
 
 
-def test_where_the_integrator_changes():
-    system, start = pendulum([-1.0, 1.3])
-    kinds = _core.MethodKind
-    methods = [(kinds.dopri5, 1.0, 0.0), (kinds.radau, 1.0, 1e9)]  # the second is taken for much faster
-    settings = _core.IntegrationControls(tolerance=1e-11, max_steps=0, methods=methods, spectral_radius=0.8)
-    found = run(system, start, [0.0, PERIOD], settings)
-    assert found.changes
-    np.testing.assert_allclose(seen(system, found)["pin", 0], (-START, START, time_at(-1.0)), rtol=0, atol=1e-8)
-
-
 def test_under_a_sampled_controller():
     """One that does nothing, but has steps end at its samples."""
     system, start = pendulum([-1.0, 1.3])
@@ -168,20 +158,6 @@ def test_both_coordinates_of_a_universal_joint(backwards):
         np.testing.assert_allclose(found["cross", number], expected, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("backwards", [False, True])
-def test_entries_of_a_cylindrical_joint(backwards):
-    """The core has the way first; it moves the other way where the joint leads backwards."""
-    between = ["a.top", "ground"] if backwards else ["ground", "a.top"]
-    joint = {"name": "c", "type": "cylindrical", "between": between, "axis": [0.0, 0.0, 1.0],
-             "position_limit": [[-1.0, 2.0], [-3.0, 4.0]]}  # fmt: skip
-    system, _ = system_of([joint], ["a"])
-    found = [(one.number, one.v, one.limits) for one in watched(system.model.tree)]
-    expected = [(0, 1, (-2.0, 1.0)), (1, 0, (-4.0, 3.0))] if backwards else [(0, 1, (-1.0, 2.0)), (1, 0, (-3.0, 4.0))]
-    assert found == expected
-    one = watched(system.model.tree)[0]
-    assert one.seen((0.5, 2.5, 0.1)) == ((-2.5, -0.5, 0.1) if backwards else (0.5, 2.5, 0.1))
-
-
 def test_beside_orientations():
     """A pendulum on a body that tumbles: steps are made in local coordinates about each other centre."""
     joints = [
@@ -229,15 +205,3 @@ def test_a_run_that_goes_on_has_seen_the_same(method):
     assert len(parts) > 2
     assert parts[-1].ranges == whole.ranges
     np.testing.assert_array_equal(checkpoint.ranges[::4], [least for least, *_ in whole.ranges])
-
-
-def test_what_is_refused():
-    system, start = pendulum([-1.0, 1.3])
-    checkpoint = _core.TreeCheckpoint()
-    run(system, start, [0.0, 1.0], controls(max_steps=3), checkpoint)
-    with pytest.raises(ValueError, match="ranges of coordinates"):
-        run(system, start, [0.0, 1.0], controls(), checkpoint, is_watched=False)
-    core, scene, _ = system.integrated
-    scene.add_limit(1, 0.0, 1.0)
-    with pytest.raises(ValueError, match="coordinate of a limit"):
-        _core.tree_motion(core, scene, [0.0, 1.0], start.q, start.v, controls(), lambda _: True)

@@ -4,11 +4,8 @@ N x + C_qᵀν = r, C_q x = c with N = M + E: M from forces that accelerations r
 of rows, and one factorization of all.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from closed_chains import COUNT, FRICTION, closed_chain
 from points_3d import Body, J, Mechanism, r
 from random_bodies import GRAVITY, ground, random_body, random_state, random_tree, row, rows_of_every_kind
 from trees_in_a_plane import planar_model
@@ -113,45 +110,6 @@ def test_rotors(clamped):
         random_body(rng, 3, J.revolute, clamped, parent=1, parent_marker=2),
     ]
     check_mechanism(Mechanism([Geared(**vars(body)) for body in bodies], ground(rng), GRAVITY), rng)
-
-
-@pytest.mark.parametrize(
-    ("types", "kinds"),
-    [(("revolute", "universal", "cylindrical", "universal"), ("rigid",)), (("revolute", "cylindrical"), ("beam",))],
-)
-def test_friction_where_a_loop_is_cut(types, kinds):
-    """What it takes at unit rates is what motion requires with it and without; forces on modes alone."""
-    rng = np.random.default_rng(1)
-    chain = closed_chain(rng, types, kinds)
-    rough, smooth = (with_friction(chain, viscous) for viscous in (0.4, 0.0))
-    q, n = chain.position(rough.model), rough.model.tree.n_v
-    rough.core.keep_independent_rows(q, np.zeros(n))
-    rows = len(rough.row_signs)
-    M, C = mass_and_gradients(rough.core, q, rough.scene)
-    rest = np.zeros(n)
-    of_friction = [
-        required(rough.core, rough.scene, q, unit, rest) - required(smooth.core, smooth.scene, q, unit, rest)
-        for unit in np.eye(n)
-    ]
-    stiffness, damping = np.zeros(n), np.zeros(n)
-    for node in rough.model.tree.nodes:
-        stiffness[node.p_v], damping[node.p_v] = node.body.stiffness, np.diag(node.body.damping)
-    force, c = (stiffness > 0) * rng.standard_normal(n), rng.standard_normal(rows)
-    force[0] = 1.0  # along a joint of the tree
-    for of_damping, of_stiffness in FACTORS[:2]:
-        N = M + of_damping * (np.diag(damping) + np.array(of_friction).T) + of_stiffness * np.diag(stiffness)
-        r = np.append(force, np.zeros(COUNT[types[-1]]))
-        found = _core.tree_newton_step(rough.core, rough.scene, 0.0, q, rest, of_damping, of_stiffness, r, c)
-        agree(found, N, C, force, c)
-
-
-def with_friction(chain, viscous):
-    """Cut at its last joint, with viscous friction alone, the same in all joints."""
-    tables = {
-        name: {key: value for key, value in table.items() if key not in FRICTION} | {"viscous_friction": viscous}
-        for name, table in chain.tables.items()
-    }
-    return MultibodySystem(replace(chain, tables=tables).model(list(tables)[-1]))
 
 
 def test_driven_coordinate_in_3d():
