@@ -22,14 +22,8 @@ class PointCloud:
     stiffness: np.ndarray  # (n,)
     damping: np.ndarray  # (n, n)
 
-    def positions(self, q):
-        """Where the points are (k, 3) for q = (R, θ, p); for complex q as well."""
-        u = self.x + self.Phi @ q[3:]
-        c, s = np.cos(q[2]), np.sin(q[2])
-        return np.column_stack([q[0] + c * u[:, 0] - s * u[:, 1], q[1] + s * u[:, 0] + c * u[:, 1], u[:, 2]])
-
     def kinetic_energy(self, q, v):
-        """½ Σ m |ṙ|², with ṙ by the chain rule on `positions`; for complex q as well."""
+        """½ Σ m |ṙ|² for q = (R, θ, p)."""
         u, u_dot = self.x + self.Phi @ q[3:], self.Phi @ v[3:]
         c, s = np.cos(q[2]), np.sin(q[2])
         moved_x, moved_y = u_dot[:, 0] - v[2] * u[:, 1], u_dot[:, 1] + v[2] * u[:, 0]

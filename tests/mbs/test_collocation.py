@@ -1,7 +1,6 @@
 """Gauss collocation of second-order boundary value problems against solutions that are known."""
 
 import numpy as np
-import pytest
 
 from ffrobot.mbs.solve.collocation import Boundary, Problem, collocate
 
@@ -52,36 +51,3 @@ def test_order_at_the_breaks_is_twice_the_number_of_points():
 def test_intervals_need_not_resolve_fast_growing_and_decaying_motions():
     """σh = 1000 in the second component: forward integration would grow by e^40000."""
     assert error_at_breaks(40)[1] < 1e-4
-
-
-def vibration(omega, zeta, state, breaks):
-    """p̈ + 2ζω ṗ + ω² p = 0 from (p, ṗ) at the first break: both at the last."""
-    one = np.array([omega])
-    problem = Problem(
-        lambda t, p, v, a: a + 2 * zeta * omega * v + omega**2 * p,
-        lambda t: (np.full((len(t), 1, 1), x) for x in (1.0, 2 * zeta * omega, omega**2)),
-        one,
-        omega,
-        Boundary(np.eye(2), np.array(state)),
-        Boundary(np.zeros((0, 2)), np.zeros(2)),
-    )
-    found = collocate(problem, breaks, lambda t: (np.zeros((len(t), 1)),) * 3)
-    assert found.converged
-    return found.curve(breaks[-1])[0], found.curve.derivative()(breaks[-1])[0]
-
-
-def pade(z):
-    """The diagonal Padé approximant (4, 4) of e^z, by which a step of Gauss's method multiplies solutions of ẏ = λy."""
-    P = np.polynomial.Polynomial([1, 1 / 2, 3 / 28, 1 / 84, 1 / 1680])
-    return P(z) / P(-z)
-
-
-@pytest.mark.parametrize("zeta", [-0.01, 0.0, 0.01])
-def test_vibrations_grow_or_decay_as_they_do_however_long_the_interval(zeta):
-    """The sides of all zeros stay: |multiplier| < 1 for damped ones, 1 for undamped ones, > 1 for growing ones."""
-    for omega in np.geomspace(0.1, 1e4, 60):
-        columns = [vibration(omega, zeta, [p, omega * v], np.array([0.0, 1.0])) for p, v in np.eye(2)]
-        size = np.abs(np.linalg.eigvals(np.array(columns).T / np.array([[1.0], [omega]])))
-        s = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
-        np.testing.assert_allclose(size, abs(pade(s)), rtol=1e-7)
-        assert np.all(np.sign(np.round(size - 1, 10)) == np.sign(-zeta))

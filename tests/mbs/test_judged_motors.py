@@ -1,14 +1,10 @@
 """Errors of small motor torques are judged by their own size while an arm follows a path."""
 
-from io import StringIO
-
 import numpy as np
 import pytest
-from rich.console import Console
 
 import ffrobot as program
 from ffrobot.mbs.model.motors import motor_forces, path_forces
-from ffrobot.present.feasibility import feasibility_tables
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
@@ -52,8 +48,8 @@ def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
     assert peaks[2] == pytest.approx(largest[2], rel=0.02)
 
 
-def test_inertia_that_a_motor_turns_with_the_other_joints_locked(tmp_path):
-    """Steiner: the shoulder turns both links and the hand, the farthest when they are stretched most; and the ratio."""
+def test_inertia_that_a_motor_turns_with_the_other_joints_locked():
+    """Steiner: the shoulder turns both links and the hand, the farthest when they are stretched most."""
     keys = {"gear_ratio": 50.0, "rotor_inertia": 2e-5}
     scene = make_scene(
         name="arm", gravity=[0.0, -9.81], body=[link("upper", 2.0, 0.5), link("lower", 1.0, 0.4)],
@@ -68,15 +64,3 @@ def test_inertia_that_a_motor_turns_with_the_other_joints_locked(tmp_path):
     shoulder = 2.0 * 0.5**2 / 3 + lower + 1.0 * (0.5**2 + 2 * 0.5 * 0.2 * np.cos(0.5)) + 2e-5  # and the other rotor
     assert motors["e"].load_inertia == pytest.approx(lower, rel=1e-9)
     assert motors["s"].load_inertia == pytest.approx(shoulder, rel=1e-9)
-    results.save(tmp_path / "r.h5")
-    printed = StringIO()
-    Console(file=printed, width=200).print(feasibility_tables(tmp_path / "r.h5", None))
-    lines = printed.getvalue().splitlines()
-    begin = next(k for k, line in enumerate(lines) if "load / rotor inertia" in line)
-    name, ratio, peak, rms, speed, turns, power, inertia = lines[begin + 1].split()
-    motor = motors["s"]
-    expected = (50.0, motor.moment / 50, motor.rms_moment / 50, 50 * motor.speed, 50 * motor.speed * 30 / np.pi,
-                motor.power, shoulder / (2e-5 * 2500))  # fmt: skip
-    found = [float(value) for value in (ratio, peak, rms, speed, turns, power, inertia)]
-    assert name == "s"
-    np.testing.assert_allclose(found, expected, rtol=6e-3)

@@ -2,11 +2,13 @@
 
 import copy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from body_equations import Accelerated, required_forces
 from moving_trees import SMALL, moving
-from prescribed_oracle import Motor, prescribed_motion, split
+from prescribed_oracle import Motor, row_accelerations, unmet
 from random_mechanisms import TYPES
 from rotations import random_rotation
 from scipy.linalg import qr
@@ -14,7 +16,7 @@ from scipy.linalg import qr
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.model.drives import Command, Drive
-from ffrobot.mbs.model.model import row_values
+from ffrobot.mbs.model.model import row_values, target_rates
 from ffrobot.mbs.model.rows import ConstraintRow
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.model.tree import Section
@@ -116,25 +118,35 @@ def drawn(seed, types, loops=0, count_more=0, pool=lambda *_: ()):
             break  # loops that rigid links can close, too
     motors = motors_of(rng, motion.model, q)
     model = following(rng, motion.model, q, count_more, tuple(pool(rng, motion.model)))
-    modal = np.concatenate([np.r_[node.p_q] for node in model.tree.nodes]).astype(int)
+    modal = modal_columns(model.tree)
     sizes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None]
     modes = sizes * rng.standard_normal((3, len(TIMES), len(modal)))
     modes[0] += q[modal]
     return model, motors, modes, np.tile(q, (len(TIMES), 1))
 
 
-def check(found, expected, model, motors):
-    """Agreement of all that the core finds, relative to the largest; rounding grows with the condition of C_J."""
-    C_J = expected.C_v[:, :, model.tree.joint_columns]
-    values = np.linalg.svd(C_J, compute_uv=False)
-    grows = max(1.0, 0.1 * (values[:, :1] / np.where(values > 1e-9 * values[:, :1], values, values[:, :1])).max())
-    tau, loops, left = split(model, expected, motors)
-    pairs = {name: (getattr(found, name), getattr(expected, name)) for name in ("q", "v", "a", "required")}
-    pairs |= {"multipliers": (found.multipliers, expected.multipliers), "loops": (found.loops, loops)}
-    pairs |= {"tau": (found.tau, tau), "left": (found.left, left)}
-    for name, (x, y) in pairs.items():
-        tolerance = 1e-12 * grows * max(1.0, np.abs(y).max(initial=0.0))
-        np.testing.assert_allclose(x, y, rtol=0, atol=tolerance, err_msg=name)
+def check(found, model, motors, modes):
+    """Modes move as told; rows, d'Alembert's principle and the motors' share of forces hold as they do in NumPy."""
+    tree, joints = model.tree, model.tree.joint_columns
+    state = Accelerated(tree, found.q, found.v, found.a, tree.frames(found.q))
+    C, C_v = row_values(model, found.q, TIMES)
+    required, of_rows = required_forces(model, state, TIMES), np.einsum("tji,tj->ti", C_v, found.multipliers)
+    for p, told in zip((found.q[:, modal_columns(tree)], found.v[:, ~joints], found.a[:, ~joints]), modes, strict=True):
+        np.testing.assert_array_equal(p, told)
+    rates = np.einsum("tij,tj->ti", C_v, found.v) - target_rates(model, found.q, TIMES)
+    fast, faster = 1 + np.abs(found.v).max(), 1 + np.abs(found.a).max() + np.abs(found.v).max() ** 2
+    forces = max(np.abs(x).max(initial=0.0) for x in (required, of_rows, found.loops, found.tau))
+    for left, size in (
+        (C, 1.0), (rates, fast), (row_accelerations(model, state, TIMES), faster), (found.required - required, forces),
+        ((required + of_rows)[:, joints], forces), (found.left - unmet(model, found, motors), forces),
+        (found.left[:, joints], forces),
+    ):  # fmt: skip
+        np.testing.assert_allclose(left, 0, atol=1e-11 * size)
+
+
+def modal_columns(tree):
+    """Of q."""
+    return np.concatenate([np.r_[node.p_q] for node in tree.nodes]).astype(int)
 
 
 @pytest.mark.parametrize("types", [["revolute"] * 3, ["revolute", "screw", "revolute"]])
@@ -143,7 +155,7 @@ def test_angles_between_sections_follow_targets(types):
     model, motors, modes, near = drawn(11, types, pool=angles)
     assert [row.kind for row in model.rows] == ["turn"] * 3
     motion = _core.SpatialPrescribedMotion(in_core(model, motors), near[0])
-    check(motion.motion(TIMES.tolist(), *modes, near), prescribed_motion(model, modes, TIMES, near), model, motors)
+    check(motion.motion(TIMES.tolist(), *modes, near), model, motors, modes)
 
 
 CASES = [([joint] * 3, 0, 0) for joint in TYPES if joint != "weld"]
@@ -157,51 +169,53 @@ def test_the_core_finds_the_motion_and_forces_of_numpy(seed, types, loops, count
     model, motors, modes, near = drawn(seed, types, loops, count_more)
     driven = in_core(model, motors)
     found = _core.SpatialPrescribedMotion(driven, near[0]).motion(TIMES.tolist(), *modes, near)
-    check(found, prescribed_motion(model, modes, TIMES, near), model, motors)
-
-
-def motor_rows(model, motors, targets):
-    """The model with the motors' coordinates, which follow `targets`, in place of its path."""
-    rows = [row for row in model.rows if not row.is_trajectory]
-    for motor, target in zip(motors, targets, strict=True):
-        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
-        (row,) = coordinate_rows(node, [motor.coordinate])
-        rows.append(replace(row, target=target))
-    return replace(model, rows=tuple(rows))
+    check(found, model, motors, modes)
 
 
 @pytest.mark.parametrize(
     ("types", "loops"), [(["revolute"] * 3, 0), (["universal", "screw"], 0), (["revolute"] * 6, 1)]
 )
 def test_motors_of_a_redefined_output_are_those_of_less_deflection(types, loops):
-    """The motors' coordinates, rates and accelerations are those on the path with the deflections a p + p_e."""
+    """The motors' coordinates, rates and accelerations are those on the path with the deflections a p + p_e.
+
+    Loops stay closed with all of the deflections, by the other joints.
+    """
     model, motors, modes, near = drawn(3, types, loops)
     factor, shift = 0.6, 0.3 * modes[0, 0]
-    offset = [_core.TimeFunction.constant(float(p)) for p in shift]
-    still = [_core.TimeFunction.constant(0.0)] * len(motors)
-    path = in_core(model, motors)
-    driven = in_core(motor_rows(model, motors, still), motors) if loops else path
+    path, offset = in_core(model, motors), [_core.TimeFunction.constant(float(p)) for p in shift]
+    still = replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory)) if loops else model
+    driven = in_core(with_motors_held(still, motors), motors) if loops else path
     motion = _core.SpatialRedefinedMotion(driven, path, near[0], factor, offset)
     found = motion.motion(TIMES.tolist(), *modes, near)
     seen = factor * modes
     seen[0] += shift
-    on_path = prescribed_motion(model, seen, TIMES, near)
-    for k in range(len(TIMES)):
-        targets = []
-        for motor in motors:
-            node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
-            place = node.q.start + motor.coordinate - node.v.start
-            targets.append(
-                polynomial(on_path.q[k, place], on_path.v[k, motor.coordinate], on_path.a[k, motor.coordinate])
-            )
-        one = motor_rows(model, motors, targets)
-        expected = prescribed_motion(one, modes[:, k : k + 1], np.zeros(1), on_path.q[k : k + 1])
-        tau, lambdas, left = split(one, expected, motors)
-        for x, y in (
-            (found.q[k], expected.q[0]), (found.v[k], expected.v[0]), (found.a[k], expected.a[0]),
-            (found.tau[k], tau[0]), (found.loops[k], lambdas[0]), (found.left[k], left[0]),
-        ):  # fmt: skip
-            np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))
+    on_path = _core.SpatialPrescribedMotion(path, near[0]).motion(TIMES.tolist(), *seen, near)
+    for motor in motors:
+        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
+        place = node.q.start + motor.coordinate - node.v.start
+        np.testing.assert_allclose(found.q[:, place], on_path.q[:, place], atol=1e-11)
+        for x, y in ((found.v, on_path.v), (found.a, on_path.a)):
+            of_path = y[:, motor.coordinate]
+            np.testing.assert_allclose(x[:, motor.coordinate], of_path, atol=1e-11 * max(1.0, np.abs(y).max()))
+    np.testing.assert_allclose(found.q[:, modal_columns(model.tree)], modes[0], atol=1e-14)
+    C, C_v = row_values(model, found.q, TIMES)
+    of_loops = model.loop_rows
+    assert np.abs(C[:, of_loops]).max(initial=0.0) < 1e-11
+    assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, of_loops]).max(initial=0.0) < 1e-10
+    state = Accelerated(model.tree, found.q, found.v, found.a, model.tree.frames(found.q))
+    required = required_forces(model, state, TIMES)
+    left = unmet(model, SimpleNamespace(q=found.q, required=required, tau=found.tau, loops=found.loops), motors)
+    np.testing.assert_allclose(found.left, left, atol=1e-11 * np.abs(required).max())
+
+
+def with_motors_held(model, motors):
+    """The model with coordinates of motors that stand still for its path."""
+    rows = list(model.rows)
+    for motor in motors:
+        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
+        (row,) = coordinate_rows(node, [motor.coordinate])
+        rows.append(replace(row, target=_core.TimeFunction.constant(0.0)))
+    return replace(model, rows=tuple(rows))
 
 
 def test_loads_are_held_before_and_after_the_path():

@@ -157,15 +157,3 @@ def test_the_bent_place_of_a_tool_is_exact_to_second_order(arm):
 def test_wrong_tools(keys, message):
     with pytest.raises(InputError, match=message):
         solve(wrist(tool=[tool(**keys)], trajectory=[{"name": "a", "joint": "to_a", "value": "0"}]))
-
-
-def test_compliance_where_payloads_and_loads_are():
-    """Half way along a cantilever a³/3EI, by its modes; beside them the point of the path stays the first."""
-    EI, a = E * 0.03 * HEIGHT**3 / 12, LENGTH / 2
-    keys = {"payload": [{"point": "strip.mid", "mass": 0.1}], "load": [{"point": "strip.tip", "y": "0"}], "tool": []}
-    path = [{"name": "still", "point": "strip.tip", "y": "0.6*sin(0.4)"}]
-    with solve(strip(trajectory=path, **keys)) as results:
-        names = [name.rpartition("/")[2] for name in results.keys() if "joints_locked/compliance/" in name]  # noqa: SIM118
-        C = results["rest/joints_locked/compliance/strip.mid"][0]
-    assert names == ["strip.mid", "strip.tip"]
-    assert np.trace(C[:2, :2]) == pytest.approx(a**3 / (3 * EI), rel=2e-3)

@@ -156,19 +156,6 @@ def test_least_voltage(modes, pairs, T, intervals, expected, within):
     assert 200.0 * found.share == pytest.approx(expected, rel=within)
 
 
-def test_least_effort_of_the_paper():
-    """Checkpoint 4, at 140 intervals."""
-    servo, Phi_V = arm(2, 5, 0.7)
-    found = track(asked_of_arm(servo, Phi_V, "effort", 120.0, is_free=False), graded(0.0, 0.7, 140))
-    assert found.cost == pytest.approx(0.0241177, abs=1e-7)
-    times = np.array([0.1, 0.2, 0.6, 0.68])
-    tau = servo.forces(times, *(found.curve(times, k) for k in range(3)))[1]
-    expected = [[49.783816, 7.279802], [36.530793, 8.429446], [58.572953, -5.241064], [43.211319, 1.390667]]
-    assert np.abs(tau - expected).max() < 2e-6
-    expected = [-2.50895, -8.95866, -15.8538, -16.6934, -7.28926, -10.5947, -55.0307, -65.0616, -46.1778, -7.83145]
-    assert np.abs(found.voltage(0.68) - expected).max() < 3e-4
-
-
 def test_bounds_of_zeros():
     """Section 7: what the slowest zeros ask for at least; less than what is needed."""
     servo, Phi_V = strip(4, 0.5)

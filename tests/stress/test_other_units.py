@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 import tomli_w
 from beam_links import beam_link
-from links import TIP, arm, quintic
+from links import quintic
 from mechanisms import relative
-from robots import inverse
 
 import ffrobot
 
@@ -64,16 +63,6 @@ def test_rigid_links(integrator, axis):
     angle, steps = found["SI"]
     assert {taken for _, taken in found.values()} == {steps}
     assert max(relative(other, angle) for other, _ in found.values()) < 1e-9
-
-
-def test_slow_motion_is_as_precise():
-    """A path that takes 20 s, against the same at a tighter tolerance: no velocity is too small to count."""
-    long = 20.0
-    path = {"name": "tip", "point": "link2.tip", "x": quintic(TIP[0], 0.4, long), "y": quintic(TIP[1], 1.5, long)}
-    model = arm(trajectory=[path], gravity=(0.0, 0.0))
-    keys = {"end": long, "output_step": long / 100, "integrator": "radau"}
-    coarse, fine = (inverse(model, tolerance=tolerance, **keys) for tolerance in (1e-4, 1e-5))
-    assert relative(coarse.lambda_, fine.lambda_) < 1e-4
 
 
 # Powers of length, mass and time of the results in 3D.
