@@ -52,13 +52,6 @@ def test_a_component_out_of_reach_is_told():
         ffrobot.solve(arm({"x": "-1.6"}, BENT))
 
 
-def test_a_reach_that_a_slide_leaves_open_is_not_told():
-    slide = {"name": "yaw", "type": "prismatic", "between": ["ground", "hub.in"], "axis": [0.0, 0.0, 1.0]}
-    with pytest.raises(InputError, match="out of reach, or on another branch") as caught:
-        ffrobot.solve(arm({"x": "3", "y": "0", "z": "0"}, BENT, [slide, *JOINTS[1:]]))
-    assert "links reach" not in str(caught.value)
-
-
 def test_a_path_that_leaves_the_reach_says_where():
     """1.3 + 2 t from the hub along x passes 1.4 m at t = 0.05 s, where the arm is stretched: nothing is integrated."""
     path = {"x": "1.4 + 2*t", "y": "0.2", "z": "0.3"}

@@ -49,20 +49,6 @@ def test_rows_are_kept_along_a_motion_in_3d():
         assert np.abs(rate - (0.15 * np.cos(3 * t) - 0.2 * t)).max() < 1e-6
 
 
-def test_a_free_rigid_body_turns_as_jacobi_says():
-    """formulation_spatial.md, checkpoint A: I = diag(0.02, 0.03, 0.045), omega = (3, 0, 4) at t = 0, at 4 s."""
-    body, data, marker = r.SpatialBody(), r.SpatialData(), r.SpatialMarker()
-    inertia = np.array([0.02, 0.03, 0.045])
-    data.mass, data.J2 = 1.0, np.diag(inertia.sum() / 2 - inertia)
-    data.markers = [marker]
-    body.name, body.joint, body.data = "top", J.free, data
-    model = r.SpatialModel([body], [r.SpatialMarker()], [], [], np.zeros(3))
-    q, v = np.array([0, 0, 0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 3.0, 0, 4.0])
-    states = _core.tree_motion(model, _core.TreeScene(), [0.0, 4.0], q, v, controls(1e-12), on).states
-    assert np.abs(states[-1, -3:] - [2.64241551, -1.49727169, 3.92456121]).max() < 1e-8
-    assert abs(np.linalg.norm(states[-1, 3:7]) - 1) < 1e-13
-
-
 def test_a_flexible_tree_keeps_momentum_and_energy():
     rng = np.random.default_rng(7)
     bodies = three_links(rng)
