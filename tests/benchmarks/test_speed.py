@@ -8,12 +8,8 @@ Run and compare on a quiet machine:
 In the ordinary test run (--benchmark-disable, see pyproject.toml) each runs once, and the ratios are checked: bounds
 are two to three times what was measured, so that a slip in an algorithm is found and a busy machine is not.
 
-* right-hand side: accelerations and multipliers of the two-link model, 22 coordinates and 2 constraint equations; the
-  time is that of 1000 evaluations (milliseconds there are microseconds each). Aim: 1 µs each.
 * pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s. An evaluation in the run, with what the
   integrator does to it, takes 2.3 times a bare one.
-* process: `ffrobot solve` with the inverse analysis only and modal files up to date, from start to exit; extra_info has
-  what is left after taking off the solver's own wall_seconds. Aim: 0.5 s left; 3 times the import of its libraries.
 * fcid: 1000 outputs of the two-link model with straight links, and with sagging ones; extra_info has the solver's
   own time, without the check that the path is within reach. Aim: 10 ms; 36 and 115 evaluations an output.
 * allocation: voltages of 20 patches for 20 modes at 1000 times, most of which meet limits. Aim: 50 ms; SciPy's general
@@ -26,7 +22,6 @@ import sys
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -110,19 +105,6 @@ def test_allocation_of_20_patches_at_1000_times(benchmark):
     assert np.mean(np.abs(V) == 1.0) > 0.2
     general = seconds(lambda: [lsq_linear(Phi, f, (-1.0, 1.0)) for f in F[::50]]) * 50
     assert seconds(lambda: solver.solve(F)) < general / 300
-
-
-def test_whole_process(benchmark, scene, ffrobot):
-    def run():
-        assert ffrobot("solve", scene).returncode == 0
-
-    run()  # stage 1, if nothing has cached it
-    benchmark.pedantic(run, rounds=5)
-    with h5py.File(scene.with_suffix(".results.h5")) as file:
-        solver = float(file["inverse"].attrs["wall_seconds"])
-    if benchmark.stats:
-        benchmark.extra_info |= {"solver": solver, "overhead": benchmark.stats.stats.min - solver}
-    assert seconds(run) < 2 * solver + 8 * imports(LIBRARIES)
 
 
 def test_stage_1_of_a_link(benchmark, scene, ffrobot):

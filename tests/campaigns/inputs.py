@@ -35,20 +35,8 @@ NUMBERS = tuple(
 )
 RUN = ("=cmd|' /C calc'!A0", '__import__("os").system("touch CANARY")', "$(touch CANARY)", "`touch CANARY`", "{{7*7}}")
 ODD = (
-    "",
-    " ",
-    "/",
-    "..",
-    "../../out",
-    "/tmp/ffrobot_out",
-    "a\nb",
-    "a" * 300,
-    "é関",
-    "\u202e",
-    "\0",
-    "<script>",
-    "%s%n",
-)
+    "", " ", "/", "..", "../../out", "/tmp/ffrobot_out", "a\nb", "a" * 300, "é関", "\u202e", "\0", "<script>", "%s%n",
+)  # fmt: skip
 TEXTS = (*NUMBERS, *RUN, *ODD)
 SCENE = """
 name = "arm"

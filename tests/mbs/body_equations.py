@@ -88,7 +88,7 @@ def absolute_accelerations(mechanism, state) -> Array:
     of_modes = np.concatenate([np.r_[node.p_v] for node in tree.nodes]).astype(int)
     for k, at in enumerate(absolute_states(mechanism, state)):
         known = {}
-        C, G = ([mechanism.row(row, at.q, at.v, 0.0, known) for row in rows] for rows in (held, moved))
+        C, G = ([mechanism.row(row, at.q, at.v, known) for row in rows] for rows in (held, moved))
         gradients = np.array([row.gradient for row in (*C, *G)]).reshape(-1, mechanism.size)
         right = -np.array([row.bias for row in (*C, *G)])
         right[len(C) :] += gradients[len(C) :] @ at.B @ state.a[k]
@@ -104,7 +104,7 @@ def required_forces(model, state, times):
     found = resistance(model, state.q, state.v, state.frames) - given_forces(model, state.q, state.frames, times)
     found -= gear_forces(model.tree, state.q, state.v)
     for k, (at, a) in enumerate(zip(absolute_states(mechanism, state), accelerations, strict=True)):
-        found[k] += at.B.T @ (mechanism.mass_matrix(at.q) @ a - mechanism.forces(times[k], at.q, at.v))
+        found[k] += at.B.T @ (mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v))
     for node in state.tree.nodes:
         found[:, node.v] += rotor_mass(node) * state.a[:, node.v]
     return found
@@ -123,7 +123,7 @@ def body_forces(state: Accelerated, gravity) -> list[BodyForces]:
     mechanism = Mechanism([node.body for node in state.tree.nodes], np.array(gravity))
     accelerations = absolute_accelerations(mechanism, state)
     needed = np.array([
-        mechanism.mass_matrix(at.q) @ a - mechanism.forces(0.0, at.q, at.v)
+        mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v)
         for at, a in zip(absolute_states(mechanism, state), accelerations, strict=True)
     ])  # fmt: skip
     parts = [needed[:, mechanism.coordinates.columns(node.body.name)] for node in state.tree.nodes]

@@ -165,25 +165,13 @@ class MarkerState:
     bias: np.ndarray
 
 
-def resistance(friction, rate):
-    return friction.viscous * rate + friction.coulomb * np.tanh(rate / friction.speed)
-
-
 @dataclass
 class Mechanism:
-    """Bodies under constraints.
-
-    constraints: (row, target), target(t) = (d, ḋ, d̈) or None where the row is kept at zero; loads: (row, size(t));
-    modal_loads: (body name, vector (n,), size(t)); rotors: (row, inertia); frictions: (row, Friction).
-    """
+    """Bodies, and rotors (row, inertia)."""
 
     bodies: list
     gravity: np.ndarray
-    constraints: list = field(default_factory=list)
-    loads: list = field(default_factory=list)
-    modal_loads: list = field(default_factory=list)
     rotors: list = field(default_factory=list)
-    frictions: list = field(default_factory=list)
 
     def __post_init__(self):
         self.gravity = np.array(self.gravity, dtype=float)
@@ -204,32 +192,24 @@ class Mechanism:
             M += J * np.outer(gradient, gradient)
         return M
 
-    def forces(self, t, q, v):
-        """Q (N,): quadratic velocity, elastic, damping, gravity and applied forces."""
+    def forces(self, q, v):
+        """Q (N,): quadratic velocity, elastic, damping and gravity forces."""
         Q = np.zeros(self.size)
         for body in self.bodies:
             _, e, p = self.coordinates.parts(q, body.name)
             _, omega, p_dot = self.coordinates.rates(v, body.name)
             own = body_forces(body, rotation(e), p, omega, p_dot, self.gravity)
             Q[self.coordinates.columns(body.name)] += own
-        for row, size in self.loads:
-            Q += self.row(row, q, v, t).gradient * size(t)
         for row, J in self.rotors:
-            state = self.row(row, q, v, t)
+            state = self.row(row, q, v)
             Q -= J * (state.bias * state.gradient + state.rate * state.axis_turns)
-        for row, friction in self.frictions:
-            state = self.row(row, q, v, t)
-            Q -= state.gradient * resistance(friction, state.rate)
-        for name, vector, size in self.modal_loads:
-            Q[self.coordinates.columns(name)][6:] += vector * size(t)
         return Q
 
-    def marker(self, at, q, v, t=0.0):
+    def marker(self, at, q, v):
         """A section's triad (`triad_measures.Section`), of a body or the ground."""
         L = np.zeros((6, self.size))
         if at.body is None:
-            r, F, velocity, acceleration = at.motion(t)
-            return MarkerState(r, F, velocity, L, acceleration)
+            return MarkerState(np.asarray(at.position, dtype=float), at.triad, np.zeros(6), L, np.zeros(6))
         body, i = self.body(at.body), self.coordinates.columns(at.body)
         (R, e, p), (_, omega, p_dot) = self.coordinates.parts(q, at.body), self.coordinates.rates(v, at.body)
         A, n = rotation(e), body.n_modes
@@ -251,7 +231,7 @@ class Mechanism:
         F = A @ exponential(phi) @ at.triad
         return MarkerState(R + A @ u, F, L @ v, L, np.concatenate([A @ carried, A @ spin]))
 
-    def row(self, row, q, v, t=0.0, known=None):
+    def row(self, row, q, v, known=None):
         """Value, rate, gradient (N,) and bias of a row: its second derivative is gradient · v̇ + bias.
 
         `known`: markers found before at this state, by their identity.
@@ -259,7 +239,7 @@ class Mechanism:
         known = {} if known is None else known
         for at in (row.a, row.b):
             if id(at) not in known:
-                known[id(at)] = self.marker(at, q, v, t)
+                known[id(at)] = self.marker(at, q, v)
         a, b = known[id(row.a)], known[id(row.b)]
         found = row.between(a, b)
         ends = ((found.on_a, a), (found.on_b, b))
@@ -268,31 +248,8 @@ class Mechanism:
             rate=sum(on @ end.velocity for on, end in ends),
             gradient=sum(on @ end.L for on, end in ends),
             bias=sum(on @ end.bias for on, end in ends) + found.extra,
-            on_b=found.on_b,
             axis_turns=found.axis_turns @ a.L[3:],
         )
-
-    def constraint_values(self, t, q, v):
-        """C, Ċ, C_v (m, N) and γ, with C_v v̇ = γ."""
-        known = {}
-        states = [self.row(row, q, v, t, known) for row, _ in self.constraints]
-        targets = [(0.0, 0.0, 0.0) if target is None else target(t) for _, target in self.constraints]
-        C = np.array([state.value - target[0] for state, target in zip(states, targets, strict=True)])
-        C_dot = np.array([state.rate - target[1] for state, target in zip(states, targets, strict=True)])
-        gamma = np.array([target[2] - state.bias for state, target in zip(states, targets, strict=True)])
-        return C, C_dot, np.array([state.gradient for state in states]).reshape(-1, self.size), gamma
-
-    def solve(self, t, q, v):
-        """V̇ and λ of M v̇ + C_vᵀλ = Q, C_v v̇ = γ; of least size where constraints repeat each other."""
-        _, _, C_v, gamma = self.constraint_values(t, q, v)
-        m = len(gamma)
-        augmented = np.block([[self.mass_matrix(q), C_v.T], [C_v, np.zeros((m, m))]])
-        right = np.concatenate([self.forces(t, q, v), gamma])
-        if m and np.linalg.matrix_rank(C_v) < m:
-            solution = np.linalg.lstsq(augmented, right, rcond=1e-13)[0]
-        else:
-            solution = np.linalg.solve(augmented, right)
-        return solution[: self.size], solution[self.size :]
 
     def energies(self, q, v):
         """Kinetic, strain and gravitational energy."""

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mechanisms import always, random_state
+from scipy.integrate import simpson
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
@@ -132,6 +133,13 @@ def joint_forces(seen, joint):
 def energies(seen):
     """Kinetic, strain and gravitational energy, dissipated power (T,)."""
     return vars(totals(seen.motion)[0])
+
+
+def energy_and_losses(seen):
+    """Total energy (T,) and what damping has taken by the end."""
+    parts = energies(seen)
+    total = parts["kinetic"] + parts["strain"] + parts["gravitational"]
+    return total, simpson(parts["dissipated_power"], x=seen.time)
 
 
 def evaluated(robot, t, q, v):

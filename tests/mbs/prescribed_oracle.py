@@ -20,8 +20,6 @@ from triad_measures import Along, Dot, Way
 
 from ffrobot.mbs.model.model import row_values
 
-RANK = 1e-10  # of the largest singular value
-
 
 def residuals(motion):
     """M v̇ − Q + C_vᵀλ, and C̈ less what targets ask for, the largest, both relative to their largest terms."""

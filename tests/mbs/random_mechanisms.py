@@ -145,7 +145,7 @@ def random_pose(rng, joint):
 class Tree:
     """Bodies, the joints that carry them (joint k carries body k, on its second side), joints that close loops.
 
-    `q` and `v` meet all joints; `poses` by joint. Joints without a partner stand on the ground.
+    `q` meets all joints; `poses` by joint. Joints without a partner stand on the ground.
     """
 
     bodies: list
@@ -153,12 +153,9 @@ class Tree:
     loops: list = field(default_factory=list)
     poses: dict = field(default_factory=dict)
     q: np.ndarray | None = None
-    v: np.ndarray | None = None
 
-    def mechanism(self, constraints=(), **keys):
-        """With the rows of all joints, and further `constraints` (row, target) behind them."""
-        rows = [(row, None) for joint in (*self.joints, *self.loops) for row in joint.rows()]
-        return Mechanism(self.bodies, keys.pop("gravity", G), rows + list(constraints), **keys)
+    def mechanism(self):
+        return Mechanism(self.bodies, G)
 
 
 def random_body(rng, name, kinds=("rigid", "solid", "beam", "supported beam")):
@@ -177,7 +174,7 @@ def random_body(rng, name, kinds=("rigid", "solid", "beam", "supported beam")):
 def random_tree(rng, types, kinds=("rigid", "solid", "beam", "supported beam"), chain=False, loops=0, size=0.1):
     """Bodies b1, b2, … on joints j1, j2, … of `types` in this order, each on the ground or an earlier body.
 
-    Modal coordinates are about `size`, velocities of order one. Each of `loops` joins the last body to the ground or an
+    Modal coordinates are about `size`. Each of `loops` joins the last body to the ground or an
     earlier body by a joint of any type but weld and free, where it happens to be.
     """
     tree = Tree([], [])
@@ -194,7 +191,6 @@ def random_tree(rng, types, kinds=("rigid", "solid", "beam", "supported beam"), 
     tree.q = placed(tree, [size * rng.standard_normal(body.n_modes) for body in tree.bodies])
     for k in range(1, loops + 1):
         _close_loop(rng, tree, f"loop{k}")
-    tree.v = admissible(tree, rng.standard_normal(tree.mechanism().size))
     return tree
 
 
@@ -210,12 +206,6 @@ def placed(tree, p):
         e[:] = quaternion(A)
         R[:] = a.r + a.F @ pose.d - rotation(e) @ b.r
     return q
-
-
-def admissible(tree, v):
-    """The velocity nearest to v that all joints allow."""
-    C_v = tree.mechanism().constraint_values(0.0, tree.q, v)[2]
-    return v - np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)
 
 
 def _close_loop(rng, tree, name):

@@ -2,43 +2,9 @@
 
 import numpy as np
 import pytest
-from beam_links import paper_link
+from steel_arms import EI, LINE, two_links
 
 import ffrobot
-
-E, RHO, HEIGHT, WIDTH = 2.068427e11, 7850.0, 0.015, 0.025
-EI, LINE = E * WIDTH * HEIGHT**3 / 12, RHO * HEIGHT * WIDTH
-QUINTIC = "(10*t**3-15*t**4+6*t**5)"
-
-
-def link(condition, count, attachment, ratio=0.005):
-    return paper_link(condition, count, attachment_modes=attachment, mesh={"elements": 40}, damping={"ratio": ratio})
-
-
-def two_links(count, attachment, kept=None, **keys):
-    """The arm of two steel links, the first simply supported, the second a cantilever, with a payload of 2 kg."""
-    kept, ratio = {"modes": kept} if kept else {}, keys.pop("ratio", 0.005)
-    bodies = [
-        {"name": name, "link": link(condition, count, attachment, ratio)} | kept
-        for name, condition in (("a", "simply-supported"), ("b", "cantilever"))
-    ]
-    scene = {
-        "name": "arm",
-        "gravity": [0.0, -9.81],
-        "body": bodies,
-        "joint": [
-            {"name": "O", "type": "revolute", "between": ["ground", "a.root"]},
-            {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]},
-        ],
-        "payload": [{"point": "b.tip", "mass": 2.0}],
-        "trajectory": [
-            {"name": "first", "joint": "O", "value": f"0.2+0.8*{QUINTIC}"},
-            {"name": "second", "joint": "A", "value": f"-0.5+0.7*{QUINTIC}"},
-        ],
-        "initial": {"state": "static", "angles": {"a": 0.2, "b": -0.3}},
-        "analysis": [{"name": "swing", "kind": "pcid", "end": 1.0, "output_step": 0.005, "tolerance": 1e-6}],
-    }
-    return ffrobot.make_scene(**(scene | keys))
 
 
 def errors(found, expected, name="swing"):

@@ -8,7 +8,6 @@ second derivative is neither v̇ nor the triads' own bias. x, y, z (0, 1, 2) are
 from dataclasses import dataclass, field
 
 import numpy as np
-from rotations import logarithm
 
 X, Y, Z = 0, 1, 2
 UNIT = np.eye(3)
@@ -35,9 +34,6 @@ class Ground:
     triad: np.ndarray = field(default_factory=lambda: np.eye(3))
     body = None
 
-    def motion(self, t):
-        return np.asarray(self.position, dtype=float), self.triad, np.zeros(6), np.zeros(6)
-
 
 @dataclass
 class Found:
@@ -56,7 +52,6 @@ class RowState:
     rate: float
     gradient: np.ndarray
     bias: float
-    on_b: np.ndarray
     axis_turns: np.ndarray
 
 
@@ -75,19 +70,6 @@ class Along:
     def between(self, a, b):
         e = np.asarray(self.direction, dtype=float)
         return Found(e @ (b.r - a.r), wrench(-e), wrench(e))
-
-
-@dataclass(frozen=True)
-class About:
-    """The turn of b on a about a fixed `direction` in global axes; the value holds where it is small."""
-
-    a: object
-    b: object
-    direction: np.ndarray
-
-    def between(self, a, b):
-        e = np.asarray(self.direction, dtype=float)
-        return Found(e @ logarithm(b.F @ a.F.T), wrench(None, -e), wrench(None, e))
 
 
 @dataclass(frozen=True)
