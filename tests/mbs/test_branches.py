@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rods import arm_of_rods
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
@@ -122,15 +123,9 @@ def test_a_start_of_six_axes_by_name(six_axes, wrist):
 
 def two_rods(**initial):
     """Two rods of 0.5 m whose tip is at (0.6, 0.1)."""
-    points = {"root": [0.0, 0.0], "tip": [0.5, 0.0]}
-    rod = {"mass": 1.0, "inertia": 0.02, "center": [0.25, 0.0], "points": points}
-    return make_scene(
-        name="rods", gravity=[0.0, -9.81], body=[{"name": name, "rigid": rod} for name in "ab"],
-        joint=[{"name": "O", "type": "revolute", "between": ["ground", "a.root"]},
-               {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]}],
-        trajectory=[{"name": "tip", "point": "b.tip", "x": "0.6", "y": "0.1"}], initial=initial,
-        analysis=[{"name": "rest", "kind": "static"}],
-    )  # fmt: skip
+    path = [{"name": "tip", "point": "b.tip", "x": "0.6", "y": "0.1"}]
+    rest = [{"name": "rest", "kind": "static"}]
+    return arm_of_rods({"a": (1.0, 0.5), "b": (1.0, 0.5)}, trajectory=path, initial=initial, analysis=rest)
 
 
 @pytest.mark.parametrize(("word", "side"), [("up", 1), ("down", -1), ("negative", 1), ("positive", -1)])

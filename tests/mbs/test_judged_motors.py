@@ -2,39 +2,23 @@
 
 import numpy as np
 import pytest
+from rods import arm_of_rods
 
 import ffrobot as program
 from ffrobot.mbs.model.motors import motor_forces, path_forces
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
-from ffrobot.scene.load import make_scene
-
-
-def link(name, mass, length):
-    points = {"root": [0.0, 0.0], "tip": [length, 0.0]}
-    rigid = {"mass": mass, "inertia": mass * length**2 / 12, "center": [length / 2, 0.0], "points": points}
-    return {"name": name, "rigid": rigid}
 
 
 def arm():
     """Two links, and a hand of a gram which keeps its angle."""
-    bodies = [link("upper", 2.0, 0.5), link("lower", 1.0, 0.4), link("hand", 1e-3, 0.02)]
-    sides = ["ground", "upper.tip", "lower.tip"]
-    joints = [
-        {"name": f"j{k}", "type": "revolute", "between": [side, f"{body['name']}.root"]}
-        for k, (side, body) in enumerate(zip(sides, bodies, strict=True))
-    ]
     path = {"name": "tip", "point": "lower.tip", "x": "0.6+0.1*sin(2*t)", "y": "0.2-0.1*t**2"}
-    turn = {"name": "turn", "angle": "hand", "value": "0.3*t**2"}
-    return make_scene(
-        name="arm",
-        gravity=[0.0, -9.81],
-        body=bodies,
-        joint=joints,
-        trajectory=[path, turn],
+    return arm_of_rods(
+        {"upper": (2.0, 0.5), "lower": (1.0, 0.4), "hand": (1e-3, 0.02)}, ("j0", "j1", "j2"),
+        trajectory=[path, {"name": "turn", "angle": "hand", "value": "0.3*t**2"}],
         initial={"angles": {"upper": 0.9, "lower": -0.6, "hand": 0.0}},
         analysis=[{"name": "follow", "kind": "pcid", "end": 1.0, "output_step": 0.001, "tolerance": 1e-6}],
-    )
+    )  # fmt: skip
 
 
 def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
@@ -51,10 +35,8 @@ def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
 def test_inertia_that_a_motor_turns_with_the_other_joints_locked():
     """Steiner: the shoulder turns both links and the hand, the farthest when they are stretched most."""
     keys = {"gear_ratio": 50.0, "rotor_inertia": 2e-5}
-    scene = make_scene(
-        name="arm", gravity=[0.0, -9.81], body=[link("upper", 2.0, 0.5), link("lower", 1.0, 0.4)],
-        joint=[{"name": "s", "type": "revolute", "between": ["ground", "upper.root"], **keys},
-               {"name": "e", "type": "revolute", "between": ["upper.tip", "lower.root"], **keys}],
+    scene = arm_of_rods(
+        {"upper": (2.0, 0.5), "lower": (1.0, 0.4)}, "se", keys,
         trajectory=[{"name": "s", "joint": "s", "value": "sin(t)"}, {"name": "e", "joint": "e", "value": "1 - t"}],
         analysis=[{"name": "follow", "kind": "pcid", "end": 0.5, "output_step": 0.01}],
     )  # fmt: skip

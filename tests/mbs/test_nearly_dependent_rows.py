@@ -2,15 +2,10 @@
 
 import numpy as np
 import pytest
+from rods import arm_of_rods
 
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
-from ffrobot.scene.load import make_scene
-
-
-def rod(name):
-    points = {"root": [0.0, 0.0], "tip": [1.0, 0.0]}
-    return {"name": name, "rigid": {"mass": 1.0, "inertia": 1 / 12, "center": [0.5, 0.0], "points": points}}
 
 
 @pytest.mark.parametrize("off", [8e-6, 0.3])
@@ -19,14 +14,8 @@ def test_all_equations_of_a_path_are_followed(off):
 
     Both rows hardly differ where `off` is small; round-off leaves 1e-16/off² of their multipliers.
     """
-    scene = make_scene(
-        name="arm",
-        gravity=[0.0, -9.81],
-        body=[rod("link1"), rod("link2")],
-        joint=[
-            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
-            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
-        ],
+    scene = arm_of_rods(
+        {"link1": (1.0, 1.0), "link2": (1.0, 1.0)},
         trajectory=[
             {"name": "tip", "point": "link2.tip", "x": f"2*cos(0.5)*cos({off}+t**2)"},
             {"name": "bend", "joint": "A", "value": "1"},

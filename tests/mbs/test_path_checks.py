@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rods import arm_of_rods
 
 import ffrobot
 from ffrobot import InputError
@@ -9,16 +10,11 @@ from ffrobot import InputError
 
 def arm(folder, **trajectory):
     """A rigid arm whose joint follows a trajectory for a tenth of a second."""
-    points = {"root": [0.0, 0.0], "tip": [0.5, 0.0]}
-    return ffrobot.make_scene(
-        folder=folder,
-        name="arm",
-        gravity=[0.0, -9.81],
-        body=[{"name": "arm", "rigid": {"mass": 1.0, "inertia": 0.1, "center": [0.1, 0.0], "points": points}}],
-        joint=[{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    return arm_of_rods(
+        {"arm": (1.0, 0.2)}, ("shoulder",), folder=folder,
         trajectory=[{"name": "path", "joint": "shoulder", **trajectory}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("value", [0.3, -0.7, 1e-6])

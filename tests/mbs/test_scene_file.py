@@ -80,6 +80,9 @@ actuation = "inverse"
 apply = "joints+pzt"
 """
 
+XY = 'x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"'
+TIP = 'point = "link2.tip"\n' + XY
+
 
 @pytest.fixture
 def folder(tmp_path):
@@ -138,21 +141,11 @@ def test_output_times_are_exact_multiples_that_end_at_the_end(folder):
 
 
 def test_waypoints_replace_expressions(folder):
-    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', 'waypoints = "path.csv"')
+    text = SCENE.replace(XY, 'waypoints = "path.csv"')
     components = load(folder, text).trajectory[0].components
     assert components["x"](0.5)[0] == pytest.approx(1.4)
     assert list(components) == ["x", "y"]
 
-
-def test_places_given_as_waypoints_are_told_of_via(folder):
-    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', "waypoints = [[0.5, 0.5], [1.0, 0.5]]")
-    with pytest.raises(
-        InputError, match=r"waypoints: expected the name of a CSV file in quotes, or places in via = \["
-    ):
-        load(folder, text)
-
-
-TIP = 'point = "link2.tip"\nx = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"'
 
 # What is replaced in the scene, by what, and the start of the line (after "scene.toml: ") that tells about it.
 # ruff: noqa: E501 (one line for each mistake)
@@ -201,6 +194,8 @@ MISTAKES = [
     (TIP, 'joint = "W"\nvalue = "t"', 'trajectory "tip": joint: expected a joint that moves', 'found "W", a weld'),
     (TIP, 'joint = "B"\nvalue = "t"', 'trajectory "tip": joint: expected one of the joints "O", "A"', '"B"'),
     ('x = "1.5*cos(pi*t/4)"', 'waypoints = "path.csv"', 'trajectory "tip": expected either waypoints, via or expr', '"y", "way'),
+    (XY, "waypoints = [[0.5, 0.5], [1.0, 0.5]]", 'trajectory "tip": waypoints: expected the name of a CSV file in quotes, or', "places in via = ["),
+    (XY, 'waypoints = "value.csv"', 'trajectory "tip": expected waypoints with the header t,x,y', 'found "t,value"'),
     # patches and loads
     ("count = 2", "count = 2.5", 'pzt "link1": count: expected a whole number, found 2.5', ""),
     ("count = 2", "centers = []", 'pzt "link1": centers: expected at least one entry, found none', ""),
@@ -224,6 +219,7 @@ MISTAKES = [
     ('kind = "pcid"', 'kind = "motors-only"\npre_actuation = -1', 'analysis "inverse": pre_actuation: expected a number', ""),
     ('kind = "pcid"', 'kind = "motors-only"', 'analysis "forward": apply: expected "joints" with', "joints+pzt"),
     ('actuation = "inverse"', 'actuation = "invers"', 'analysis "forward": actuation: expected an earlier', '"inverse"?'),
+    ('kind = "pcid"', 'kind = "forward"', 'analysis "forward": actuation: expected an analysis of kind "pcid", "fcid"', "motors-only"),
     ('apply = "joints+pzt"', "", 'analysis "forward": expected the keys "actuation" and "apply" together, found only', ""),
     ('apply = "joints+pzt"', 'apply = "joints"\nend = 2.0', 'analysis "forward": end: expected at most 1', "found 2"),
     ('name = "forward"', 'name = "inverse"', 'analysis "inverse": expected one analysis of this name, found 2', ""),
@@ -278,21 +274,8 @@ def test_stiffening_knows_no_loads_between_interfaces(folder, value, old, new, s
         load(folder, f"geometric_stiffening = {value}\n{text}")
 
 
-def test_actuation_comes_from_pcid(folder):
-    with pytest.raises(
-        InputError,
-        match='actuation: expected an analysis of kind "pcid", "fcid", "motors-only" or "tracking", found "inv',
-    ):
-        load(folder, SCENE.replace('kind = "pcid"', 'kind = "forward"', 1))
-
-
 def by_waypoints(table):
-    return SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', f'waypoints = "{table}"')
-
-
-def test_waypoints_must_fit(folder):
-    with pytest.raises(InputError, match='header t,x,y, found "t,value"'):
-        load(folder, by_waypoints("value.csv"))
+    return SCENE.replace(XY, f'waypoints = "{table}"')
 
 
 def test_a_path_that_ends_before_the_run_is_held(folder):
@@ -324,7 +307,7 @@ MOTION_MISTAKES = [
 
 @pytest.mark.parametrize(("keys", "says"), MOTION_MISTAKES, ids=range(len(MOTION_MISTAKES)))
 def test_keys_of_motions_that_do_not_fit(folder, keys, says):
-    text = SCENE.replace('x = "1.5*cos(pi*t/4)"\ny = "sqrt(3)/2*cos(pi*t/4)"', keys)
+    text = SCENE.replace(XY, keys)
     with pytest.raises(InputError, match=re.escape(says)):
         load(folder, text)
 
