@@ -25,6 +25,7 @@ from ..model.model import Model, modal_directions, path_errors
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, Stopped, make_servo
+from ..solve.stable_inversion import with_corners
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, track
 from ..solve.tracking_intervals import SETTLED, refined, settled, start_breaks
 from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
@@ -220,7 +221,8 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     asked = Transition(
         servo, Phi_V, limits, _weights(servo, analysis, limits), rest, "least-voltage", rate=_rate(linear)
     )
-    meshes = (start_breaks(first, end, last, analysis.intervals // k) for k in (1, 2))
+    starts, loads = (start_breaks(first, end, last, analysis.intervals // k) for k in (1, 2)), [*servo.loads()]
+    meshes = (with_corners(breaks, loads) for breaks in starts)
     return _Posed(servo, linear, around, asked, *meshes)
 
 

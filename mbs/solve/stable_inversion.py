@@ -9,7 +9,7 @@ initial value problem, solved window by window, each with intervals as short as 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -88,7 +88,7 @@ def invert(
         schemes = [GAUSS, OF_SECOND_ORDER]
     is_marched = not len(finish.rows)
     breaks = np.unique([-pre, 0.0, end, end + post]) if is_marched else _breaks(pre, end, post)
-    breaks = _with_corners(breaks, np.unique([t for target in servo.targets() for t in target.function.switches()]))
+    breaks = with_corners(breaks, (*(target.function for target in servo.targets()), *servo.loads()))
     for scheme in schemes:
         problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, finish, scheme)
         solver = _Solver(problem, tolerance * force, progress)
@@ -277,8 +277,9 @@ def _breaks(pre: float, end: float, post: float) -> Array:
     return np.unique(np.concatenate(pieces))
 
 
-def _with_corners(breaks: Array, corners: Array) -> Array:
-    """The breaks, and those of `corners` within the path that are not next to one: there conditions of paths change."""
+def with_corners(breaks: Array, functions: Iterable[_core.TimeFunction]) -> Array:
+    """The breaks, and those times within at which conditions of functions change, if they are not next to one."""
+    corners = np.unique([t for function in functions for t in function.switches()])
     near = np.abs(breaks[:, None] - corners).min(axis=0) <= SHORTEST * (breaks[-1] - breaks[0])
     within = (corners > breaks[0]) & (corners < breaks[-1])
     return np.union1d(breaks, corners[within & ~near])

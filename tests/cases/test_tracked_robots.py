@@ -230,3 +230,13 @@ def test_load_on_the_tip():
     assert work == pytest.approx(dissipated + stored - F @ (tip[-1] - tip[0]), rel=1e-6)
     assert dissipated > 1e-3 * work
     assert stored > 1e-3 * work
+
+
+@pytest.mark.parametrize("lasts", [0.02, 1e-4])
+def test_brief_load_on_the_tip(lasts):
+    """Intervals begin and end where it does: a simulation under the same torques and voltages stays on the path."""
+    force = f"where(t < 0.3011, 0, where(t < {0.3011 + lasts}, {2e-4 / lasts}, 0))"
+    tables = in_plane(load=[{"point": "arm.tip", "y": force}])
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        off = results["replay/points/arm.tip/position"] - results["carried/points/arm.tip/position"]
+    assert np.abs(off).max() < 1e-6

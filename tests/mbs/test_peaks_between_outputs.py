@@ -210,3 +210,18 @@ def replayed_as_followed(scene, peak, way):
     reached = results["replay/joints/O/coordinate"]
     assert reached[-1] == pytest.approx(way, rel=1e-6)
     assert np.abs(reached - results["inverse/joints/O/coordinate"]).max() < 1e-6 * way
+
+
+@pytest.mark.parametrize("lasts", [5e-2, 1e-3, 1e-4])
+def test_a_brief_load_while_only_motors_move(lasts):
+    """A path of joints leaves links to themselves, as inverse dynamics does; collocation has breaks at the jumps."""
+    scene = flexible(0.01, space=False)
+    scene["trajectory"][0]["value"] = "0.3*(35*t**4 - 84*t**5 + 70*t**6 - 20*t**7)"
+    force = f"where(t < 0.5011, 0, where(t < {0.5011 + lasts}, {2.5e-3 / lasts}, 0))"
+    scene["load"] = [{"point": "arm.tip", "y": force}]
+    (inverse,) = scene["analysis"]
+    found = [solve(scene | {"analysis": [inverse | {"kind": kind}]}) for kind in ("pcid", "motors-only")]
+    by_inverse, by_motors = (
+        one["inverse/joints/O/moment"][np.isin(one.time("inverse").round(9), np.arange(101) / 100)] for one in found
+    )
+    assert np.abs(by_motors - by_inverse).max() < 1e-5 * np.abs(by_inverse).max()
