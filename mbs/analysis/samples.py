@@ -106,6 +106,8 @@ def stops(
             found.append(
                 _parts(breaks, (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0)))
             )
+    for load in loads:  # just before it jumps, too: a mean over time is by the values on both sides
+        found.append(np.array(load.switches()) - SHORTEST * duration)
     if is_driven and duration > 0.0:
         grid = np.union1d(np.linspace(times[0], times[-1], FEWEST + 1), np.concatenate(found))
         found += [np.setdiff1d(_resolved(function, grid, SEEN), grid) for function in (*targets, *loads)]

@@ -225,3 +225,14 @@ def test_a_brief_load_while_only_motors_move(lasts):
         one["inverse/joints/O/moment"][np.isin(one.time("inverse").round(9), np.arange(101) / 100)] for one in found
     )
     assert np.abs(by_motors - by_inverse).max() < 1e-5 * np.abs(by_inverse).max()
+
+
+@pytest.mark.parametrize("lasts", [5e-2, 1.7e-3, 1e-4])
+@pytest.mark.parametrize("end", [1.0, 10.0])
+def test_rms_of_a_torque_that_jumps(lasts, end):
+    """Of 80 N·m that a motor bears at rest for so long, on a flexible arm without gravity: 80 √(lasts/end)."""
+    scene = flexible(0.1, space=False) | {"gravity": [0.0, 0.0]}
+    scene["trajectory"][0]["value"] = "0"
+    scene["load"] = [{"joint": "O", "moment": f"where(t < 0.5011, 0, where(t < {0.5011 + lasts}, 80, 0))"}]
+    scene["analysis"][0]["end"] = end
+    assert motor(solve(scene)).rms_moment == pytest.approx(80.0 * np.sqrt(lasts / end), rel=1e-5)
