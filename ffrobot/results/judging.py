@@ -125,7 +125,10 @@ def _answer(
         about = group["tracking"].attrs
         off = about.get("without_patches", np.nan)
         alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
-        least = f"; least voltage {about['least_voltage']:.3g} V{alone}"
+        limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
+        is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
+        size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
+        least = f"; least voltage {size}{alone}"
     return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True
 
 
