@@ -22,22 +22,15 @@ def arm(case_copy):
     return copy
 
 
-@pytest.mark.parametrize(
-    ("stopped", "keys"),
-    [
-        ("inverse", "tolerance = 1e-3"),
-        ("forward", "tolerance = 1e-3"),
-        ("inverse", 'tolerance = 1e-4\nintegrator = "dopri5"'),
-    ],
-)
-def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
+@pytest.mark.parametrize("stopped", ["inverse", "forward"])
+def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
     """To the last bit: the explicit methods go on with the same step.
 
     "auto" has tried Radau before: what it found, and steps by two methods to be replayed, go on as well.
     """
-    scene, after, end = arm(**{"tolerance = 1e-7": keys, "end = 1.0": "end = 0.2"}), 0.15, 0.2
+    scene, after, end = arm(**{"tolerance = 1e-7": "tolerance = 1e-3", "end = 1.0": "end = 0.2"}), 0.15, 0.2
     expected = ffrobot.solve(scene)
-    assert (expected.attributes("inverse")["integrator"] == "dop853 after radau") == ("integrator" not in keys)
+    assert expected.attributes("inverse")["integrator"] == "dop853 after radau"
     message = stop(scene, stopped, after)
     with h5py.File(scene.with_suffix(".h5")) as file:
         reached = file[stopped]["resume/checkpoint"].attrs["time"]

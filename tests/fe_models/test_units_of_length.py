@@ -187,7 +187,6 @@ SOLIDS = {
         interface=[{"name": "cut", "position": 8e-4, "mass": 1e-7}],
         stress={"points": {"inside": [6e-4, 4e-5, 2e-5]}},
     ),
-    "round bar that gmsh meshes": solid("cantilever", 1e-4, {"order": 1}, {"shape": "circle", "diameter": 1.1e-4}),
     "hole in a thin bar that gmsh meshes": solid(
         "cantilever",
         3e-5,
