@@ -8,7 +8,7 @@ drawn in 3D: they move in z = 0 and turn about z.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class MovingBody:
         points: (k, 3) where they are in the frame, undeformed, in m.
         deflection: (T, k, 3) their Φ p, in the frame, in m.
         sections: (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none.
+        shift: (T, 3) m, how much a unit of s moves the body as a whole, so that joints stay shut; global axes.
     """
 
     name: str
@@ -46,6 +47,7 @@ class MovingBody:
     points: Array
     deflection: Array
     sections: Array
+    shift: Array
 
     @property
     def axes(self) -> Array:
@@ -65,25 +67,32 @@ class MovingBody:
         """Where the points are in global axes (T, k, 3), m."""
         return self.placed(self.points + self.deflection)
 
-    def exaggerated(self, shift: Array, s: float) -> Array:
-        """Where the points are (T, k, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
-        return self.placed(self.points + s * self.deflection) + (s - 1.0) * shift[:, None]
+    def exaggerated(self, s: float) -> Array:
+        """Where the points are (T, k, 3), m, with deflections s times as large."""
+        return self.placed(self.points + s * self.deflection) + (s - 1.0) * self.shift[:, None]
 
     def global_deflection(self, point: str) -> Array:
         """A Φ p of a point (T, 3), in m: how much a unit of s moves it in global axes."""
         return self.turned(self.deflection[:, self.point_names.index(point)])
 
 
-def moving_bodies(results: Results, analysis: str, frames: Indices) -> tuple[list[MovingBody], list[Array]]:
-    """All bodies at the outputs `frames`, each after the one that carries it.
-
-    And how much a unit of s moves each as a whole (T, 3), m, so that joints stay shut.
-    """
-    bodies = [_moving_body(results, analysis, name, frames) for name in topology(results.scene).carriers]
-    return bodies, _carried(bodies, results.scene)
+def moving_bodies(results: Results, analysis: str, frames: Indices) -> list[MovingBody]:
+    """All bodies at the outputs `frames`, each after the one that carries it."""
+    found: dict[str, MovingBody] = {}
+    for name, carrier in topology(results.scene).carriers.items():
+        body = _moving_body(results, analysis, name, frames)
+        shift = np.zeros_like(body.position)
+        if carrier is not None and carrier.own in body.point_names:
+            shift -= body.global_deflection(carrier.own)
+        parent = None if carrier is None else found.get(carrier.parent)
+        if carrier is not None and parent is not None and carrier.other in parent.point_names:
+            shift += parent.shift + parent.global_deflection(carrier.other)
+        found[name] = replace(body, shift=shift)
+    return list(found.values())
 
 
 def _moving_body(results: Results, analysis: str, name: str, frames: Indices) -> MovingBody:
+    """Not shifted."""
     group, points = f"{analysis}/bodies/{name}", f"{analysis}/points"
     position, orientation = in_3d(results[f"{group}/position"][frames]), _orientation(results, group, frames)
     labels = [label for label in results.names(points) if label.startswith(f"{name}.")]
@@ -100,7 +109,7 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
     modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
     return MovingBody(
         name, position, orientation, modal, tuple(labels[i] for i in along), at[along], deflection[:, along],
-        sections[:, along] if sections.size else sections,
+        sections[:, along] if sections.size else sections, np.zeros_like(position),
     )  # fmt: skip
 
 
@@ -128,22 +137,6 @@ def topology(scene: Mapping[str, Any]) -> Topology:
     joints = scene.get("joint", [])
     edges = [Edge(tuple(joint["between"]), int(not joint_type(joint).locates)) for joint in joints]
     return spanning_forest([body["name"] for body in scene["body"]], edges)
-
-
-def _carried(bodies: Sequence[MovingBody], scene: Mapping[str, Any]) -> list[Array]:
-    """For each body (T, 3), m: how much a unit of s moves it as a whole, so that joints stay shut."""
-    by_name, carriers = {body.name: body for body in bodies}, topology(scene).carriers
-    shift: dict[str, Array] = {}
-    for body in bodies:
-        shift[body.name] = np.zeros_like(body.position)
-        if (carrier := carriers[body.name]) is None:
-            continue
-        if carrier.own in body.point_names:
-            shift[body.name] -= body.global_deflection(carrier.own)
-        parent = by_name.get(carrier.parent)
-        if parent is not None and carrier.other in parent.point_names:
-            shift[body.name] += shift[parent.name] + parent.global_deflection(carrier.other)
-    return list(shift.values())
 
 
 def size_of(bodies: Sequence[MovingBody]) -> float:
@@ -225,28 +218,27 @@ class Marker:
         return self.position + (s - 1.0) * self.exaggeration
 
 
-def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> list[Marker]:
+def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody]) -> list[Marker]:
     """Every joint at its second side, with the axes that it has: one, two of universal joints, none of others."""
-    return [_joint(keys, bodies, shift) for keys in scene.get("joint", [])]
+    return [_joint(keys, bodies) for keys in scene.get("joint", [])]
 
 
-def tool_marker(point: str, bodies: Sequence[MovingBody], shift: Sequence[Array]) -> Marker:
+def tool_marker(point: str, bodies: Sequence[MovingBody]) -> Marker:
     """The section "BODY.POINT" with its axes x, y, z, without them in planar scenes."""
-    position, exaggeration = _place(point, bodies, shift)
+    position, exaggeration = _place(point, bodies)
     T, is_known = len(position), any(body.sections.size for body in bodies)
     axes = section_axes(bodies, point, T).swapaxes(1, 2) if is_known else np.zeros((T, 0, 3))
     return Marker(point, position, exaggeration, axes)
 
 
-def tool_markers(targets: Iterable[Target], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> list[Marker]:
+def tool_markers(targets: Iterable[Target], bodies: Sequence[MovingBody]) -> list[Marker]:
     """Of each point that follows a path, once."""
-    return [tool_marker(point, bodies, shift) for point in dict.fromkeys(target.point for target in targets)]
+    return [tool_marker(point, bodies) for point in dict.fromkeys(target.point for target in targets)]
 
 
-def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> Marker:
+def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody]) -> Marker:
     first, second = keys["between"]
-    side = second if second != GROUND else first
-    position, exaggeration = _place(side, bodies, shift)
+    position, exaggeration = _place(second if second != GROUND else first, bodies)
     T = len(position)
     directions = [
         section_axes(bodies, of, T) @ in_3d(np.array(keys[key]) / np.linalg.norm(keys[key]))
@@ -256,12 +248,9 @@ def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequenc
     return Marker(keys["name"], position, exaggeration, np.stack(directions, 1) if directions else np.zeros((T, 0, 3)))
 
 
-def _place(side: str, bodies: Sequence[MovingBody], shift: Sequence[Array]) -> tuple[Array, Array]:
-    for body, carried in zip(bodies, shift, strict=True):
-        if side in body.point_names:
-            k = body.point_names.index(side)
-            return body.global_points[:, k], body.global_deflection(side) + carried
-    raise KeyError(side)
+def _place(side: str, bodies: Sequence[MovingBody]) -> tuple[Array, Array]:
+    body = next(body for body in bodies if side in body.point_names)
+    return body.global_points[:, body.point_names.index(side)], body.global_deflection(side) + body.shift
 
 
 def ground_places(scenes: Iterable[Mapping[str, Any]]) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -150,7 +150,7 @@ OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3
 
 @dataclass(frozen=True)
 class Shape:
-    """Points of a body that coordinates move: x + s Φ p.
+    """Points of a `body` that coordinates move: x + s Φ p.
 
     Attributes:
         points: (p, 3) x, in the frame, in m.
@@ -159,20 +159,22 @@ class Shape:
         cells: (c, v) points that make a line (v = 2) or a facet.
     """
 
+    body: MovingBody
     points: Array
     shapes: Array
     coordinates: Array
     cells: Integers
 
-    def deflection(self, body: MovingBody) -> Array:
+    @property
+    def deflection(self) -> Array:
         """A Φ p (T, p, 3), m, global axes."""
-        return body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
+        return self.body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
 
-    def placed(self, body: MovingBody, shift: Array | None = None, s: float = 1.0) -> Array:
-        """Where its points are (T, p, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
-        rest = body.placed(np.broadcast_to(self.points, (len(body.position), *self.points.shape)))
-        found: Array = rest + s * self.deflection(body)
-        return found if shift is None else found + (s - 1.0) * shift[:, None]
+    def placed(self, s: float = 1.0) -> Array:
+        """Where its points are (T, p, 3), m, with deflections s times as large and joints shut."""
+        rest = self.body.placed(np.broadcast_to(self.points, (len(self.coordinates), *self.points.shape)))
+        found: Array = rest + s * self.deflection
+        return found if s == 1.0 else found + (s - 1.0) * self.body.shift[:, None]
 
 
 def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
@@ -182,13 +184,13 @@ def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
     """
     if body.modal is None and (visual := visual_surface(results, body.name, notes)) is not None:
         points, triangles = visual
-        return Shape(points, np.zeros((*points.shape, 0)), np.zeros((len(body.position), 0)), triangles)
+        return Shape(body, points, np.zeros((*points.shape, 0)), np.zeros((len(body.position), 0)), triangles)
     found = _modal_body(results, body, notes)
     if found is None:
         return point_shape(body)
     mesh = body_surface(found)
     assert body.modal is not None
-    return Shape(mesh.points, mesh.mode_shapes, body.modal, mesh.cells)
+    return Shape(body, mesh.points, mesh.mode_shapes, body.modal, mesh.cells)
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
@@ -198,7 +200,8 @@ def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
         return point_shape(body)
     stations, k = found.stations, len(found.stations.position)
     assert body.modal is not None
-    return Shape(stations.position, stations.translation, body.modal, np.stack([np.arange(k - 1), np.arange(1, k)], 1))
+    cells = np.stack([np.arange(k - 1), np.arange(1, k)], 1)
+    return Shape(body, stations.position, stations.translation, body.modal, cells)
 
 
 def point_shape(body: MovingBody) -> Shape:
@@ -206,7 +209,7 @@ def point_shape(body: MovingBody) -> Shape:
     k = len(body.points)
     shapes = np.eye(3 * k).reshape(k, 3, 3 * k)
     cells = shortest_tree(body.points) if k > 1 else np.zeros((k, 1), dtype=np.int64)
-    return Shape(body.points, shapes, body.deflection.reshape(len(body.position), 3 * k), cells)
+    return Shape(body, body.points, shapes, body.deflection.reshape(len(body.position), 3 * k), cells)
 
 
 def thickened(shape: Shape, radius: float) -> Shape:
@@ -215,18 +218,20 @@ def thickened(shape: Shape, radius: float) -> Shape:
         return shape
     if shape.cells.shape[1] == 1:
         offsets = 2 * radius * np.concatenate([np.eye(3), -np.eye(3)])
-        return Shape(shape.points + offsets, np.repeat(shape.shapes, 6, axis=0), shape.coordinates, OCTAHEDRON)
+        points, shapes = shape.points + offsets, np.repeat(shape.shapes, 6, axis=0)
+        return replace(shape, points=points, shapes=shapes, cells=OCTAHEDRON)
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
-    points, ends, triangles, count = [], [], [], 0
+    rings, bar = [], _bar()
     for first, last in shape.cells:
         across = smallest_turn(shape.points[last] - shape.points[first])[:, :2]
         ring = radius * (np.outer(np.cos(angle), across[:, 0]) + np.outer(np.sin(angle), across[:, 1]))
-        points += [shape.points[first] + ring, shape.points[last] + ring]
-        ends += [np.full(SIDES, first), np.full(SIDES, last)]
-        triangles.append(_bar() + count)
-        count += 2 * SIDES
-    at = np.concatenate(ends)
-    return Shape(np.concatenate(points), shape.shapes[at], shape.coordinates, np.concatenate(triangles))
+        rings += [shape.points[first] + ring, shape.points[last] + ring]
+    return replace(
+        shape,
+        points=np.concatenate(rings),
+        shapes=shape.shapes[np.repeat(shape.cells.ravel(), SIDES)],
+        cells=np.concatenate([bar + 2 * SIDES * k for k in range(len(shape.cells))]),
+    )
 
 
 def _bar() -> Integers:

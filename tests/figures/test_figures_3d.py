@@ -57,10 +57,10 @@ def test_every_standard_figure_is_drawn(arm_3r, tmp_path):
 @pytest.mark.parametrize("s", [1.0, 40.0])
 def test_links_are_drawn_where_they_were_solved_and_joined(arm, s):
     """Ends of the lines against the file; at 40 times the deflection, too, each begins where the one before it ends."""
-    bodies, shift = moving_bodies(arm, "inverse", FRAMES)
+    bodies = moving_bodies(arm, "inverse", FRAMES)
     drawn = {}
-    for body, carried in zip(bodies, shift, strict=True):
-        at = line_shape(arm, body, []).placed(body, carried, s)
+    for body in bodies:
+        at = line_shape(arm, body, []).placed(s)
         drawn[body.name] = at
         if s == 1.0:
             for end, label in ((0, "root"), (-1, "tip" if body.name != "column" else "top")):
@@ -74,10 +74,10 @@ def test_links_are_drawn_where_they_were_solved_and_joined(arm, s):
 
 def test_surface_is_the_section_swept_along_the_line(arm):
     """Every corner of the tube is its outer radius off the deformed axis, to second order of the slopes."""
-    bodies, shift = moving_bodies(arm, "inverse", FRAMES)
-    for body, carried, radius in zip(bodies[1:], shift[1:], (0.0055, 0.004), strict=True):
-        line = line_shape(arm, body, []).placed(body, carried, 1.0)
-        surface = surface_shape(arm, body, []).placed(body, carried, 1.0)
+    bodies = moving_bodies(arm, "inverse", FRAMES)
+    for body, radius in zip(bodies[1:], (0.0055, 0.004), strict=True):
+        line = line_shape(arm, body, []).placed()
+        surface = surface_shape(arm, body, []).placed()
         corners = surface.shape[1] // line.shape[1]
         away = np.linalg.norm(surface.reshape(len(FRAMES), -1, corners, 3) - line[:, :, None], axis=3)
         np.testing.assert_allclose(away, radius, rtol=1e-3)
@@ -85,7 +85,7 @@ def test_surface_is_the_section_swept_along_the_line(arm):
 
 def test_sections_have_the_axes_of_the_file(crank):
     """The universal joint's axes are square at all times: z of the crank's tip, y of the rod's root."""
-    bodies, _ = moving_bodies(crank, "inverse", FRAMES)
+    bodies = moving_bodies(crank, "inverse", FRAMES)
     z = section_axes(bodies, "crank.tip", len(FRAMES))[:, :, 2]
     y = section_axes(bodies, "rod.root", len(FRAMES))[:, :, 1]
     np.testing.assert_allclose(np.sum(z * y, axis=1), 0.0, atol=1e-10)
@@ -111,7 +111,7 @@ def test_configurations_hold_every_link_at_every_time(arm):
     corner, above, level = draw_configurations(record, arm).axes
     assert "deflections × 3" in corner.get_title(loc="left")
     assert [axes.get_xlabel() + axes.get_ylabel() for axes in (above, level)] == ["x (m)y (m)", "x (m)z (m)"]
-    bodies, shift = moving_bodies(arm, "inverse", FRAMES[[0, 1, 3]])
+    bodies = moving_bodies(arm, "inverse", FRAMES[[0, 1, 3]])
     for axes, right, up in (
         (corner, SPACE.right, SPACE.up),
         (above, [1, 0, 0], [0, 1, 0]),
@@ -119,8 +119,8 @@ def test_configurations_hold_every_link_at_every_time(arm):
     ):
         drawn = np.concatenate([np.concatenate(c.get_segments()) for c in axes.collections])
         assert len(axes.collections) == 3 * 3  # times, bodies
-        for body, carried in zip(bodies, shift, strict=True):
-            at = line_shape(arm, body, []).placed(body, carried, 3.0)
+        for body in bodies:
+            at = line_shape(arm, body, []).placed(3.0)
             at = np.stack([at @ right, at @ up], axis=-1)
             assert np.all(at > [axes.get_xlim()[0], axes.get_ylim()[0]])
             assert np.all(at < [axes.get_xlim()[1], axes.get_ylim()[1]])

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from selenium.webdriver import ActionChains
 
 from ffrobot.common.errors import InputError
+from ffrobot.pictures.motion import MovingBody
 from ffrobot.pictures.projection import COLORS
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import history_charts
@@ -176,8 +177,10 @@ def test_a_run_has_one_colour_on_the_page(two_link):
 def test_bars_stand_for_lines():
     """Closed surfaces: every edge between two triangles, once each way; a ring as far off the line as asked."""
     points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.4], [0.3, 0.0, 0.4]])
-    line = Shape(points, np.zeros((3, 3, 0)), np.zeros((1, 0)), np.array([[0, 1], [1, 2]]))
-    dot = Shape(points[:1], np.zeros((1, 3, 0)), np.zeros((1, 0)), np.zeros((1, 1), dtype=int))
+    position, still = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
+    body = MovingBody("rod", position, still, None, (), np.zeros((0, 3)), position[:, :0], still[:, :0], position)
+    line = Shape(body, points, np.zeros((3, 3, 0)), np.zeros((1, 0)), np.array([[0, 1], [1, 2]]))
+    dot = Shape(body, points[:1], np.zeros((1, 3, 0)), np.zeros((1, 0)), np.zeros((1, 1), dtype=int))
     for shape in (thickened(line, 0.01), thickened(dot, 0.01)):
         edges = np.concatenate([shape.cells[:, [0, 1]], shape.cells[:, [1, 2]], shape.cells[:, [2, 0]]])
         assert {tuple(e) for e in edges} == {tuple(e[::-1]) for e in edges}

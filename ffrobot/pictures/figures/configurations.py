@@ -30,7 +30,7 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     assert figure.analysis is not None
     outputs = results.time(figure.analysis)
     frames = np.array([int(np.argmin(np.abs(outputs - time))) for time in figure.times], dtype=np.intp)
-    bodies, shift = moving_bodies(results, figure.analysis, frames)
+    bodies = moving_bodies(results, figure.analysis, frames)
     s = figure.exaggeration or (1.0 if results.space.is_plane else _visible(bodies))
     is_bent = any(body.deflection.any() for body in bodies)
     exaggerated = f", deflections × {s:g}" if s != 1.0 and is_bent else ""
@@ -45,10 +45,10 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
             axes.plot(ground, "^", color=GREY, markersize=6, label="ground")
         for k, color in enumerate(colors):
             has_surface = axes is views[0] and k in (0, len(frames) - 1)
-            for body, shape, carried in zip(bodies, surfaces if has_surface else lines, shift, strict=True):
-                axes.body(shape.placed(body, carried, s)[k], shape.cells, color)
-                ends = [i for i, name in enumerate(body.point_names) if not name.endswith(".mid")]
-                axes.plot(body.exaggerated(carried, s)[k, ends], "o", color=color, markersize=2.5)
+            for shape in surfaces if has_surface else lines:
+                axes.body(shape.placed(s)[k], shape.cells, color)
+                ends = [i for i, name in enumerate(shape.body.point_names) if not name.endswith(".mid")]
+                axes.plot(shape.body.exaggerated(s)[k, ends], "o", color=color, markersize=2.5)
             axes.axes.plot([], [], color=color, linewidth=1.5, label=f"t = {outputs[frames[k]]:g} s")
         axes.finish()
     legend(views[0].axes)
@@ -172,19 +172,18 @@ def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
     picture = Figure(figsize=(2 * SIZE[0], (2.1 if results.space.is_plane else 2.6) * rows), layout="constrained")
     if not len(shown):
         picture.suptitle("no mode vibrates")
-    bodies, _ = moving_bodies(results, figure.analysis, np.array([k]))
-    shapes = [line_shape(results, body, []) for body in bodies]
+    shapes = [line_shape(results, body, []) for body in moving_bodies(results, figure.analysis, np.array([k]))]
     for place, mode in enumerate(shown, 1):
         axes = SceneAxes(picture.add_subplot(rows, COLUMNS, place), PLANE if results.space.is_plane else SPACE)
         axes.axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
         group = f"{figure.analysis}/linear/modes"
-        ways = [_way(results, group, body, shape, k, int(mode)) for body, shape in zip(bodies, shapes, strict=True)]
-        _draw_mode(axes, [shape.placed(body)[0] for body, shape in zip(bodies, shapes, strict=True)], shapes, ways)
+        _draw_mode(axes, shapes, [_way(results, group, shape, k, int(mode)) for shape in shapes])
         axes.finish(label_size=6)
     return picture
 
 
-def _draw_mode(axes: SceneAxes, places: Sequence[Array], shapes: Sequence[Shape], ways: Sequence[Array]) -> None:
+def _draw_mode(axes: SceneAxes, shapes: Sequence[Shape], ways: Sequence[Array]) -> None:
+    places = [shape.placed()[0] for shape in shapes]
     size = np.ptp(np.vstack(places), axis=0).max()
     largest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)
     scale = AMPLITUDE * size / max(largest, 1e-300)
@@ -194,12 +193,12 @@ def _draw_mode(axes: SceneAxes, places: Sequence[Array], shapes: Sequence[Shape]
             axes.body(at + sign * scale * way, shape.cells, color, 1.2)
 
 
-def _way(results: Results, group: str, body: MovingBody, shape: Shape, k: int, mode: int) -> Array:
+def _way(results: Results, group: str, shape: Shape, k: int, mode: int) -> Array:
     """(p, 3) how the points of a body move in a mode: δR + δφ × A (x + Φ p) + A Φ δp, in global axes."""
-    turning = "angle" if results.space.is_plane else "rotation"
+    body, turning = shape.body, "angle" if results.space.is_plane else "rotation"
     d_position, turn, d_p = (results[f"{group}/{body.name}/{key}"][k, mode] for key in ("position", turning, "modal"))
     turn = np.array([0.0, 0.0, float(turn)]) if results.space.is_plane else turn
-    arm = shape.placed(body)[0] - body.position[0]
+    arm = shape.placed()[0] - body.position[0]
     is_flexible = len(d_p) == shape.shapes.shape[2]  # bodies drawn through their points do not show it
     bent = body.turned((shape.shapes @ d_p)[None])[0] if is_flexible else np.zeros_like(arm)
     return in_3d(d_position) + np.cross(turn, arm) + bent

@@ -93,19 +93,19 @@ class Scene:
 
 def moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
     """The scene at the outputs `frames`; `scale` as large as can be seen if None."""
-    bodies, shift = moving_bodies(results, analysis, frames)
+    bodies = moving_bodies(results, analysis, frames)
     size = size_of(bodies)
     if scale is None:
         scale = visible_exaggeration(size, max(float(np.abs(b.deflection).max(initial=0.0)) for b in bodies))
     points, triangles, count = [], [], 0
-    for body, carried in zip(bodies, shift, strict=True):
+    for body in bodies:
         shape = thickened(surface_shape(results, body, notes), BAR * size)
         kept, cells = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
-        points.append(shape.placed(body, carried, scale)[:, kept])
+        points.append(shape.placed(scale)[:, kept])
         triangles.append(cells + count)
         count += len(kept)
     wanted, T, reach = targets(results, analysis), len(frames), AXIS_LENGTH * size
-    joints = joint_markers(results.scene, bodies, shift)
+    joints = joint_markers(results.scene, bodies)
     return Scene(
         size=size,
         scale=scale,
@@ -113,8 +113,8 @@ def moving_scene(results: Results, analysis: str, frames: Indices, scale: float 
         triangles=np.concatenate(triangles),
         joints=np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3)),
         axes=_ends(joints, scale, (-reach, reach), T),
-        tools=_ends(tool_markers(wanted, bodies, shift), scale, (0.0, TOOL_LENGTH * size), T),
-        paths=[(target, tool_marker(target.point, bodies, shift).position) for target in wanted],
+        tools=_ends(tool_markers(wanted, bodies), scale, (0.0, TOOL_LENGTH * size), T),
+        paths=[(target, tool_marker(target.point, bodies).position) for target in wanted],
     )
 
 

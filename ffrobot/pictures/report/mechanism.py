@@ -49,17 +49,17 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
     notes: list[str] = []
     moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]
     shown = [k for k, run in enumerate(runs) if run.analysis == run.results.analyses[0]]  # others are hidden at first
-    corners = np.concatenate([body.global_points.reshape(-1, 3) for k in shown for body in moved[k][0]])
+    corners = np.concatenate([body.global_points.reshape(-1, 3) for k in shown for body in moved[k]])
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = float((high - low).max()) or 1.0
-    deflections = [float(np.abs(body.deflection).max(initial=0.0)) for k in shown for body in moved[k][0]]
+    deflections = [float(np.abs(body.deflection).max(initial=0.0)) for k in shown for body in moved[k]]
     entries = [
         {
             "label": plain(run.label),
             "color": COLORS[k % len(COLORS)],
             "visible": k in shown,
             "time": encoded(run.results.time(run.analysis)[_frames(run)]),
-            **_run_data(run, *moved[k], size, notes),
+            **_run_data(run, moved[k], size, notes),
         }
         for k, run in enumerate(runs)
     ]
@@ -88,18 +88,17 @@ def _frames(run: Run) -> Indices:
     return np.unique(np.linspace(0, outputs - 1, min(outputs, MAX_FRAMES)).astype(np.intp))
 
 
-def _run_data(run: Run, bodies: list[MovingBody], shift: list[Array], size: float, notes: list[str]) -> dict[str, Any]:
-    scene = run.results.scene
+def _run_data(run: Run, bodies: list[MovingBody], size: float, notes: list[str]) -> dict[str, Any]:
     wanted = targets(run.results, run.analysis)
     return {
-        "bodies": [_body_data(run, body, s, BAR * size, notes) for body, s in zip(bodies, shift, strict=True)],
-        "joints": [_marker_data(marker) for marker in joint_markers(scene, bodies, shift)],
-        "tools": [_marker_data(marker) for marker in tool_markers(wanted, bodies, shift)],
+        "bodies": [_body_data(run, body, BAR * size, notes) for body in bodies],
+        "joints": [_marker_data(marker) for marker in joint_markers(run.results.scene, bodies)],
+        "tools": [_marker_data(marker) for marker in tool_markers(wanted, bodies)],
         "paths": [_path_data(run, target) for target in wanted],
     }
 
 
-def _body_data(run: Run, body: MovingBody, shift: Array, bar: float, notes: list[str]) -> dict[str, Any]:
+def _body_data(run: Run, body: MovingBody, bar: float, notes: list[str]) -> dict[str, Any]:
     """Surface points x (p, 3), their displacements Φ (p, 3, n), and the motion R, e, p of the body with its shift."""
     shape = thickened(surface_shape(run.results, body, notes), bar)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
@@ -107,7 +106,7 @@ def _body_data(run: Run, body: MovingBody, shift: Array, bar: float, notes: list
         "name": plain(body.name),
         "position": encoded(body.position),
         "quaternion": encoded(body.orientation),
-        "shift": encoded(shift),
+        "shift": encoded(body.shift),
         "points": encoded(shape.points[kept]),
         "shapes": encoded(shape.shapes[kept].reshape(len(kept), -1)),
         "p": encoded(shape.coordinates),

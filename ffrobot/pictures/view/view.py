@@ -147,9 +147,9 @@ def motion_picture(
     assert grid.time is not None
     name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
     braces = name.replace("{", "{{").replace("}", "}}")
-    bodies, shift = moving_bodies(results, analysis, frames[list(steps)])
-    joints = joint_markers(results.scene, bodies, shift)
-    tools = tool_markers(targets(results, analysis), bodies, shift)
+    bodies = moving_bodies(results, analysis, frames[list(steps)])
+    joints = joint_markers(results.scene, bodies)
+    tools = tool_markers(targets(results, analysis), bodies)
     return Picture(
         f"{braces}, t = {{time}} s{exaggerated}",
         steps=steps,

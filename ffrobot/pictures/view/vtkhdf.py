@@ -120,11 +120,10 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     stresses of a surface are known. Cell data: `body`, its number in the scene. `notes` say what could not be drawn as
     it is.
     """
-    bodies, shift = moving_bodies(results, analysis, frames)
+    bodies = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
-    deflections = [shape.deflection(body) for shape, body in zip(shapes, bodies, strict=True)]
-    points = [shape.placed(body) for shape, body in zip(shapes, bodies, strict=True)]
-    exaggerations = [deflection + carried[:, None] for deflection, carried in zip(deflections, shift, strict=True)]
+    deflections = [shape.deflection for shape in shapes]
+    exaggerations = [part + body.shift[:, None] for part, body in zip(deflections, bodies, strict=True)]
     data = {"deflection": deflections, "exaggeration": exaggerations}
     stresses = [_von_mises(results, analysis, body.name, frames) for body in bodies]
     if any(stress is not None for stress in stresses):
@@ -136,7 +135,7 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     numbers = [body["name"] for body in results.scene["body"]]
     return Grid(
         cells=[shape.cells + start for shape, start in zip(shapes, first, strict=True)],
-        points=np.concatenate(points, axis=1),
+        points=np.concatenate([shape.placed() for shape in shapes], axis=1),
         time=results.time(analysis)[frames],
         point_data={name: np.concatenate(parts, axis=1) for name, parts in data.items()},
         cell_data={"body": np.repeat([numbers.index(b.name) for b in bodies], [len(s.cells) for s in shapes])},
