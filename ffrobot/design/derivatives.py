@@ -18,7 +18,7 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..sweep.sweep import Key
-from .designs import Design, Point
+from .designs import Point
 from .readings import Followed, Goal, Reading
 
 LEVELS = 3  # sizes of steps that one extrapolation takes at most
@@ -141,21 +141,6 @@ class Entry:
     method: Method
     notes: tuple[str, ...] = ()
     unresolved: float = 0.0
-
-
-def sample(base: Base, k: int, offset: float, design: Design) -> Sample:
-    """The goals of a design beside the base with one key changed."""
-    failure = "" if design.completed else f"{design.row.status}: {design.row.message}"
-    return Sample(k, offset, followed(base, design), failure)
-
-
-def followed(base: Base, design: Design) -> tuple[Followed, ...]:
-    """The goals of a design beside the base; nothing where it failed."""
-    if not design.completed:
-        return ()
-    with design.results() as results:
-        pairs = zip(base.goals, base.readings, strict=True)
-        return tuple(goal.follow(results, reading) for goal, reading in pairs)
 
 
 def values_of(goals: Sequence[Followed]) -> Array:

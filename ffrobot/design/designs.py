@@ -31,7 +31,7 @@ from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, check_point, claim_folder
 from ..sweep.variation import Variation
 from ..sweep.workers import Workers
-from .readings import Goal, Reading
+from .readings import Followed, Goal, Reading
 
 OUTPUTS = 1000  # at least, where goals are peaks or means over time: they do not depend on those of the scene
 ALGEBRAIC = ("static", "pcid")
@@ -66,8 +66,8 @@ def may_repeat(keys: Sequence[Key]) -> bool:
     return not any(key[0] == "analysis" for key in keys)
 
 
-def repeated_steps(results: Results, path: Path, readings: Iterable[Reading]) -> dict[Key, Any] | None:
-    """Changes of a scene with which its integrations take the steps of a run again, whose `results` are at `path`.
+def repeated_steps(results: Results, readings: Iterable[Reading]) -> dict[Key, Any] | None:
+    """Changes of a scene with which its integrations take the steps of a run again, whose `results` these are.
 
     None where one of them cannot be repeated, or one of the `readings` lies between outputs, as runs that repeat steps
     have outputs alone; nothing where none is integrated, and differences are smooth anyway.
@@ -80,7 +80,7 @@ def repeated_steps(results: Results, path: Path, readings: Iterable[Reading]) ->
     smooth = all(about[name]["kind"] in ALGEBRAIC for name in about if name not in stepping)
     if not (repeated and smooth):
         return None
-    return {("analysis", name, "repeat_steps"): str(path.absolute()) for name in stepping}
+    return {("analysis", name, "repeat_steps"): str(results.path.absolute()) for name in stepping}
 
 
 def _needed(scene: Scene, goals: Sequence[Goal]) -> set[str]:
@@ -144,11 +144,26 @@ class Design:
         """Whether its results are whole."""
         return self.row.status == "completed"
 
-    @contextmanager
-    def results(self) -> Iterator[Results]:
-        """To be read."""
-        with Results(self.folder / RESULTS) as results:
-            yield results
+    @property
+    def failure(self) -> str:
+        """Why they are not; empty where they are."""
+        return "" if self.completed else f"{self.row.status}: {self.row.message}"
+
+    def results(self) -> Results:
+        """To be read, in a `with`."""
+        return Results(self.folder / RESULTS)
+
+    def read(self, goals: Iterable[Goal]) -> tuple[Reading, ...]:
+        """The goals of a design that completed. Raises `InputError` where its results do not have them."""
+        with self.results() as results:
+            return tuple(goal.read(results) for goal in goals)
+
+    def follow(self, goals: Sequence[Goal], readings: Sequence[Reading]) -> tuple[Followed, ...]:
+        """The goals beside a design with these `readings`; nothing where this one failed."""
+        if not self.completed:
+            return ()
+        with self.results() as results:
+            return tuple(goal.follow(results, one) for goal, one in zip(goals, readings, strict=True))
 
 
 class Designs:
@@ -183,20 +198,24 @@ class Designs:
     def _lot(self, points: Sequence[Point], changes: Mapping[Key, Any] | None) -> Sweep:
         return replace(self._sweep, points=tuple(points), fixed={**self._sweep.fixed, **(changes or {})})
 
-    def problem(self, point: Point) -> str:
-        """What is wrong with the scene or a link file at a point, before any run; empty where nothing is seen."""
-        try:
-            check_point(self._sweep, point)
-        except InputError as error:
-            return str(error)
-        return ""
+    def problem(self, *points: Point) -> str:
+        """What is wrong with the scene or a link file at all of the points, before any run; empty where nothing is."""
+        found = ""
+        for point in points:
+            try:
+                check_point(self._sweep, point)
+            except InputError as error:
+                found = str(error)
+            else:
+                return ""
+        return found
 
     def run_first(self, point: Point) -> Design:
         """The design at `point`. Raises `InputError` or `SolveError` where it does not complete."""
         (design,) = self.run([point])
         if not design.completed:
             error = InputError if design.row.status == "wrong input" else SolveError
-            raise error(f"{self._runs.path}: {design.row.status}: {design.row.message}")
+            raise error(f"{self._runs.path}: {design.failure}")
         return design
 
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:

@@ -20,7 +20,6 @@ from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..results.file import Results
-from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point, repeated_steps
 from .goals import Limit, Problem
@@ -143,7 +142,7 @@ class Evaluations:
     def failures(self) -> list[str]:
         """Designs that failed, in words."""
         unread = {one.design.point: one.failure for one in self.searched if not one.completed}
-        unrun = {d.point: f"{d.row.status}: {d.row.message}" for d in self._designs.values() if not d.completed}
+        unrun = {d.point: d.failure for d in self._designs.values() if not d.completed}
         return [f"{self._words(point)}: {why}" for point, why in (unread | unrun).items()]
 
     @property
@@ -166,8 +165,7 @@ class Evaluations:
     def rows(self, one: Evaluated) -> tuple[Reading, ...]:
         """Of all rows of `split`, in a design that completed."""
         if one.design.folder not in self._rows:
-            with one.design.results() as results:
-                self._rows[one.design.folder] = tuple(goal.read(results) for goal in self.split.goals)
+            self._rows[one.design.folder] = one.design.read(self.split.goals)
         return self._rows[one.design.folder]
 
     def row_values(self, one: Evaluated) -> tuple[float, ...]:
@@ -202,13 +200,12 @@ class Evaluations:
 
     def _read(self, place: Place, design: Design) -> Evaluated:
         if not design.completed:
-            return Evaluated(place, design, (), f"{design.row.status}: {design.row.message}")
+            return Evaluated(place, design, (), design.failure)
         first = not any(one.completed for one in self._searched.values())
         try:
             with design.results() as results:
                 readings = tuple(goal.read(results) for goal in self.problem.goals)
-                again = repeated_steps(results, design.folder / RESULTS, readings)
-                found = Evaluated(place, design, readings, again=again)
+                found = Evaluated(place, design, readings, again=repeated_steps(results, readings))
         except InputError as error:
             if first:  # a goal that means nothing
                 raise
@@ -218,13 +215,9 @@ class Evaluations:
         return found
 
     def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:
-        if not design.completed:
-            return ()
         known = base.place, design.folder
         if known not in self._followed:
-            with design.results() as results:
-                pairs = zip(self.split.goals, self.rows(base), strict=True)
-                self._followed[known] = tuple(goal.follow(results, reading) for goal, reading in pairs)
+            self._followed[known] = design.follow(self.split.goals, self.rows(base))
         return self._followed[known]
 
     def _words(self, point: Point) -> str:

@@ -185,8 +185,8 @@ class _Searches:
 
     def front(self, count: int) -> Front:
         """The ends, then from the first one on to the second."""
-        start = tuple(float(u or 0.0) for u in self.space.start())
-        first = self._least(self.problem, start, f"1 of {count}")
+        assert self.space.start_place is not None  # which `check_start` has seen to
+        first = self._least(self.problem, self.space.start_place, f"1 of {count}")
         last = self._least(replace(self.problem, objective=self.against), first.design.place, f"{count} of {count}")
         high, low = first.against, last.against
         if high - low <= SAME * abs(high):
@@ -198,9 +198,9 @@ class _Searches:
         for k, bound in enumerate(_between(high, low, count), start=2):
             limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
             found.append(self._least(replace(self.problem, limits=limits), found[-1].design.place, f"{k} of {count}"))
-        units = [self._read(goal, first.design).unit for goal in (self.problem.objective, self.against)]
+        unit, other = (one.unit for one in self._both(first.design))
         return Front(
-            self.path, (self.problem.objective.text, self.against.text), (units[0], units[1]),
+            self.path, (self.problem.objective.text, self.against.text), (unit, other),
             tuple(map(".".join, self.space.keys)), (*found, last), len(self.ran), self.tolerance, self.space,
             self.problem, tuple(map(self._with_both, self.tried.values())),
         )  # fmt: skip
@@ -219,7 +219,7 @@ class _Searches:
         self.tried |= {one.design.folder: one for one in evaluations.searched}
         if not found.best.completed:
             raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
-        goal, against = (self._read(goal, found.best).value for goal in (self.problem.objective, self.against))
+        goal, against = (one.value for one in self._both(found.best))
         return FrontPoint(
             self.space.point(found.best.place), goal, against, self._price(found, evaluations.problem),
             found.optimality is not None and found.optimality.reached(AIM),
@@ -235,15 +235,11 @@ class _Searches:
 
     def _with_both(self, one: Evaluated) -> Evaluated:
         """With readings of all goals, those of the limits, and the second one."""
-        if not one.completed:
-            return one
-        with one.design.results() as results:
-            return replace(one, readings=tuple(goal.read(results) for goal in (*self.problem.goals, self.against)))
+        goals = (*self.problem.goals, self.against)
+        return replace(one, readings=one.design.read(goals)) if one.completed else one
 
-    @staticmethod
-    def _read(goal: Goal, design: Evaluated) -> Reading:
-        with design.design.results() as results:
-            return goal.read(results)
+    def _both(self, one: Evaluated) -> tuple[Reading, ...]:
+        return one.design.read((self.problem.objective, self.against))
 
 
 def _between(high: float, low: float, count: int) -> Array:

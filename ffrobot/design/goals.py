@@ -129,7 +129,12 @@ class Frequency(Goal):
         return Followed(float(body.frequency[modes.index(nominal.mode)]))
 
     def _body(self, results: Results) -> ModalBody:
-        return results.modal_body(_flexible(results, self.text, self.body))
+        if self.body not in (known := results.modal_files):
+            raise InputError(
+                f'"{self.text}": expected a body with a link ({quoted(known)}), found "{self.body}"'
+                f"{did_you_mean(self.body, known)}"
+            )
+        return results.modal_body(self.body)
 
 
 @dataclass(frozen=True)
@@ -231,15 +236,6 @@ def _modes(body: ModalBody) -> list[str]:
     """Family and number in it, from 1, of the eigenmodes."""
     families = body.family[: body.eigenmode_count]
     return [f"{family} {families[: k + 1].count(family)}" for k, family in enumerate(families)]
-
-
-def _flexible(results: Results, text: str, body: str) -> str:
-    known = results.modal_files
-    if body not in known:
-        raise InputError(
-            f'"{text}": expected a body with a link ({quoted(known)}), found "{body}"{did_you_mean(body, known)}'
-        )
-    return body
 
 
 def _mass(results: Results, body: Mapping[str, object]) -> float:

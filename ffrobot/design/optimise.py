@@ -83,17 +83,13 @@ def check_start(path: Path, space: Space, method: str) -> None:
 
 def check_bounds(designs: Designs, space: Space) -> None:
     """Raise `InputError` for a bound that is impossible wherever the others are, before any run."""
-    own = space.start()
-    others: list[Place] = [] if None in own else [tuple(float(u or 0.0) for u in own)]
-    others += [(0.0,) * len(own), tuple(variable.top for variable in space.variables)]
+    others = [] if space.start_place is None else [space.start_place]
+    others += [(0.0,) * len(space.variables), tuple(variable.top for variable in space.variables)]
     for j, variable in enumerate(space.variables):
         ends = () if variable.is_catalogue else ((0.0, variable.low), (1.0, variable.high))
         for end, bound in ends:
-            problem = ""
-            for place in others:
-                if not (problem := designs.problem(space.point((*place[:j], end, *place[j + 1 :])))):
-                    break
-            if problem:
+            points = (space.point((*place[:j], end, *place[j + 1 :])) for place in others)
+            if problem := designs.problem(*points):
                 raise InputError(
                     f"--vary: expected bounds that designs can have, found {variable.name} = {bound:g}:\n{problem}"
                 )
@@ -101,8 +97,7 @@ def check_bounds(designs: Designs, space: Space) -> None:
 
 def _starts(space: Space, count: int, seed: int) -> list[Place]:
     """The scene itself, where it is in all bounds and catalogues, and places of a Latin hypercube."""
-    own = space.start()
-    found: list[Place] = [] if None in own else [tuple(float(u or 0.0) for u in own)]
+    found = [] if space.start_place is None else [space.start_place]
     if count > 1:
         sample = LatinHypercube(len(space.variables), seed=seed).random(count - 1)
         found += [tuple(map(float, row)) for row in sample]

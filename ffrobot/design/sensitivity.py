@@ -29,7 +29,6 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..pictures.studies.study import Bars, Series
 from ..sweep.files import number_at
-from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
 from .derivatives import (
     AIM,
@@ -39,8 +38,6 @@ from .derivatives import (
     Known,
     Sample,
     entries,
-    followed,
-    sample,
     values_of,
     wants_larger_steps,
     wants_smaller_steps,
@@ -246,7 +243,7 @@ def _nominal(
     design = designs.run_first(point)
     with design.results() as results:
         readings = tuple(goal.read(results) for goal in goals)
-        return readings, repeated_steps(results, design.folder / RESULTS, readings)
+        return readings, repeated_steps(results, readings)
 
 
 def _check_steps(designs: Designs, base: Base) -> None:
@@ -254,11 +251,7 @@ def _check_steps(designs: Designs, base: Base) -> None:
     for k, key in enumerate(base.keys):
         if not base.point[k].is_integer():
             continue
-        offsets, problem = (base.steps[k], -base.steps[k]), ""
-        for offset in offsets:
-            if not (problem := designs.problem(base.moved(k, offset))):
-                break
-        if problem:
+        if problem := designs.problem(base.moved(k, base.steps[k]), base.moved(k, -base.steps[k])):
             name = ".".join(key)
             raise InputError(f"--to: expected keys that may be a little larger or smaller, found {name}:\n{problem}")
 
@@ -312,7 +305,10 @@ def take_pairs(designs: Designs, base: Base, known: Known, wanted: Sequence[int]
 def samples_at(designs: Designs, base: Base, places: Sequence[tuple[int, float]]) -> list[Sample]:
     """Runs with one key changed, by number of the key and offset."""
     found = designs.run([base.moved(k, offset) for k, offset in places], base.again)
-    return [sample(base, k, offset, design) for (k, offset), design in zip(places, found, strict=True)]
+    return [
+        Sample(k, offset, design.follow(base.goals, base.readings), design.failure)
+        for (k, offset), design in zip(places, found, strict=True)
+    ]
 
 
 def _sums_of_differences(designs: Designs, base: Base, signed: Mapping[int, float]) -> dict[float, Array]:
@@ -328,7 +324,8 @@ def _sums_of_differences(designs: Designs, base: Base, signed: Mapping[int, floa
         for part in widths
         for side in (1.0, -1.0)
     ]
-    values = [values_of(followed(base, design)) for design in designs.run(ends, base.again)]
+    found = designs.run(ends, base.again)
+    values = [values_of(design.follow(base.goals, base.readings)) for design in found]
     pairs = zip(widths, values[::2], values[1::2], strict=True)
     return {part: as_floats(0.5 * (above - below) / shorter) for part, above, below in pairs}
 

@@ -23,7 +23,7 @@ from ..common.tables import shown
 from ..sweep.files import number_at
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point, Runs, changes_for, parse_key
-from .readings import Goal, Reading
+from .readings import Goal
 
 LEVELS = (0.05, 0.5, 0.95)
 RESAMPLES = 200  # of a bootstrap
@@ -289,8 +289,7 @@ class SpreadDesigns:
         self._designs = Designs(runs, keys, own, changes_for(runs.path, (*goals, *others), tolerance))
         self.failures: list[str] = []
         self.middle = self._run_middle()
-        with self.middle.results() as results:
-            self.readings: tuple[Reading, ...] = tuple(goal.read(results) for goal in goals)
+        self.readings = self.middle.read(goals)
 
     @property
     def table(self) -> Path | None:
@@ -303,14 +302,13 @@ class SpreadDesigns:
 
     def read(self, design: Design) -> list[float]:
         """The goals, NaN where the design failed or does not have them."""
-        if design.completed:
-            try:
-                with design.results() as results:
-                    return [goal.read(results).value for goal in self.goals]
-            except InputError as error:
-                self.failures.append(f"{self.where(design)}: {error}")
-        else:
-            self.failures.append(f"{self.where(design)}: {design.row.status}: {design.row.message}")
+        failure = design.failure
+        try:
+            if not failure:
+                return [one.value for one in design.read(self.goals)]
+        except InputError as error:
+            failure = str(error)
+        self.failures.append(f"{self.where(design)}: {failure}")
         return [float("nan")] * len(self.goals)
 
     def where(self, design: Design) -> str:

@@ -146,20 +146,16 @@ class _Study:
     def _check_sides(self, designs: Sequence[Design]) -> None:
         if failed := next((one for one in designs if not one.completed), None):
             where = f"{self._designs.path}: {self._designs.where(failed)}"
-            why = f"{failed.row.status}: {failed.row.message}"
-            raise SolveError(f"{where}: {why}; gradients need all runs, samples do without some")
+            raise SolveError(f"{where}: {failed.failure}; gradients need all runs, samples do without some")
 
     def _follow(self, design: Design) -> list[float]:
         """The goals beside the middle, peaks at their own times."""
-        if not design.completed:
-            return [float("nan")] * len(self._goals)
-        with design.results() as results:
-            found = [g.follow(results, r) for g, r in zip(self._goals, self._readings, strict=True)]
-        for goal, one in zip(self._goals, found, strict=True):
+        found = design.follow(self._goals, self._readings)
+        for goal, one in zip(self._goals, found, strict=False):
             if one.elsewhere:
                 kink = f"{goal.text}: a kink: with {self._designs.where(design)} the largest value is {one.elsewhere}"
                 self._notes.setdefault(goal.text, f"{kink}; samples take it into account")
-        return [one.value for one in found]
+        return [one.value for one in found] or [float("nan")] * len(self._goals)
 
     def _values(self, m: int, design: Design) -> Array:
         """History m (T,), at the times of the one in the middle."""

@@ -119,6 +119,12 @@ class Space:
             first += len(variable.keys)
         return tuple(found)
 
+    @property
+    def start_place(self) -> Place | None:
+        """Where the scene itself is; None where it is out of bounds or in no catalogue."""
+        own = [u for u in self.start() if u is not None]
+        return tuple(own) if len(own) == len(self.variables) else None
+
 
 def read_space(path: Path, vary: Sequence[str]) -> Space:
     """What `--vary` says of the scene file at `path`. Raises `InputError`."""
@@ -126,11 +132,8 @@ def read_space(path: Path, vary: Sequence[str]) -> Space:
     if not variables:
         raise InputError(f"optimise: expected at least one --vary, {FORMS}")
     check_once([key for variable in variables for key in variable.keys])
-    return Space(variables, tuple(_own(path, v, key) for v in variables for key in v.keys))
-
-
-def _own(path: Path, variable: Variable, key: Key) -> Any:  # noqa: ANN401 (whatever the file has)
-    return value_at(path, key, "--vary") if variable.is_catalogue else number_at(path, key, "--vary")
+    readers = [(value_at if variable.is_catalogue else number_at, variable.keys) for variable in variables]
+    return Space(variables, tuple(read(path, key, "--vary") for read, keys in readers for key in keys))
 
 
 def parse_variable(text: str) -> Variable:

@@ -27,7 +27,7 @@ def differentiation(tmp_path, scene):
     fixed = changes_for(path, problem.goals, 1e-7, keep_steps=True)
     designs = Designs(Runs(path, tmp_path / "runs", processes=2), space.keys, space.own, fixed)
     evaluations = Evaluations(designs, space, problem, 100)
-    (first,) = evaluations.at([tuple(float(u) for u in space.start())])
+    (first,) = evaluations.at([space.start_place])
     found = Differentiation(evaluations, 1e-7)
     found.split_at(first)
     return found, first
