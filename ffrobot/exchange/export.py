@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +23,14 @@ from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
-from .motion.read_motion import csv_text, joint_trajectory_bag, joint_trajectory_text, read_motion, robot_motion
+from .motion.read_motion import (
+    RobotMotion,
+    csv_text,
+    joint_trajectory_bag,
+    joint_trajectory_text,
+    read_motion,
+    robot_motion,
+)
 from .urdf.export_urdf import scene_as_urdf
 from .urdf.import_urdf import Imported
 
@@ -41,60 +48,62 @@ class Exported:
 
 
 class Made(NamedTuple):
-    """What a file is to hold, the analysis that it is of ("" of none), a few words on it, remarks."""
+    """What a file is to hold, a few words on it, remarks, the analysis that it is of ("" of none)."""
 
     content: Content
-    analysis: str
     what: str
     remarks: tuple[str, ...]
+    analysis: str = ""
 
 
-def _csv(path: Path, analysis: str | None) -> Made:
-    motion = robot_motion(path, analysis)
-    return Made(csv_text(motion), motion.analysis, f"{len(motion.joints)} joints of {motion.analysis}", motion.remarks)
+Make = Callable[[Path, str | None], Made]
+"""Of a file, and of an analysis of it where one is named."""
+Converted = tuple[Content, tuple[str, ...]]
+"""A content, and remarks on what it does not carry."""
 
 
-def _joint_trajectory(path: Path, analysis: str | None) -> Made:
-    motion = robot_motion(path, analysis)
-    text, remarks = joint_trajectory_text(motion)
-    return Made(text, motion.analysis, f"{len(motion.time)} points of {motion.analysis}", remarks)
+def _of_motion(convert: Callable[[RobotMotion], Converted], what: str) -> Make:
+    """From the motion in a results file; `what` tells how much it is."""
+
+    def make(path: Path, analysis: str | None) -> Made:
+        motion = robot_motion(path, analysis)
+        content, remarks = convert(motion)
+        counted = what.format(joints=len(motion.joints), points=len(motion.time))
+        return Made(content, f"{counted} of {motion.analysis}", remarks, motion.analysis)
+
+    return make
 
 
-def _rosbag(path: Path, analysis: str | None) -> Made:
-    motion = robot_motion(path, analysis)
-    files, remarks = joint_trajectory_bag(motion)
-    what = f"a JointTrajectory with {len(motion.time)} points of {motion.analysis}"
-    return Made(files, motion.analysis, what, remarks)
+def _of_body(convert: Callable[[ModalBody], Converted]) -> Make:
+    """From a modal body file."""
+
+    def make(path: Path, analysis: str | None) -> Made:
+        body = read_modal_body(path)
+        content, remarks = convert(body)
+        return Made(content, f"{body.name}, {body.modes_in_words}", remarks)
+
+    return make
 
 
-def _urdf(path: Path, analysis: str | None) -> Made:
-    text, what, remarks = scene_as_urdf(path)
-    return Made(text, "", what, remarks)
-
-
-OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], Made]]] = {
-    "csv": (".csv", _csv),
-    "joint-trajectory": (".joint-trajectory.json", _joint_trajectory),
-    "rosbag2": (".rosbag2", _rosbag),
-    "fmu": (".fmu", lambda path, analysis: Made(*linear_fmu(path, analysis))),
+FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
+    "results": {
+        "csv": (".csv", _of_motion(lambda motion: (csv_text(motion), motion.remarks), "{joints} joints")),
+        "joint-trajectory": (".joint-trajectory.json", _of_motion(joint_trajectory_text, "{points} points")),
+        "rosbag2": (".rosbag2", _of_motion(joint_trajectory_bag, "a JointTrajectory with {points} points")),
+        "fmu": (".fmu", lambda path, analysis: Made(*linear_fmu(path, analysis))),
+    },
+    "a scene": {
+        "urdf": (".urdf", lambda path, _: Made(*scene_as_urdf(path))),
+        "fmu": (".fmu", lambda path, analysis: Made(*forward_fmu(path, analysis))),
+    },
+    "a modal body": {
+        "sid": (".SID_FEM", _of_body(sid_text)),
+        "mbdyn": (".fem", _of_body(fem_text)),
+        "craig-bampton": (".craig-bampton.npz", _of_body(craig_bampton_file)),
+        "exudyn": (".exudyn.npz", _of_body(exudyn_file)),
+    },
 }
-"""Formats of results: end of the file's name, and what makes the content."""
-
-
-OF_SCENES: Mapping[str, tuple[str, Callable[[Path, str | None], Made]]] = {
-    "urdf": (".urdf", _urdf),
-    "fmu": (".fmu", lambda path, analysis: Made(*forward_fmu(path, analysis))),
-}
-"""Formats of scenes, likewise."""
-
-
-OF_BODIES: Mapping[str, tuple[str, Callable[[ModalBody], tuple[str | bytes, tuple[str, ...]]]]] = {
-    "sid": (".SID_FEM", sid_text),
-    "mbdyn": (".fem", fem_text),
-    "craig-bampton": (".craig-bampton.npz", craig_bampton_file),
-    "exudyn": (".exudyn.npz", exudyn_file),
-}
-"""Formats of bodies: end of the file's name, and what makes the content and remarks on what it does not carry."""
+"""Formats of each kind of file: end of the new file's name, and what makes its content."""
 
 
 def export_file(
@@ -109,16 +118,13 @@ def export_file(
     if not path.exists():
         raise InputError(f"{path}: expected a scene, a modal body or a results file, found no such file")
     is_scene = path.suffix.lower() == ".toml"
-    is_body = not is_scene and is_modal_body_file(path)
-    known: Collection[str] = OF_SCENES if is_scene else OF_BODIES if is_body else OF_RESULTS
-    kind = "a scene" if is_scene else "a modal body" if is_body else "results"
+    kind = "a scene" if is_scene else "a modal body" if is_modal_body_file(path) else "results"
+    known = FORMATS[kind]
     if file_format not in known:
         raise InputError(f'{path}: --format: expected one of {quoted(known)} of {kind}, found "{file_format}"')
-    if analysis is not None and (is_body or file_format == "urdf"):
+    if analysis is not None and (kind == "a modal body" or file_format == "urdf"):
         raise InputError(f"{path}: --analysis: expected it with results and FMUs only, found {kind} as {file_format}")
-    if is_body:
-        return _export_body(path, file_format, output, force=force)
-    suffix, make = (OF_SCENES if is_scene else OF_RESULTS)[file_format]
+    suffix, make = known[file_format]
     if output is not None:
         _check(output, force=force)
     made = make(path, analysis)
@@ -126,16 +132,6 @@ def export_file(
     _check(target, force=force)
     _write(target, made.content)
     return Exported(target, made.what, made.remarks)
-
-
-def _export_body(path: Path, file_format: str, output: Path | None, *, force: bool) -> Exported:
-    suffix, write = OF_BODIES[file_format]
-    target = output or path.with_suffix(suffix)
-    _check(target, force=force)
-    body = read_modal_body(path)
-    content, remarks = write(body)
-    _write(target, content)
-    return Exported(target, f"{body.name}, {body.modes_in_words}", remarks)
 
 
 def _check(target: Path, *, force: bool) -> None:
@@ -211,7 +207,7 @@ def print_import(imported: Imported, console: Console) -> None:
     console.print(
         f"{robot.name}: {len(robot.links)} links and {len(robot.joints)} joints, of which {len(scene['body'])} bodies"
         f" and {len(moving)} joints move; {mass:.6g} kg in rigid bodies",
-        highlight=False, soft_wrap=True,
+        soft_wrap=True,
     )  # fmt: skip
     table = plain_table("joint", "type", "range", "moment or force", "speed", "damping", "friction")
     for joint in moving:
@@ -227,16 +223,16 @@ def print_import(imported: Imported, console: Console) -> None:
     if imported.masses:
         _print_masses(imported, console)
     for remark in imported.remarks:
-        console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
+        console.print(f"note       {remark}", soft_wrap=True)
     for path in imported.files:
-        console.print(f"written    {path}", highlight=False, soft_wrap=True, markup=False)
+        console.print(f"written    {path}", soft_wrap=True)
 
 
 def print_export(exported: Exported, console: Console) -> None:
     """What was written, and what the format does not carry."""
     for remark in exported.remarks:
-        console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
-    console.print(f"written    {exported.path}: {exported.what}", highlight=False, soft_wrap=True, markup=False)
+        console.print(f"note       {remark}", soft_wrap=True)
+    console.print(f"written    {exported.path}: {exported.what}", soft_wrap=True)
 
 
 def _print_masses(imported: Imported, console: Console) -> None:
@@ -255,5 +251,5 @@ def _print_masses(imported: Imported, console: Console) -> None:
     console.print(
         "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
         " --flexible names a file",
-        highlight=False, soft_wrap=True,
+        soft_wrap=True,
     )  # fmt: skip

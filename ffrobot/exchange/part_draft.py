@@ -91,7 +91,8 @@ def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
     if len(bores) > 1:
         first, *_, last = sorted(bores, key=lambda face: float(face.center @ along))
         return first, last
-    ends = [face for face in part.faces if face.kind == "plane" and _is_outermost(part, face, AT_END * length)]
+    planes = [face for face in part.faces if face.kind == "plane"]
+    ends = [face for face in planes if ((part.points - face.point) @ face.direction).max() < AT_END * length]
     pairs = [
         ((tip.point - root.point) @ tip.direction, root, tip)
         for root in ends
@@ -114,10 +115,6 @@ def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
         face = min(faces, key=lambda face: float(np.linalg.norm(face.center - mass.point)))
         found[face] = found.get(face, 0.0) + mass.mass
     return found
-
-
-def _is_outermost(part: Inspection, face: PartFace, slack: float) -> bool:
-    return bool(((part.points - face.point) @ face.direction).max() < slack)
 
 
 def _across(part: Inspection, root: PartFace, x: Array) -> Array:

@@ -203,6 +203,11 @@ def nodes_of(body: ModalBody) -> tuple[list[Node], dict[str, int]]:
     return nodes, numbers
 
 
+def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
+    """What formats have no place for, as `noted` reads it back: reference condition, numbers of interfaces."""
+    return f"ffrobot: {body.reference_condition}; {', '.join(f'{name}={number}' for name, number in numbers.items())}"
+
+
 NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
 
 

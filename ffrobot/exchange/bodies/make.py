@@ -35,12 +35,15 @@ def modal_body(
         InputError: a mode has no stiffness, or the integrals cannot be those of a body.
     """
     T, omega2 = _orthonormal(found)
-    found, nodes = _transformed(found, T, omega2), [replace(node, at=_turned(node.at, T)) for node in nodes]
-    interfaces = interfaces_of(list(nodes), numbers)
+    found = _transformed(found, T, omega2)
+    turned = (Interface(at.position, at.translation @ T, at.rotation @ T) for at in (node.at for node in nodes))
+    nodes = [Node(node.number, at) for node, at in zip(nodes, turned, strict=True)]
+    interfaces = interfaces_of(nodes, numbers)
     length = float(np.linalg.norm(interfaces["tip"].position - interfaces["root"].position))
     S_bar_kl = found.S_bar_kl
     sections = section_inertia(found)
     S_bar_kl[2, 2] += sections["S_spin"]  # as `ModalBody` books it
+    without_sections = replace(found, spin=found.spin - np.outer(np.eye(3)[0], sections["h_spin"]))
     omega = np.sqrt(omega2)
     families = _families(S_bar_kl, np.asarray(sections["S_spin"]))
     constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
@@ -60,7 +63,7 @@ def modal_body(
         damping_ratio=np.diag(found.damping) / (2 * omega),
         family=families,
         S_bar=found.S_bar,
-        I_bar=_without_sections(found, np.asarray(sections["h_spin"])),
+        I_bar=without_sections.I_bar,
         S_bar_kl=S_bar_kl,
         interfaces=interfaces,
         stations=_stations(nodes, interfaces, length),
@@ -93,8 +96,6 @@ def _orthonormal(found: ShapeIntegrals) -> tuple[Array, Array]:
 
 def _transformed(found: ShapeIntegrals, T: Array, omega2: Array) -> ShapeIntegrals:
     """In modal coordinates p, q = T p."""
-    if np.array_equal(T, np.eye(len(T))):
-        return found
     return replace(
         found,
         S_bar=found.S_bar @ T,
@@ -106,17 +107,6 @@ def _transformed(found: ShapeIntegrals, T: Array, omega2: Array) -> ShapeIntegra
         stiffness=np.diag(omega2),
         damping=T.T @ found.damping @ T,
     )
-
-
-def _turned(at: Interface, T: Array) -> Interface:
-    return at if np.array_equal(T, np.eye(len(T))) else Interface(at.position, at.translation @ T, at.rotation @ T)
-
-
-def _without_sections(found: ShapeIntegrals, h_spin: Array) -> Array:
-    """I_bar (3, 3, n) of what does not turn: C_r0 about x less h_s."""
-    spin = found.spin.copy()
-    spin[0] -= h_spin
-    return replace(found, spin=spin).I_bar
 
 
 def _condition(interfaces: Mapping[str, Interface]) -> str:

@@ -18,7 +18,17 @@ from ...common.errors import InputError
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mesh.included import number_of
-from .integrals import Node, ShapeIntegrals, about_center, integrals_of, nodes_of, noted, slopes, with_agreed_masses
+from .integrals import (
+    Node,
+    ShapeIntegrals,
+    about_center,
+    integrals_of,
+    nodes_of,
+    note,
+    noted,
+    slopes,
+    with_agreed_masses,
+)  # fmt: skip
 from .make import NOT_IN_THE_FILE, modal_body
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
@@ -39,8 +49,7 @@ def fem_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     """The .fem file of a body, and what to know of it."""
     found, (nodes, numbers) = integrals_of(body), nodes_of(body)
     n = found.n_modes
-    names = ", ".join(f"{name}={number}" for name, number in numbers.items())
-    lines = [f"** {body.name}", f"** ffrobot: {body.reference_condition}; {names}", "**",
+    lines = [f"** {body.name}", f"** {note(body, numbers)}", "**",
              "** RECORD GROUP 1, HEADER", "**   REVISION.  NODES.  NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES.",
              f"REV0 {len(nodes)} {n} 0 0 0", "**"]  # fmt: skip
     lines += _record(2, np.array([[node.number for node in nodes]]))

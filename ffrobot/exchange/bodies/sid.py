@@ -18,19 +18,22 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...mesh.included import number_of
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, noted, with_agreed_masses
+from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, note, noted, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
 ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a symmetric matrix in the six rows of J."""
 LARGEST_ASYMMETRY = 1e-6  # of C_r's M1: a symmetric part is geometric stiffness, or wrong
+REMARKS = (
+    "not carried by SID as written here: geometric stiffness, stresses, the surface, sections and families of modes",
+)
 SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest; rad
 
 
 def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     """The SID_FEM file of a body, and what it does not carry."""
     found, (nodes, numbers) = integrals_of(body), nodes_of(body)
-    lines = [f"{len(nodes):5d}{found.n_modes:5d}    : nodes, modes : {body.name} : {_note(body, numbers)}", " part"]
+    lines = [f"{len(nodes):5d}{found.n_modes:5d}    : nodes, modes : {body.name} : {note(body, numbers)}", " part"]
     lines += ["      new modal                        =", "           refmod"]
     lines += [f"                mass                   = {fortran(found.mass)}",
               f"                nelastq                = {found.n_modes:5d}"]  # fmt: skip
@@ -42,14 +45,7 @@ def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     for node in nodes:
         lines += _node_lines(node)
     lines += ["           end frame", *_integral_lines(found), "      end modal", " end part"]
-    left = ["geometric stiffness, stresses, the surface, sections and families of modes"]
-    return "\n".join(lines) + "\n", (f"not carried by SID as written here: {left[0]}",)
-
-
-def _note(body: ModalBody, numbers: dict[str, int]) -> str:
-    """What the format has no place for: names of interfaces; read back by `read_sid`."""
-    names = ", ".join(f"{name}={number}" for name, number in numbers.items())
-    return f"ffrobot: {body.reference_condition}; {names}"
+    return "\n".join(lines) + "\n", REMARKS
 
 
 def _node_lines(node: Node) -> Iterator[str]:

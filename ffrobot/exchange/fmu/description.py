@@ -16,7 +16,7 @@ import numpy as np
 from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
 from ...mbs.analysis.forward import Forward
-from .forward_model import UNITS, ForwardUnit, Variable, derivatives_of
+from .forward_model import UNITS, ForwardUnit, Variable
 
 SOURCE = "linear.c"
 VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts as one
@@ -45,7 +45,10 @@ class Unit:
     @cached_property
     def derivatives(self) -> tuple[Variable, ...]:
         """Of the states."""
-        return derivatives_of(self.states)
+        return tuple(
+            Variable(f"der({each.name})", f"{each.unit}2" if each.unit.endswith("/s") else f"{each.unit}/s", "")
+            for each in self.states
+        )
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -109,19 +112,16 @@ def _add_variables(
     references: Iterable[int] | None = None,
 ) -> None:
     """Units, log, experiment and variables, in the order that FMI wants; `references`: of variables, or 0, 1, 2, …."""
-    _units(ElementTree.SubElement(root, "UnitDefinitions"), {each.unit for of in groups.values() for each in of})
+    definitions, used = ElementTree.SubElement(root, "UnitDefinitions"), {v.unit for of in groups.values() for v in of}
+    for name, exponents in UNITS.items():
+        if name in used:
+            definition = ElementTree.SubElement(definitions, "Unit", name=name)
+            if exponents:
+                ElementTree.SubElement(definition, "BaseUnit", {key: str(n) for key, n in exponents.items()})
     ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
     ElementTree.SubElement(root, "DefaultExperiment", experiment)
     numbers = count() if references is None else iter(references)
     _variables(ElementTree.SubElement(root, "ModelVariables"), groups, numbers)
-
-
-def _units(parent: ElementTree.Element, used: set[str]) -> None:
-    for name, exponents in UNITS.items():
-        if name in used:
-            definition = ElementTree.SubElement(parent, "Unit", name=name)
-            if exponents:
-                ElementTree.SubElement(definition, "BaseUnit", {key: str(n) for key, n in exponents.items()})
 
 
 def _experiment(A: Array) -> dict[str, str]:

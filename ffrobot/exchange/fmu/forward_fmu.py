@@ -31,8 +31,8 @@ LIBRARY = "ffrobot_fmu.so"  # beside the core (CMakeLists.txt)
 RESOURCE = "resources/model.bin"  # mbs/fmu/forward.cpp
 
 
-def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple[str, ...]]:
-    """The FMU of an analysis of kind "forward", the first if not named; its name, a few words on it, remarks.
+def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
+    """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks, its name.
 
     Raises:
         InputError: there is no such analysis, or something acts that the FMU does not have.
@@ -57,7 +57,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
         f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),
     }
     what = f"{chosen.name}, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), chosen.name, what, tuple(_remarks(model, unit, folder))
+    return zipped(content), what, tuple(_remarks(model, unit, folder)), chosen.name
 
 
 class _Logged(Watcher):
@@ -89,15 +89,12 @@ def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
     found = {each.name: each for each in scene.analysis}
     if name is not None and name not in found:
         raise InputError(f'{path}: --analysis: expected one of {quoted(found)}, found "{name}"')
-    fitting = [each for each in scene.analysis if isinstance(each, Forward) and each.actuation is None]
+    fitting = (each for each in scene.analysis if isinstance(each, Forward) and each.actuation is None)
+    if (chosen := next((each for each in fitting if name in (None, each.name)), None)) is not None:
+        return chosen
     wanted = 'an analysis of kind "forward" without actuation, whose motors are the inputs of the FMU'
     if name is None:
-        if not fitting:
-            raise InputError(f"{path}: --analysis: expected {wanted}, found none")
-        return fitting[0]
-    for each in fitting:
-        if each.name == name:
-            return each
+        raise InputError(f"{path}: --analysis: expected {wanted}, found none")
     kind = getattr(found[name], "kind", "?")
     what = f'kind "{kind}"' + (" with actuation" if isinstance(found[name], Forward) else "")
     raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')

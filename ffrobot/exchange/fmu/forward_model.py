@@ -63,50 +63,44 @@ def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def inputs_of(model: LinearModel, units: Mapping[str, str]) -> tuple[Variable, ...]:
-    """Motors, voltages, forces at points; `units` of the joints' coordinates, see `joint_units`.
+def linear_variables(
+    model: LinearModel, units: Mapping[str, str]
+) -> tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]]:
+    """States, inputs and outputs; `units` of the joints' coordinates, see `joint_units`.
 
-    A motor is "joint/NAME/moment" here, as in results, since "joint/NAME" is an output; FMI wants names once.
+    FMI wants names once: a motor is "joint/NAME/moment", as in results, since "joint/NAME" is an output, and "state "
+    stands before a state whose name an output has, too.
     """
-    return tuple(_input(name, units) for name in model.input_names)
-
-
-def outputs_of(model: LinearModel, units: Mapping[str, str]) -> tuple[Variable, ...]:
-    """Joint coordinates, places of points, modal coordinates."""
-    return tuple(Variable(name, *_coordinate(name, units)) for name in model.output_names)
-
-
-def states_of(model: LinearModel, units: Mapping[str, str]) -> tuple[Variable, ...]:
-    """Independent coordinates and their rates; "state " before a name which an output has too."""
-    taken = set(model.output_names)
-    found = []
+    inputs = tuple(_input(name, units) for name in model.input_names)
+    outputs = tuple(Variable(name, *_coordinate(name, units)) for name in model.output_names)
+    states = []
     for name in model.state_names:
         unit, description = _coordinate(name.removeprefix(RATE), units)
         if name.startswith(RATE):
             unit, description = f"{unit}/s", f"rate of the {description}"
-        found.append(Variable(f"state {name}" if name in taken else name, unit, description))
-    return tuple(found)
-
-
-def derivatives_of(states: tuple[Variable, ...]) -> tuple[Variable, ...]:
-    """Of each state."""
-    return tuple(
-        Variable(f"der({each.name})", f"{each.unit}2" if each.unit.endswith("/s") else f"{each.unit}/s", "")
-        for each in states
-    )
+        states.append(Variable(f"state {name}" if name in model.output_names else name, unit, description))
+    return tuple(states), inputs, outputs
 
 
 def _input(name: str, units: Mapping[str, str]) -> Variable:
     kind, _, rest = name.partition("/")
     if kind == "joint":
-        slides = units[rest] == "m"
-        words = f"{'force' if slides else 'moment'} of the motor of {rest}"
-        return Variable(f"{name}/moment", "N" if slides else "N.m", words)
+        return motor(rest, units[rest])
+    place, _, last = rest.rpartition("/")
     if kind == "pzt":
-        layout, _, number = rest.rpartition("/")
-        return Variable(name, "V", f"voltage of patch {number} of {layout}")
-    point, _, axis = rest.rpartition("/")
-    return Variable(name, "N", f"force on {point} along {axis}")
+        return voltage(place, int(last))
+    return Variable(name, "N", f"force on {place} along {last}")
+
+
+def motor(name: str, unit: str) -> Variable:
+    """Of a coordinate of a joint, which has this unit."""
+    what, of_force = ("force", "N") if unit == "m" else ("moment", "N.m")
+    return Variable(f"joint/{name}/moment", of_force, f"{what} of the motor of {name}")
+
+
+def voltage(layout: str, number: int) -> Variable:
+    """Of a patch, the `number`-th of its layout."""
+    return Variable(f"pzt/{layout}/{number}", "V", f"voltage of patch {number} of {layout}")
 
 
 def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
@@ -126,7 +120,6 @@ def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
     return units[rest], f"{of} {rest}"
 
 
-UNIT_OF_FORCE = {"rad": "N.m", "m": "N"}
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  # the last three are 2 ε, as in modal body files
 AXES = "xyz"
 
@@ -191,8 +184,7 @@ def _motors(model: Model) -> Iterator[Input]:
     units = {joint.name: joint.units for joint in model.scene.joint}
     for joint, columns in model.motors.items():
         for k, (column, unit) in enumerate(zip(columns, units[joint], strict=True), 1):
-            name, what = _numbered(joint, k, len(columns)), "force" if unit == "m" else "moment"
-            variable = Variable(f"joint/{name}/moment", UNIT_OF_FORCE[unit], f"{what} of the motor of {name}")
+            variable = motor(_numbered(joint, k, len(columns)), unit)
             yield variable, model.sign(joint) * np.eye(model.tree.n_v)[column]
 
 
@@ -202,11 +194,6 @@ def voltages_of_patches(model: Model, patches: Mapping[str, LinkPatches]) -> Ite
         directions = modal_directions(model, of_link.per_volt)
         for layout in of_link.arrays:
             yield from ((voltage(layout, k), row) for k, row in enumerate(directions[of_link.columns(layout)], 1))
-
-
-def voltage(layout: str, number: int) -> Variable:
-    """Of a patch, the `number`-th of its layout."""
-    return Variable(f"pzt/{layout}/{number}", "V", f"voltage of patch {number} of {layout}")
 
 
 def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:

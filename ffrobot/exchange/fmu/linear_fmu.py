@@ -22,11 +22,11 @@ from ...common.errors import InputError
 from ...common.version import VERSION
 from ...results.file import Results
 from .description import PLATFORMS, SOURCE, Unit, identifier_of, model_description, zipped
-from .forward_model import inputs_of, joint_units, outputs_of, states_of
+from .forward_model import joint_units, linear_variables
 
 
-def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple[str, ...]]:
-    """The FMU of an analysis of kind "linear", the first if not named; its name, a few words on it, remarks.
+def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
+    """The FMU of an analysis of kind "linear", the first if not named; a few words on it, remarks, its name.
 
     Raises:
         InputError: there is no such analysis, it has several times, or its model has no inputs or is not finite.
@@ -58,12 +58,12 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple
     else:
         content[compiled[0]] = compiled[1]
     what = f"{name}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), name, what, tuple(remarks)
+    return zipped(content), what, tuple(remarks), name
 
 
 def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str, str]) -> Unit:
     """Names and variables of the FMU of a model; `units` of the joints' coordinates."""
-    states, inputs, outputs = (of(model, units) for of in (states_of, inputs_of, outputs_of))
+    states, inputs, outputs = linear_variables(model, units)
     names = "\n".join(each.name for each in (*states, *inputs, *outputs))
     return Unit(
         identifier=identifier_of(scene, analysis),
@@ -127,8 +127,8 @@ def binary(unit: Unit, files: Mapping[str, str]) -> tuple[str, bytes] | str:
     place = PLATFORMS.get((sys.platform, platform.machine()))
     if place is None:
         return f"FMI 2.0 has no name for {sys.platform} on {platform.machine()}"
-    compiler = _compiler()
-    if compiler is None:
+    compiler = shlex.split(os.environ.get("CC", "")) or [name for name in COMPILERS if shutil.which(name)][:1]
+    if not compiler:
         return f"found no C compiler ({', '.join(COMPILERS)}, or what CC names)"
     folder, suffix = place
     with tempfile.TemporaryDirectory(prefix="ffrobot-fmu-") as temporary:
@@ -144,10 +144,3 @@ def binary(unit: Unit, files: Mapping[str, str]) -> tuple[str, bytes] | str:
             reason = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()[-1]
             return f"{shlex.join(compiler)} failed: {reason}"
         return f"binaries/{folder}/{output}", (Path(temporary) / output).read_bytes()
-
-
-def _compiler() -> list[str] | None:
-    if named := shlex.split(os.environ.get("CC", "")):
-        return named
-    found = next((name for name in COMPILERS if shutil.which(name)), None)
-    return [found] if found else None

@@ -12,7 +12,7 @@ from ...common.errors import InputError, quoted
 from ...common.numbers import SMALLEST
 from ...common.tables import shown
 from ...mbs.scene.bodies import ROUNDING, check_inertia
-from .robot import HERE, MASSLESS, Inertial, Origin, Place, Robot, UrdfJoint
+from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint
 
 
 @dataclass(eq=False)
@@ -73,7 +73,7 @@ def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool 
     ground = Body(robot.root, stands_still=True)
     bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, Body]()
     if robot.root in flexible:
-        joints.append(_weld_to_ground(robot))
+        joints.append(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))  # the parent is no link
         bodies.append(_start(robot, robot.root, flexible, body_of))
     else:
         ground.add(robot, robot.root, HERE)
@@ -102,11 +102,6 @@ def _without_mass(robot: Robot) -> str:
         " <inertial> to its links, from CAD or a data sheet, take a description of the robot for dynamics, or estimate"
         " masses by --density"
     )
-
-
-def _weld_to_ground(robot: Robot) -> UrdfJoint:
-    """What holds a flexible root: a fixed joint whose parent is not a link."""
-    return UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root, Origin(), (1.0, 0.0, 0.0), {}, {}, None)
 
 
 def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, Body]) -> Body:
@@ -190,12 +185,6 @@ def is_possible(inertia: Array) -> bool:
     return bool(moments[2] <= moments[0] + moments[1] + ROUNDING * np.abs(inertia).max())
 
 
-def _is_mended(inertia: Array) -> bool:
-    """Whether the least change makes an impossible inertia one of a body."""
-    moments = np.linalg.eigvalsh(least_change(inertia))
-    return not is_possible(inertia) and bool(moments[0] > ROUNDING * moments[2])
-
-
 def _check_inertias(bodies: list[Body]) -> None:
     found = []
     for body in bodies:
@@ -205,7 +194,9 @@ def _check_inertias(bodies: list[Body]) -> None:
             xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
             check_inertia((xx, yy, zz), SMALLEST)
         except ValueError as error:
-            way = ": --fix-inertia makes the least change" if _is_mended(body.inertial.inertia) else ""
+            least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
+            is_mended = not is_possible(body.inertial.inertia) and least > ROUNDING * largest
+            way = ": --fix-inertia makes the least change" if is_mended else ""
             found.append(f"{body.label}: <inertia>: {error}{way}")
     if found:
         raise InputError("\n".join(found))

@@ -202,13 +202,14 @@ class UrdfOfScene:
                 self._links[name] = UrdfLink(name, None)
                 joint = self._joint_names[f"{name}.fixed"]
                 origin = Origin(three(place - at), three(rpy_of(body.points[point].triad)))
-                self._joints[joint] = UrdfJoint(joint, "fixed", body.name, name, origin, (1.0, 0.0, 0.0), {}, {}, None)
+                self._joints[joint] = UrdfJoint(joint, "fixed", body.name, name, origin)
 
     # Joints
 
     def _add_joint(self, node: Node) -> None:
         """The steps of a joint one after the other, with links without mass in between."""
-        joint, parent, origin = node.joint, self._parent(node), self._origin(node)
+        joint, origin = node.joint, self._origin(node)
+        parent = GROUND if node.inner.body < 0 else self.tree.nodes[node.inner.body].body.name
         steps = steps_outward(joint, node.backwards)
         own = node.body.points[node.outer.point].triad if node.outer.point else np.eye(3)
         for number, (step, axis) in enumerate(steps, 1):
@@ -225,9 +226,6 @@ class UrdfOfScene:
     def _name(self, node: Node) -> str:
         """That of the scene; a body without any joint gets one."""
         return node.joint.name if node.joint in self._scene.joint else self._joint_names[f"{node.body.name}.free"]
-
-    def _parent(self, node: Node) -> str:
-        return GROUND if node.inner.body < 0 else self.tree.nodes[node.inner.body].body.name
 
     def _origin(self, node: Node) -> Origin:
         """The child's link in the parent's where the coordinates are zero."""

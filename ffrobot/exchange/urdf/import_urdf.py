@@ -76,25 +76,6 @@ class Replaced:
         return keys, [f"{about}, as a point mass: its moments of inertia would be {moments} kg m², which no body has"]
 
 
-def compared(
-    robot: Robot, link: FlexibleLink, folder: Path, *, keep_rest: bool
-) -> tuple[dict[str, Any] | None, list[str]]:
-    """Keys of the payload with the rest, where it is kept, and remarks.
-
-    Raises:
-        InputError: the rest shall be kept, and the link file is wrong or has too much mass.
-        SolveError: the rest shall be kept, and stage 1 fails.
-    """
-    try:
-        replaced = Replaced(robot, link, folder)
-    except FfrobotError as error:
-        if keep_rest:
-            raise
-        return None, [f'link "{shown(link.name)}": not compared with its <inertial>: {error}']
-    payload, remarks = replaced.rest() if keep_rest else (None, [])
-    return payload, [replaced.remark(), *remarks]
-
-
 def _with_whole_path(keys: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     geometry = dict(keys["geometry"])
     if isinstance(file := geometry.get("file"), str):
@@ -255,8 +236,15 @@ def _compared(
     """Payloads that make up for what flexible links lack of the URDF's masses, and remarks on what they replace."""
     payloads, remarks = [], list[str]()
     for link in links.values():
-        payload, about = compared(robot, link, folder, keep_rest=keep_rest)
-        remarks += about
+        try:
+            replaced = Replaced(robot, link, folder)
+        except FfrobotError as error:
+            if keep_rest:
+                raise
+            remarks.append(f'link "{shown(link.name)}": not compared with its <inertial>: {error}')
+            continue
+        payload, about = replaced.rest() if keep_rest else (None, [])
+        remarks += [replaced.remark(), *about]
         if payload is not None:
             payloads.append(payload | {"point": f"{scene.bodies[link.name]}.{payload['point']}"})
     return payloads, remarks

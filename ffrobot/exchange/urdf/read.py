@@ -131,8 +131,10 @@ def _link(element: Element) -> UrdfLink:
 
 
 def _inertial(element: Element, label: str) -> Inertial:
-    mass = _attribute(element, "mass", "value", label)
-    inertia = element.find("inertia")
+    of_mass, inertia = element.find("mass"), element.find("inertia")
+    if of_mass is None:
+        raise InputError(f'{label}: expected <mass value="…"/>, found none')
+    mass = _number(of_mass, "value", f"{label}: <mass>")
     if inertia is None:
         raise InputError(f"{label}: expected <inertia>, found none")
     values = dict(zip(ENTRIES, (_number(inertia, key, f"{label}: <inertia>") for key in ENTRIES), strict=True))
@@ -217,13 +219,6 @@ def _origin(element: Element, label: str) -> Origin:
         return Origin()
     where = f"{label}: <origin>"
     return Origin(_triple(origin, "xyz", (0.0, 0.0, 0.0), where), _triple(origin, "rpy", (0.0, 0.0, 0.0), where))
-
-
-def _attribute(element: Element, tag: str, key: str, label: str) -> float:
-    child = element.find(tag)
-    if child is None:
-        raise InputError(f'{label}: expected <{tag} {key}="…"/>, found none')
-    return _number(child, key, f"{label}: <{tag}>")
 
 
 def _number(element: Element, key: str, label: str, default: float | None = None) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -146,11 +146,11 @@ class UrdfJoint:
     type: str
     parent: str
     child: str
-    origin: Origin
-    axis: Numbers3
-    limits: Mapping[str, float]
-    dynamics: Mapping[str, float]
-    mimic: Mimic | None
+    origin: Origin = Origin()
+    axis: Numbers3 = (1.0, 0.0, 0.0)
+    limits: Mapping[str, float] = field(default_factory=dict)
+    dynamics: Mapping[str, float] = field(default_factory=dict)
+    mimic: Mimic | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ...mbs.fields.field_types import GROUND
 from .bodies import Body, Mechanism
 from .flexible import FlexibleLink
 from .names import Names
-from .robot import HERE, MeshFile, Place, Robot, UrdfJoint
+from .robot import HERE, MeshFile, Robot, UrdfJoint
 
 GRAVITY = [0.0, 0.0, -9.81]
 SCENE_TYPE = {
@@ -148,8 +148,11 @@ class SceneOfRobot:
             keys["at"] = _numbers(place.d)
         if joint.type in WITH_AXIS:
             keys["axis"] = _numbers(place.C @ np.array(joint.axis))
-        turned = Place(place.d, place.C @ child.members[joint.child].C.T)
-        keys |= self._orientation(joint, turned, kept=parent is None or _is_plain(parent, joint, child))
+        # The URDF's own numbers where nothing is merged in between.
+        is_plain = parent is None or (parent.members[joint.parent] is HERE and child.members[joint.child] is HERE)
+        rpy = list(joint.origin.rpy) if is_plain else rpy_of(place.C @ child.members[joint.child].C.T)
+        if any(rpy):
+            keys["rpy"] = rpy
         self._remark_on_mimic(joint)
         return keys | self._limits(joint) | self._friction(joint)
 
@@ -157,11 +160,6 @@ class SceneOfRobot:
         if body.flexible:
             return self.flexible[body.top].point_of[joint.name]
         return self.points[body.top][joint.name]
-
-    def _orientation(self, joint: UrdfJoint, place: Place, *, kept: bool) -> dict[str, Any]:
-        """`rpy`: the URDF's own numbers where nothing is merged in between."""
-        rpy = list(joint.origin.rpy) if kept else rpy_of(place.C)
-        return {"rpy": rpy} if any(rpy) else {}
 
     def _limits(self, joint: UrdfJoint) -> dict[str, Any]:
         keys: dict[str, Any] = {}
@@ -214,11 +212,6 @@ class SceneOfRobot:
             elif value:
                 keys[ours] = value
         return keys
-
-
-def _is_plain(parent: Body, joint: UrdfJoint, child: Body) -> bool:
-    """Whether the joint's origin is between the axes of the two bodies themselves."""
-    return parent.members[joint.parent] is HERE and child.members[joint.child] is HERE
 
 
 def _numbers(vector: Iterable[float]) -> list[float]:
