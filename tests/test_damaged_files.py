@@ -191,7 +191,7 @@ def test_results_that_lack_something(results, members, tmp_path, command):
     from ffrobot.pictures.report import write_report
     from ffrobot.pictures.view import Options, view_file
     from ffrobot.present.console import summary_console
-    from ffrobot.present.feasibility import print_feasibility
+    from ffrobot.present.feasibility import feasibility_tables
     from ffrobot.present.info import describe
 
     def linear(path):
@@ -200,7 +200,7 @@ def test_results_that_lack_something(results, members, tmp_path, command):
 
     run = {
         "info": describe,
-        "feasibility": lambda path: print_feasibility(path, None, summary_console()),
+        "feasibility": lambda path: summary_console().print(feasibility_tables(path, None)),
         "linear": linear,
         "plot": lambda path: ffrobot.plot_results(path, tmp_path / "figures", ["svg"]),
         "report": lambda path: write_report([path], tmp_path / "page.html"),

@@ -90,4 +90,4 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
 
     write_atomically(output, draft.encode(), "draft of a link file")
     for path in (output, *write_figure(draw_part(part, LISTED), output.parent, f"{output.stem}.faces", ("png",))):
-        console.print(f"written    {path}", highlight=False, soft_wrap=True, markup=False)
+        console.print(f"written    {path}", soft_wrap=True)

@@ -32,15 +32,13 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
     """
     from ..common.hdf5 import reading
     from ..present.console import summary_console
-    from ..present.feasibility import print_feasibility
+    from ..present.feasibility import feasibility_tables, print_motor_choice
 
     with reading(results_file):
         if catalog is None:
-            print_feasibility(results_file, analysis, summary_console())
-            return
-        from ..present.feasibility import print_motor_choice
-
-        print_motor_choice(results_file, catalog, analysis, summary_console())
+            summary_console().print(feasibility_tables(results_file, analysis))
+        else:
+            print_motor_choice(results_file, catalog, analysis, summary_console())
 
 
 @click.command()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
+from io import StringIO
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
@@ -17,6 +17,7 @@ from ..common.tables import as_csv
 from ..common.toml_files import load_toml
 from ..common.version import VERSION
 from ..pictures.studies.study import Diagram, Numbers, Study, StudyName, StudyTable, write_study
+from ..present.console import plain_console
 from ..present.lines import print_table
 
 
@@ -89,16 +90,15 @@ class Finding(ABC):
         """Tables of text, then what to mind."""
         for section in self.sections():
             if section.line:
-                _say(console, section.line)
+                console.print(section.line, soft_wrap=True)
             print_table(console, section.heading, section.rows)
         for line in self.remarks():
-            _say(console, line)
+            console.print(line, soft_wrap=True)
 
     def __str__(self) -> str:
-        console = Console(file=io.StringIO(), width=120)
+        console = plain_console(out := StringIO(), 120)
         self.print(console)
-        assert isinstance(console.file, io.StringIO)
-        return console.file.getvalue()
+        return out.getvalue()
 
     def write_tables(self, folder: Path) -> Iterator[Path]:
         """Write the tables with all numbers; the files one after the other."""
@@ -150,10 +150,6 @@ def failed_runs(failures: Sequence[str], runs: int) -> Iterator[str]:
     if failures:
         more = f", and {len(failures) - 1} more in the table of runs" if len(failures) > 1 else ""
         yield f"failed     {len(failures)} of {runs} runs, left out: {failures[0]}{more}"
-
-
-def _say(console: Console, line: str) -> None:
-    console.print(line, soft_wrap=True, markup=False, highlight=False)
 
 
 def _fact(line: str) -> str:

@@ -142,7 +142,7 @@ def print_fit(fit: Fit, console: Console) -> None:
         console.print(table)
         console.print()
     for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
-        console.print(line, soft_wrap=True, markup=False)
+        console.print(line, soft_wrap=True)
 
 
 def remarks(fit: Fit) -> Iterator[str]:

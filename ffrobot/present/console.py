@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,8 +17,13 @@ def summary_width() -> int:
     return get_terminal_size().columns if sys.stdout.isatty() else PLAIN_WIDTH
 
 
-def summary_console() -> Console:
-    """The standard output; names in a scene are no markup."""
+def plain_console(file: TextIO, width: int) -> Console:
+    """A console of so many columns; names in a scene are no markup."""
     from rich.console import Console
 
-    return Console(width=summary_width(), markup=False, highlight=False, emoji=False)
+    return Console(file=file, width=width, markup=False, highlight=False, emoji=False)
+
+
+def summary_console() -> Console:
+    """The standard output."""
+    return plain_console(sys.stdout, summary_width())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,47 +13,35 @@ from rich.table import Table
 
 from ..actuation.catalog import Choice, JointTask, choices, read_catalog
 from ..actuation.motors import MotorFeasibility
-from ..common.arrays import Array
 from ..common.errors import InputError, quoted
-from ..common.hdf5 import open_checked
 from ..results.file import Results
 from .lines import print_table
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
     """Tables of one analysis of the results file at `path`, or of all. Raises `InputError` where there are none."""
-    from ..results.file import FORMAT
-
-    try:
-        with open_checked(path) as file:
-            if file.attrs.get("format") != FORMAT:
-                raise InputError(f"{path}: expected a results file, found format {file.attrs.get('format')!r}")
-            judged = [name for name, group in file.items() if "feasibility" in group]
-            if not judged:
-                raise InputError(
-                    f"{path}: expected an analysis with motors or patches, found none: joints of kinematic loops have"
-                    " motors with motor = true alone"
-                )
-            if analysis is not None and analysis not in judged:
-                raise InputError(
-                    f"{path}: --analysis: expected an analysis with motors or patches, {quoted(judged)}, found"
-                    f' "{analysis}"'
-                )
-            wanted = judged if analysis is None else [analysis]
-            return Group(*(table for name in wanted for table in _tables(name, file[name])))
-    except OSError as error:
-        reason = "no such file" if not path.is_file() else f"not a readable HDF5 file ({error})"
-        raise InputError(f"{path}: expected a results file, found {reason}") from None
+    with Results(path) as results:
+        judged = [name for name in results.analyses if results.has(f"{name}/feasibility")]
+        if not judged:
+            raise InputError(
+                f"{path}: expected an analysis with motors or patches, found none: joints of kinematic loops have"
+                " motors with motor = true alone"
+            )
+        if analysis is not None and analysis not in judged:
+            raise InputError(
+                f'{path}: --analysis: expected an analysis with motors or patches, {quoted(judged)}, found "{analysis}"'
+            )
+        wanted = judged if analysis is None else [analysis]
+        return Group(*(table for name in wanted for table in _tables(results, name)))
 
 
-def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
+def _tables(results: Results, name: str) -> Iterator[Table | str]:
     from ..results.actuators import read_motors, read_unsupplied
     from ..results.joints import labelled_coordinates
 
+    group, scene = results.group(name), results.scene
     yield f'analysis "{name}" ({group.attrs["kind"]})'
-    scene = tomllib.loads(group.file.attrs["scene"])
-    coordinates = labelled_coordinates(scene)
-    units = {label: one.force_unit for label, (_, one) in coordinates.items()}
+    units = {label: one.force_unit for label, (_, one) in labelled_coordinates(scene).items()}
     if motors := read_motors(group["feasibility"], list(units)):
         yield _motors(motors, units)
         spikes = ((name, motor.spike_in_words(units[name])) for name, motor in motors.items())
@@ -121,14 +108,8 @@ def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
         moments = (required[k] / c[k], available[k] / c[k], required[k], available[k])
         field, strain = judged["field"][k], judged["strain"][k]
         factor, since, can = _verdict(judged["factor"][k], judged["saturation_time"][k])
-        beyond = [
-            name
-            for name, is_beyond in (
-                ("depoled", judged["limited_field"][k] > depoling),
-                ("strained", strain > judged.attrs["strain_limit"]),
-            )
-            if is_beyond
-        ]
+        beyond = ["depoled"] if judged["limited_field"][k] > depoling else []
+        beyond += ["strained"] if strain > judged.attrs["strain_limit"] else []
         table.add_row(
             f"patch {k + 1}", f"{pzt['edges'][k].mean():.4g}", *map(_number, moments), factor, since,
             _number(field / 1e6), "" if np.isinf(depoling) else _number(field / depoling), _number(1e6 * strain),
@@ -178,11 +159,6 @@ def _table(*headers: str) -> Table:
     return table
 
 
-def print_feasibility(path: Path, analysis: str | None, console: Console) -> None:
-    """Print the tables of a results file."""
-    console.print(feasibility_tables(path, analysis))
-
-
 SHOWN = 3  # motors of each joint
 NOTHING = 1e-9  # of what a motor can do: less is rounding
 COLUMNS = ("motor of", "choice", "ratio", "RMS (N·m)", "of rated", "peak (N·m)", "of peak", "speed (rad/s)", "of max")
@@ -223,24 +199,16 @@ def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTas
     Accelerations are derivatives of a cubic spline through the rates at outputs. Peaks of the torque between outputs
     count: the load is scaled by their ratio to the largest output.
     """
+    from scipy.interpolate import CubicSpline
+
     time = results[f"{analysis}/time"]
     for joint in results.scene.get("joint", ()):
         place = f"{analysis}/joints/{joint['name']}"
         if not (results.has(f"{place}/moment") and results[f"{place}/moment"].ndim == 1) or len(time) < 4:
             continue
         torque, rate = results[f"{place}/moment"], results[f"{place}/rate"]
-        acceleration = _derivative(time, rate)
+        acceleration = CubicSpline(time, rate)(time, 1)
         rotor = joint.get("rotor_inertia", 0.0) * joint.get("gear_ratio", 1.0) ** 2
-        between = _peak(results, f"{place}/moment") / max(float(np.abs(torque).max()), 1e-300)
+        peak = np.max(results.attributes(f"{place}/moment").get("peak", 0.0))  # between outputs too
+        between = float(peak) / max(float(np.abs(torque).max()), 1e-300)
         yield joint["name"], JointTask(time, max(between, 1.0) * (torque - rotor * acceleration), rate, acceleration)
-
-
-def _derivative(time: Array, values: Array) -> Array:
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(time, values)(time, 1)
-
-
-def _peak(results: Results, dataset: str) -> float:
-    """The largest absolute value, between outputs too where the file knows it."""
-    return float(np.max(results.attributes(dataset).get("peak", np.abs(results[dataset]).max())))

@@ -51,8 +51,7 @@ def _modal_body(body: ModalBody) -> str:
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
         f"mass {body.mass:.6g} kg, center of mass {center}",
-        "interfaces: "
-        + ", ".join(f"{name} at {_place(body, i.position)}{_of(i)}" for name, i in body.interfaces.items()),
+        f"interfaces: {', '.join(_interface(body, name, one) for name, one in body.interfaces.items())}",
         f"stations: {len(body.stations.position)} along the axis",
         f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
         *_optional(body),
@@ -74,8 +73,9 @@ def _modes(body: ModalBody) -> Table:
     return table
 
 
-def _of(interface: Interface) -> str:
-    return f" ({interface.coupling})" if interface.coupling else ""
+def _interface(body: ModalBody, name: str, interface: Interface) -> str:
+    coupling = f" ({interface.coupling})" if interface.coupling else ""
+    return f"{name} at {_place(body, interface.position)}{coupling}"
 
 
 def _place(body: ModalBody, position: Array) -> str:
@@ -84,19 +84,15 @@ def _place(body: ModalBody, position: Array) -> str:
     return f"({x:.6g}, {y:.6g}, {z:.6g}) m"
 
 
-def _and_static(body: ModalBody) -> str:
-    """What else than modal stresses the file holds."""
-    return " and static" if body.stress_loads else ""
-
-
 def _optional(body: ModalBody) -> Iterator[str]:
     """Lines on what only some modal bodies have."""
     if body.measured is not None:
         yield f"measured: {body.measured.in_words()}; shapes are those of the model"
+    stresses = f"modal{' and static' if body.stress_loads else ''} stresses"
     for name, point in body.stress.items():
-        yield f"modal{_and_static(body)} stresses at {name}, {_place(body, point.position)}"
+        yield f"{stresses} at {name}, {_place(body, point.position)}"
     if body.surface_stress is not None:
-        yield f"modal{_and_static(body)} stresses on the surface, at {len(body.surface_stress)} points"
+        yield f"{stresses} on the surface, at {len(body.surface_stress)} points"
     yield from (f"remark: {remark}" for remark in body.remarks)
     if (patches := body.surface_patches) is not None:
         faces = " and ".join(face for face in ("top", "bottom") if getattr(patches, face) is not None)
@@ -142,6 +138,5 @@ def _add_datasets(table: Table, group: h5py.Group, meanings: Mapping[str, Meanin
 
 
 def _rendered(table: Table) -> str:
-    out = StringIO()
-    Console(file=out, width=110).print(table)
+    Console(file=(out := StringIO()), width=110).print(table)
     return out.getvalue()

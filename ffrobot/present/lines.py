@@ -77,7 +77,7 @@ def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterabl
     table = plain_table(*headers)
     for row in rows:
         table.add_row(*row)
-    console.print(table, highlight=False)
+    console.print(table)
     console.print()
 
 

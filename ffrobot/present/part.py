@@ -26,7 +26,7 @@ def print_inspection(file: Path, part: Inspection, density: float | None, consol
     if part.groups:
         lines.append(f"groups {', '.join(part.groups)}")
     for line in (*lines, *(f"remark     {remark}" for remark in part.remarks)):
-        console.print(line, highlight=False, soft_wrap=True, markup=False)
+        console.print(line, soft_wrap=True)
     table = plain_table("face", "kind", "center mm", "normal or axis", "radius mm", "area mm²")
     for k, face in enumerate(part.faces[:LISTED], start=1):
         radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"
@@ -34,7 +34,7 @@ def print_inspection(file: Path, part: Inspection, density: float | None, consol
         table.add_row(str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}")
     console.print(table)
     if (more := len(part.faces) - LISTED) > 0:
-        console.print(f"and {more} smaller faces", highlight=False)
+        console.print(f"and {more} smaller faces")
 
 
 def _point(place: Array) -> str:

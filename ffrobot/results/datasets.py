@@ -118,6 +118,10 @@ class Datasets:
         """Names inside a group such as `inverse/points`; none when the file does not have it."""
         return list(self._file[group]) if group in self._file else []
 
+    def group(self, name: str) -> h5py.Group:
+        """An analysis as h5py has it, for what reads groups."""
+        return self._file[name]
+
     def has(self, dataset: str) -> bool:
         """Whether the file holds this dataset or group."""
         return dataset in self._file
