@@ -96,7 +96,8 @@ def error_budget(solution: Solution) -> Iterator[str]:
     for name, result in solution.analyses.items():
         if result.check is not None:
             yield f"{name}, {result.check.in_words}"
-    yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patch_arrays)
+    layouts = (array for of_link in solution.patches.values() for array in of_link.arrays.values())
+    yield from (f"patches of {array.stiffness_in_words}" for array in layouts)
 
 
 def integrated(solution: Solution) -> list[AnalysisResult]:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.placement import Placed
     from ..actuation.feasibility import Feasibility, Unsupplied
     from ..actuation.motors import MotorFeasibility
-    from ..actuation.patches.composite import StructureEffect
     from ..actuation.patches.patches import PatchArray, Voltages
     from ..actuation.patches.records import PztLayout
     from ..actuation.points import PointForces, PointSet
@@ -50,7 +49,10 @@ def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility
     """Of an analysis: feasibility/."""
     entry = group.create_group("feasibility")
     layouts = {name: array.layout for of_link in solution.patches.values() for name, array in of_link.arrays.items()}
-    _write_verdict(entry, judged)
+    entry.attrs["feasible"] = judged.is_feasible
+    if judged.unsupplied is not None:
+        about = {key: value for key, value in vars(judged.unsupplied).items() if value not in ((), "")}
+        entry.create_group("unsupplied").attrs.update(about)
     _write_judgement(entry, judged, layouts)
     for joint in solution.scene.motor_joints:
         for k, unit in enumerate(joint.units):
@@ -58,31 +60,14 @@ def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility
             entry[f"joints/{name}"].attrs["unit"] = "N·m" if unit == "rad" else "N"
 
 
-def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -> None:
-    """Of an analysis: patch_structure/, by body."""
-    for body, effect in effects.items():
-        for key, pair in vars(effect).items():
-            group[f"patch_structure/{body}/{key}"] = pair
-
-
 def _write_layout(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
     """Of one layout what has no peaks, and the modal forces `unmet` (T, n) that it leaves."""
     group["residual"] = voltages.residual
-    group["edges"] = patches.edges
-    group["moment_per_volt"] = patches.moment_per_volt
-    group["stiffness_ratio"] = patches.stiffness_ratio
-    group["authority"] = patches.authority
+    for key in ("edges", "moment_per_volt", "stiffness_ratio", "authority"):
+        group[key] = getattr(patches, key)
     group.attrs["condition_number"] = patches.condition_number
     group["residual_force"] = unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
-
-
-def _write_verdict(group: h5py.Group, judged: Feasibility) -> None:
-    """Whether it can be done, and what nothing supplies."""
-    group.attrs["feasible"] = judged.is_feasible
-    if judged.unsupplied is not None:
-        about = {key: value for key, value in vars(judged.unsupplied).items() if value != () and value != ""}
-        group.create_group("unsupplied").attrs.update(about)
 
 
 def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PztLayout]) -> None:

@@ -122,8 +122,7 @@ class AnalysisAccess(Datasets):
         """Write the linear models of an analysis, the first that has any if not named, to .npz or .mat; its name."""
         from .linear import save_models
 
-        name = self.linear_analysis(analysis)
-        save_models(self.linear(name), path)
+        save_models(self.linear(name := self.linear_analysis(analysis)), path)
         return name
 
     def _with_models(self) -> list[str]:

@@ -153,8 +153,7 @@ def _deflection(group: h5py.Group) -> Place | None:
     time = group["time"][()]
     found = [_peak(point["deflection"], name, time) for name, point in group.get("points", {}).items()
              if "deflection" in point]  # fmt: skip
-    worst = max(found, default=None)
-    return worst if worst is not None and worst[0] > 0.0 else None
+    return max((place for place in found if place[0] > 0.0), default=None)
 
 
 def _stress(group: h5py.Group) -> Place | None:
@@ -213,12 +212,9 @@ def _advice(
         yield text
     if "control" in group:
         about = group["control"].attrs
-        general = ("smaller gains, a shorter sample_time, or rotor_inertia in the joints",)
-        yield from (
-            map(str, about.get("advice", ()))
-            if len(about.get("advice", ()))
-            else (general if about["verdict"] != "stable" else ())
-        )
+        yield from map(str, found := about.get("advice", ()))
+        if not len(found) and about["verdict"] != "stable":
+            yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
 
 
 def _is_from_rest_to_rest(group: h5py.Group) -> bool:

@@ -26,8 +26,7 @@ def labelled(results: Datasets, analysis: str, histories: Sequence[str]) -> Data
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for name in names:
-        if not name.startswith("control/") or results.has(f"{analysis}/{name}"):
-            _add(results, analysis, name, variables, coordinates)
+        _add(results, analysis, name, variables, coordinates)
     for name in (TIME, SAMPLES):
         if results.has(f"{analysis}/{name}"):
             coordinates[name] = (name, results[f"{analysis}/{name}"], {"units": "s"})

@@ -66,22 +66,12 @@ def left_out(solution: Solution) -> list[str]:
     """Analyses that were not begun when the run was stopped, or ended by an error."""
     if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
         return []
-    return [name for name in analyses(solution) if name not in solution.outcomes]
-
-
-def is_kept(solution: Solution) -> bool:
-    """Whether there is something to go on with."""
-    return stopped(solution) is not None or bool(left_out(solution))
+    return [one.name for one in solution.scene.analysis if one.name not in solution.outcomes]
 
 
 def stopped(solution: Solution) -> Outcome | None:
     """The analysis that was stopped."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
-
-
-def analyses(solution: Solution) -> list[str]:
-    """Names of all that the scene asks for."""
-    return [analysis.name for analysis in solution.scene.analysis]
 
 
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
@@ -193,14 +183,12 @@ def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, Earli
 
     A run that was stopped before its first step begins anew: what acts on it may not have been known yet.
     """
-    return {one.name: _earlier_run(file, one) for one in analyses if _can_go_on(file, one.name)}
-
-
-def _can_go_on(file: Results, name: str) -> bool:
-    if not file.has(f"{name}/{GROUP}"):
-        return False
-    about = file.attributes(name)
-    return bool(about["steps"] > 0 or about["status"] == "completed")
+    found = {}
+    for one in analyses:
+        about = file.attributes(one.name) if file.has(f"{one.name}/{GROUP}") else None
+        if about is not None and (about["steps"] > 0 or about["status"] == "completed"):
+            found[one.name] = _earlier_run(file, one)
+    return found
 
 
 def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
@@ -258,7 +246,7 @@ def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Kee
         return run_analyses(solution, watcher, keep)
     with blaming(results), Results(results) as file:
         check_same_input(solution.scene, solution.bodies, file)
-        names = analyses(solution)
+        names = [one.name for one in solution.scene.analysis]
         if all(file.has(name) and file.attributes(name)["status"] == "completed" for name in names):
             return None
         if solution.scene.geometric_stiffening == "auto" and file.attributes("/")["geometric_stiffening"]:
@@ -270,6 +258,7 @@ def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Kee
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume_scene` needs."""
     write_input_files(file, solution.scene)
-    for name, run in solution.outcomes.items() if is_kept(solution) else ():
+    is_kept = stopped(solution) is not None or left_out(solution)
+    for name, run in solution.outcomes.items() if is_kept else ():
         if solution.goes_on(run) and run.continuation is not None:
             write_earlier_run(file[name].create_group(GROUP), run)

@@ -22,7 +22,6 @@ from .actuators import (
     write_feasibility,
     write_placement,
     write_point_forces,
-    write_structure,
     write_tracking,
     write_voltages,
 )
@@ -93,7 +92,9 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     _write_forces(group, solution, result)
     if result.actuation is not None:
         write_feasibility(group, solution, result.actuation.feasibility)
-    write_structure(group, {name: body.structure for name, body in solution.bodies.items() if body.structure})
+    for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
+        for key, pair in vars(effect).items():
+            group[f"patch_structure/{name}/{key}"] = pair
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
     for key, values in vars(result.energies).items():

@@ -74,20 +74,6 @@ def robot_damping_ratios(bodies: Mapping[str, LoadedBody]) -> dict[str, float]:
     }
 
 
-def remarks_on_parts(bodies: Mapping[str, LoadedBody]) -> list[str]:
-    """What the files of solid links' parts hold and the links do not, a line each."""
-    return [f"{name}: {text}" for name, body in bodies.items() if body.modal for text in body.modal.remarks]
-
-
-def rigid_in_words(bodies: Mapping[str, LoadedBody]) -> list[str]:
-    """Which links are rigid in which motions, a line each."""
-    return [
-        f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
-        for name, body in bodies.items()
-        if body.rigid_in
-    ]
-
-
 P = TypeVar("P", Payload, Tool)
 
 
@@ -120,11 +106,9 @@ def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
         loaded = [_loaded(scene, body, wanted or body.pieces is not None, stage) for body in scene.body]
     bodies = [(body.spatial.name, _with_payloads(scene, body)) for body in loaded]
     complete = [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
-    return [_projected(body) for body in complete] if scene.is_planar else complete
-
-
-def _projected(body: LoadedBody) -> LoadedBody:
-    return replace(body, spatial=projected(body.spatial), carrying=projected(body.carrying))
+    if not scene.is_planar:
+        return complete
+    return [replace(one, spatial=projected(one.spatial), carrying=projected(one.carrying)) for one in complete]
 
 
 def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str], None]) -> LoadedBody:

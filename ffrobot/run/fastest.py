@@ -44,14 +44,10 @@ class Search:
     def keeps_limits(self, stretch: float) -> bool:
         """Whether the motion at this stretch does."""
         if stretch not in self.tried:
-            self.tried[stretch] = self._try(stretch)
+            found = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
+            factors = {"no motion along the path": inf} if found is None else found.factors
+            self.tried[stretch] = max((factor, name) for name, factor in factors.items())
         return self.tried[stretch][0] <= KEPT
-
-    def _try(self, stretch: float) -> tuple[float, str]:
-        found = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
-        if found is None:
-            return inf, "no motion along the path"
-        return max((factor, name) for name, factor in found.factors.items())
 
 
 def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:

@@ -168,10 +168,7 @@ def _as_in(source: Outcome, model: Model) -> Array:
 
 def _distance(source: Outcome, run: Outcome, point: str) -> float:
     """The largest, m, between where the two runs have a point."""
-    path, found = (_motion(one).point(point).position for one in (source, run))
+    motions = (RobotMotion(one.model, one.time, one.q, one.v, one.a, one.multipliers) for one in (source, run))
+    path, found = (motion.point(point).position for motion in motions)
     rows = min(len(path), len(found))
     return float(np.linalg.norm(path[:rows] - found[:rows], axis=1).max(initial=0.0))
-
-
-def _motion(run: Outcome) -> RobotMotion:
-    return RobotMotion(run.model, run.time, run.q, run.v, run.a, run.multipliers)

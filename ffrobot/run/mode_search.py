@@ -124,18 +124,14 @@ class ModeSearch:
         self._tolerances = tolerances
         self._levels: Sequence[Mapping[str, Body]] = levels
         self._estimate, self._tried = ErrorEstimate(), list[int]()
-        self._level, self._is_over, self._completed = 0, False, False
+        self.is_over = False  # whether the last solve is the one to keep
+        self._level, self._completed = 0, False
         self._began = self._last = time.perf_counter()
 
     @property
     def bodies(self) -> Mapping[str, Body]:
         """The bodies to solve with next; those of the solve to keep once it is over."""
         return self._levels[self._level]
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the last solve is the one to keep."""
-        return self._is_over
 
     def add(self, reported: Mapping[str, Reported] | None, *, last: bool) -> None:
         """Take in, by analysis, what a solve with `bodies` found; None where not all of them completed.
@@ -147,8 +143,8 @@ class ModeSearch:
         if reported is not None:
             self._estimate.add(reported)
         enough = self._completed and self._estimate.meets(self._tolerances)
-        self._is_over = not self._more or last or enough
-        if not self._is_over:
+        self.is_over = not self._more or last or enough
+        if not self.is_over:
             hopeless = not self._completed or self._estimate.is_hopeless(self._tolerances, self._more - 1)
             self._level = len(self._levels) - 1 if hopeless else self._level + 1
             self._last = time.perf_counter()

@@ -38,11 +38,10 @@ from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
 from ..mbs.solve.limits import left_ranges
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
-from .bodies import LoadedBody, remarks_on_parts, rigid_in_words
+from .bodies import LoadedBody
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.patches.link_patches import LinkPatches
-    from ..actuation.patches.patches import PatchArray
     from ..actuation.points import PointForces, PointSet
     from .actuation import Actuation
     from .mode_search import ModeChoice
@@ -168,21 +167,17 @@ class AnalysisResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
-        missed = None if self.actuation is None else self.actuation.feasibility.unsupplied
-        bent = deflection_warning(self.bending)
-        texts = (
-            *([bent] if bent else []),
-            *self._doubts,
-            *self.run.statistics.warnings,
-            *unresolved_gears(self.motion.gears),
-        )
-        texts = (*texts, *self.run.details.warnings)
-        if not isinstance(self.analysis, IntegratedAnalysis) and len(self.run.time):
+        bent, run = deflection_warning(self.bending), self.run
+        texts = [bent] if bent else []
+        texts += [*self._doubts, *run.statistics.warnings, *unresolved_gears(self.motion.gears), *run.details.warnings]
+        if not isinstance(self.analysis, IntegratedAnalysis) and len(run.time):
             of = self.histories.run
-            texts = (*texts, *left_ranges(of.model, None, of.time, of.q, of.v))
+            texts += left_ranges(of.model, None, of.time, of.q, of.v)
         if self.motion.is_prescribed:
-            texts = (*texts, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
-        return texts if missed is None else (*texts, missed.in_words)
+            texts += path_warnings(run.analysis, run.time, self.motion.model.scene.trajectory)
+        if self.actuation is not None and (missed := self.actuation.feasibility.unsupplied) is not None:
+            texts.append(missed.in_words)
+        return tuple(texts)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -263,11 +258,6 @@ class Solution:
         return self.stiffened or any(node.body.stiffening is not None for node in self.model.tree.nodes)
 
     @property
-    def patch_arrays(self) -> tuple[PatchArray, ...]:
-        """Of all layouts."""
-        return tuple(array for of in self.patches.values() for array in of.arrays.values())
-
-    @property
     def omissions(self) -> tuple[str, ...]:
         """What a planar scene does not need, one line each."""
         return tuple(omissions(self.scene, self.bodies)) if self.scene.is_planar else ()
@@ -285,7 +275,12 @@ class Solution:
     @property
     def link_notes(self) -> tuple[str, ...]:
         """What links cannot do, and what their meshes leave out, one line each."""
-        return (*rigid_in_words(self.bodies), *remarks_on_parts(self.bodies))
+        rigid = (
+            f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
+            for name, body in self.bodies.items()
+            if body.rigid_in
+        )
+        return (*rigid, *(f"{name}: {text}" for name, modal in self.links.items() for text in modal.remarks))
 
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}

@@ -289,6 +289,7 @@ def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actua
 
 
 def _histories(solution: Solution, run: Outcome, motion: MotionOfLinks, outputs: Indices) -> Histories:
+    """What has peaks at the times of `run`."""
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
     return Histories(
         run, motion, outputs, reactions(motion), _actuation(solution, run, motion),

@@ -8,7 +8,7 @@ Each of these is refused by name where it is found, with what to write in its pl
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -132,19 +132,15 @@ def _check_path(function: TimeFunction, times: Array, label: str) -> None:
 
 def _all_duplicates(scene: SceneKeys) -> Iterator[str]:
     for kind in ("body", "joint", "trajectory", "analysis"):
-        yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
+        for name, count in Counter(record.name for record in getattr(scene, kind)).items():
+            if count > 1:
+                yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
     for label, count in Counter(layout.label for layout in scene.pzt).items():
         if count > 1:
             yield f'pzt "{label}": name: expected a separate name for each layout on a body, found {count}'
     for name, count in Counter(points.body for points in scene.actuation_points).items():
         if count > 1:
             yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
-
-
-def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
-    for name, count in Counter(names).items():
-        if count > 1:
-            yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
 
 
 def _body_problems(scene: SceneKeys) -> Iterator[str]:

@@ -120,19 +120,15 @@ def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
                     yield f'{table}: {key}: expected no such key in space = "spatial", found it: {instead}'
 
 
-def _takes_actuation(analysis: dict[str, Any]) -> bool:
-    """Whether the key "actuation" is there, and one of its kind."""
-    record = KINDS.modules.get(analysis.get("kind", "")) if "actuation" in analysis else None
-    return record is not None and "actuation" in loaded(record).model_fields
-
-
 def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
     """`data` with the `end` and `output_step` of forward analyses taken from their actuation where not given."""
     try:
         sources = {analysis["name"]: analysis for analysis in data["analysis"]}
         analyses = []
         for analysis in data["analysis"]:
-            source = sources.get(analysis.get("actuation"), {}) if _takes_actuation(analysis) else {}
+            record = KINDS.modules.get(analysis.get("kind", "")) if "actuation" in analysis else None
+            takes = record is not None and "actuation" in loaded(record).model_fields
+            source = sources.get(analysis.get("actuation"), {}) if takes else {}
             times = {key: source[key] for key in ("end", "output_step") if key in source}
             analyses.append(times | analysis)
     except (KeyError, TypeError, AttributeError):

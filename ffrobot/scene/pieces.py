@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..common.errors import InputError
@@ -76,9 +77,9 @@ def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
     }
     bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
     welds = (
-        WeldJoint(name=weld, type="weld", between=between)
+        WeldJoint(name=f"{name}, cut {k}", type="weld", between=(f"{first}.tip", f"{second}.root"))
         for name, body in divided.items()
-        for weld, between in _welds(name, body)
+        for k, (first, second) in enumerate(pairwise(body.names), 1)
     )
     return scene.model_copy(update=keys | {"body": bodies, "joint": (*keys["joint"], *welds)})
 
@@ -95,12 +96,6 @@ def _pieces(body: BodyKeys, divided: Mapping[str, BodyInPieces]) -> Iterator[Bod
     pieces = divided[body.name]
     for name, link in zip(pieces.names, pieces.cut.tables, strict=True):
         yield body.model_copy(update={"name": name, "link": link, "pieces": None})
-
-
-def _welds(name: str, body: BodyInPieces) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Names of the welds between the pieces of a body, and what each joins."""
-    for k, (first, second) in enumerate(zip(body.names, body.names[1:], strict=False), 1):
-        yield f"{name}, cut {k}", (f"{first}.tip", f"{second}.root")
 
 
 T = TypeVar("T")

@@ -7,7 +7,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
-from ..common.files import write_atomically
 from ..common.locks import is_running, this_process
 from ..results.file import Results
 from ..results.meanings import meaning
@@ -98,7 +97,7 @@ def perform(run: Run, workers: Workers) -> Row | None:
     if code in STOPPED:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
-    message = "" if code == 0 else _last_message(printed, run.folder) or _ended(code)
+    message = "" if code == 0 else _message(printed, run.folder, code)
     quantities = _quantities(results, run.collect) if results.exists() else {}
     return Row(run.number, run.values, status, message, quantities, run.inputs | imported, tuple(imported))
 
@@ -111,11 +110,6 @@ def perform_under_mpi(run: Run) -> Row | None:
     return perform(run, _of_process)
 
 
-def keep_row(folder: Path, row: Row) -> None:
-    """Keep a row in the run's folder, so that the sweep can be taken up again."""
-    write_atomically(folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep", ours=True)
-
-
 def finished_row(folder: Path) -> Row | None:
     """The row that an earlier run left in `folder`, if it came to its end and can be read."""
     with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
@@ -124,17 +118,13 @@ def finished_row(folder: Path) -> Row | None:
     return None
 
 
-def _last_message(text: str, folder: Path) -> str:
-    lines = [line for line in text.splitlines() if line.strip()]
-    message = lines[-1].removeprefix("ffrobot: ") if lines else ""
-    return message.replace(f"{folder.absolute()}{os.sep}", "").replace(f"{folder}{os.sep}", "")
-
-
-def _ended(code: int) -> str:
-    """What there is to say of a process without a message."""
+def _message(printed: str, folder: Path, code: int) -> str:
+    """The last one that a process printed; of one without, the signal that ended it."""
+    lines = [line.removeprefix("ffrobot: ") for line in printed.splitlines() if line.strip()]
     with suppress(ValueError):
-        return f"ended by {signal.Signals(-code).name}"
-    return "no message"
+        lines = lines or [f"ended by {signal.Signals(-code).name}"]
+    message = lines[-1] if lines else "no message"
+    return message.replace(f"{folder.absolute()}{os.sep}", "").replace(f"{folder}{os.sep}", "")
 
 
 def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:

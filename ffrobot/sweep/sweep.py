@@ -9,7 +9,7 @@ import signal
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..common.python_files import allowed_python, python_allowed
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, run_files
-from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, perform_under_mpi
+from .runs import RESULTS, ROW, Row, Run, collected, finished_row, perform, perform_under_mpi
 from .table import write_table
 from .variation import Value, Variation, grid, latin_hypercube, parse_variation
 from .workers import Workers
@@ -149,7 +149,7 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
                     f"{sweep.folder}: {' and '.join(what)} changed while the sweep ran, and the runs under way with it;"
                     " the same command resumes it, and computes what is out of date"
                 )
-            keep_row(run.folder, row)
+            write_atomically(run.folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep", ours=True)
             rows[row.number] = row
             watcher.advance(before + len(rows), before + len(sweep.points))
             tabulate()
@@ -176,17 +176,13 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
     rows, waiting = {}, {}
     for run in sweep.runs:
         files, row = _files(sweep, run), finished_row(run.folder)
-        if row is not None and not row.changes(files.inputs) and _is_whole(sweep, run, row):
+        is_whole = not sweep.growing or (run.folder / RESULTS).exists()  # their results are to be read
+        if row is not None and not row.changes(files.inputs) and (is_whole or row.status != "completed"):
             rows[run.number] = replace(row, number=run.number, values=run.values)
         else:
             files.write(run.folder)
             waiting[run.number] = replace(run, inputs=files.inputs)
     return rows, waiting
-
-
-def _is_whole(sweep: Sweep, run: Run, row: Row) -> bool:
-    """Whether all that the row stands for is there still."""
-    return not sweep.growing or row.status != "completed" or (run.folder / RESULTS).exists()
 
 
 @contextmanager
@@ -232,11 +228,9 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
                     read_link(body.link)
         except InputError as error:
             message = str(error).replace(str(Path(folder) / SCENE), str(sweep.scene)).replace(folder + os.sep, "")
-            raise InputError(f"with {_describe(sweep, run)}:\n{message}") from None
-
-
-def _describe(sweep: Sweep, run: Run) -> str:
-    return ", ".join(f"{v.name} = {value}" for v, value in zip(sweep.variations, run.values, strict=True))
+            pairs = zip(sweep.variations, values, strict=True)
+            what = ", ".join(f"{variation.name} = {value}" for variation, value in pairs)
+            raise InputError(f"with {what}:\n{message}") from None
 
 
 def claim_folder(sweep: Sweep) -> None:
