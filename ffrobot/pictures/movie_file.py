@@ -74,8 +74,8 @@ def movie_outputs(time: NDArray[np.float64], seconds: float) -> Indices:
 
 def write_movie(path: Path, frames: Iterable[Frame]) -> None:
     """Write frames, all of the same size, as a movie: the suffix of `path` says of which kind."""
-    image = gif_image(frames) if path.suffix.lower() == ".gif" else mp4_image(frames)
-    write_atomically(path, image, "movie", make_folder=True)
+    image = gif_image if path.suffix.lower() == ".gif" else mp4_image
+    write_atomically(path, image(frames), "movie", make_folder=True)
 
 
 def gif_image(frames: Iterable[Frame]) -> bytes:

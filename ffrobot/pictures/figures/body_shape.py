@@ -53,7 +53,8 @@ def draw_part(part: Inspection, listed: int) -> Figure:
     figure = Figure(figsize=(WIDTH, 2 * SOLID_HEIGHT), layout="constrained")
     palette = np.array([matplotlib.colors.to_rgb(color) for color in COLORS])
     colors = palette[part.face_of % len(palette)]
-    for k, (view, title) in enumerate(((LINK, "from the side of +z"), (_behind(LINK), "from the other side"))):
+    behind = View(viewer=-LINK.viewer, right=-LINK.right, up=LINK.up)
+    for k, (view, title) in enumerate(((LINK, "from the side of +z"), (behind, "from the other side"))):
         axes = _view(figure, (2, 1, k + 1), title)
         _draw_cells(axes, part.points, part.facets, colors, view=view)
         facing = normals(part.points, part.facets) @ view.viewer > 0
@@ -65,11 +66,6 @@ def draw_part(part: Inspection, listed: int) -> Figure:
                 axes.annotate(str(number + 1), (x, y), fontsize=7, bbox=box)
         directions(axes, 0.06 * float(np.ptp(part.points, axis=0).max()), view)
     return figure
-
-
-def _behind(view: View) -> View:
-    """The view from the other side, with the same direction upward."""
-    return View(viewer=-view.viewer, right=-view.right, up=view.up)
 
 
 def draw_modes(body: ModalBody) -> Figure:
@@ -143,7 +139,7 @@ def _sides(cells: Integers) -> Integers:
     return np.asarray(np.sort(sides, axis=1), dtype=np.int64)
 
 
-def _outline(points: Array, cells: Integers, viewer: Array | None = None) -> Integers:
+def _outline(points: Array, cells: Integers, viewer: Array) -> Integers:
     """(e, 2) the edges along which a surface folds or ends, or turns away from a viewer; of a line, all of it."""
     corners = cells.shape[1]
     if corners == 2:
@@ -156,8 +152,7 @@ def _outline(points: Array, cells: Integers, viewer: Array | None = None) -> Int
     paired = np.flatnonzero(np.all(edges[1:] == edges[:-1], axis=1))
     one, other = normal[owner[paired]], normal[owner[paired + 1]]
     smooth = np.abs(np.einsum("ei,ei->e", one, other)) > FOLD
-    if viewer is not None:
-        smooth &= (one @ viewer > 0.0) == (other @ viewer > 0.0)
+    smooth &= (one @ viewer > 0.0) == (other @ viewer > 0.0)
     inner = np.zeros(len(edges), dtype=bool)
     inner[paired[smooth]] = inner[paired[smooth] + 1] = True
     # A fold is listed by both of its cells; once is enough.

@@ -11,7 +11,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import in_3d
 from ...results.file import Results
-from ..motion import MovingBody, ground_places, moving_bodies, size_of, visible_exaggeration
+from ..motion import ground_places, moving_bodies, size_of, visible_exaggeration
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
 from .figure_file import Curve, FigureRecord
@@ -31,9 +31,9 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     outputs = results.time(figure.analysis)
     frames = np.array([int(np.argmin(np.abs(outputs - time))) for time in figure.times], dtype=np.intp)
     bodies = moving_bodies(results, figure.analysis, frames)
-    s = figure.exaggeration or (1.0 if results.space.is_plane else _visible(bodies))
-    is_bent = any(body.deflection.any() for body in bodies)
-    exaggerated = f", deflections × {s:g}" if s != 1.0 and is_bent else ""
+    largest = max(float(np.abs(body.deflection).max(initial=0.0)) for body in bodies)
+    s = figure.exaggeration or (1.0 if results.space.is_plane else visible_exaggeration(size_of(bodies), largest))
+    exaggerated = f", deflections × {s:g}" if s != 1.0 and largest > 0.0 else ""
     places = np.concatenate([body.global_points for body in bodies], axis=1)
     picture, views = _new(results, figure.title + exaggerated, places)
     lines, surfaces = ([shape(results, body, []) for body in bodies] for shape in (line_shape, surface_shape))
@@ -114,18 +114,13 @@ def _curves(figure: FigureRecord, results: Results) -> list[Path]:
 
 def _path(results: Results, figure: FigureRecord, curve: Curve) -> Array:
     """(T, 3) of the dataset of a curve, which has as many columns as the scene has axes."""
-    values, names = results.data(curve.data), [f"{'xyz'[axis]}" for axis in results.space.translations]
+    values, names = results.data(curve.data), ["xyz"[axis] for axis in results.space.translations]
     if values.shape[1] != len(names):
         raise InputError(
             f'{results.path}: figure "{figure.name}": expected {"two" if len(names) == 2 else "three"} columns'
             f' ({", ".join(names)}) in "{curve.data}", found {values.shape[1]}'
         )
     return in_3d(values)
-
-
-def _visible(bodies: list[MovingBody]) -> float:
-    largest = max((float(np.abs(body.deflection).max(initial=0.0)) for body in bodies), default=0.0)
-    return visible_exaggeration(size_of(bodies), largest)
 
 
 POINTS = 4000  # of a frequency response

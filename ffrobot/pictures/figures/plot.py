@@ -24,7 +24,6 @@ from .style import literal, new_axes, style
 from .time_history import draw_placement, draw_time_history, draw_torque_speed
 
 DRAW = {"time": draw_time_history, "placement": draw_placement, "torque-speed": draw_torque_speed}
-
 DRAW_WHOLE = {  # with axes of their own
     "path": draw_path,
     "configurations": draw_configurations,

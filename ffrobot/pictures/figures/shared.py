@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -94,22 +93,17 @@ MARGIN = 1.15  # of the largest moment or speed, where no limit ends a curve
 POINTS = 60  # of that curve
 
 
-def limits_of(results: Results, joint: str, datasets: Sequence[str]) -> MotorLimits:
-    """Of the motor of a joint of which `datasets` such as "…/moment" or "…/moment[1]" are drawn; infinite without any.
-
-    Of several coordinates of a joint each has its limits: those of the one that the first dataset is of.
-    """
-    column = next((name.partition("[")[2].rstrip("]") for name in datasets), "")
-    coordinates, number = joint_coordinates(results.scene, joint), int(column or 0)
-    return coordinates[number].limits if number < len(coordinates) else MotorLimits()
-
-
 def motor_limits(results: Results, figure: FigureRecord) -> Array:
-    """What the motor of the joint of a torque-speed diagram can do, as `limit_curves`."""
+    """What the motor of the joint of a torque-speed diagram can do, as `limit_curves`.
+
+    Of several coordinates of a joint each has its limits: those of the one that the first curve is of, "…/moment[1]".
+    """
     assert figure.joint is not None
     points = [curve_points(results, curve, figure.scale) for curve in figure.curves]
     speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
-    return limit_curves(limits_of(results, figure.joint, [curve.data for curve in figure.curves]), speed, moment)
+    number = int(figure.curves[0].data.partition("[")[2].rstrip("]") or 0)
+    limits = [coordinate.limits for coordinate in joint_coordinates(results.scene, figure.joint)]
+    return limit_curves(limits[number] if number < len(limits) else MotorLimits(), speed, moment)
 
 
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:

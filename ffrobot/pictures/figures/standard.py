@@ -61,15 +61,11 @@ def _configurations(results: Results) -> Iterator[FigureRecord]:
     """Of the first analysis that goes through time, else the first: in others the robot is hardly elsewhere."""
     moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
     for analysis in [*moving, *results.analyses][:1]:
-        times = results.time(analysis)
-        snapshots = np.linspace(times[0], times[-1], SNAPSHOTS if len(times) > 1 else 1)
-        yield FigureRecord(
-            name=file_name("configurations", analysis),
-            title=f"robot postures, {analysis}",
-            kind="configurations",
-            analysis=analysis,
-            times=tuple(float(t) for t in snapshots),
-        )
+        outputs = results.time(analysis)
+        snapshots = np.linspace(outputs[0], outputs[-1], SNAPSHOTS if len(outputs) > 1 else 1)
+        name, title = file_name("configurations", analysis), f"robot postures, {analysis}"
+        times = tuple(map(float, snapshots))
+        yield FigureRecord(name=name, title=title, kind="configurations", analysis=analysis, times=times)
 
 
 def _paths(results: Results) -> Iterator[FigureRecord]:
@@ -98,9 +94,8 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
 
 def _tip_errors(results: Results) -> Iterator[FigureRecord]:
     """Of all closed loops in one figure."""
-    yield from _histories(
-        ("tip_error",), "tip position error", curves_of(results, "tip_error"), "error (mm)", scale=1e3
-    )
+    curves = curves_of(results, "tip_error")
+    yield from _histories(("tip_error",), "tip position error", curves, "error (mm)", scale=1e3)
 
 
 def _angles(results: Results) -> Iterator[FigureRecord]:
@@ -157,6 +152,7 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
     """What keeps points and angles on their paths; along a joint it is what its motor does, which is drawn anyway."""
     for trajectory in results.scene.get("trajectory", []):
         name, joint = trajectory["name"], trajectory.get("joint")
+        slides = any(coordinate.unit == "m" for coordinate in joint_coordinates(results.scene, str(joint)))
         forces: list[Curve] = []
         moments: list[Curve] = []
         for analysis in results.analyses:
@@ -166,7 +162,7 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
             components = _components(results, group)
             for k, component in enumerate(components):
                 several = f", {ABOUT.get(component, component)}" if len(components) > 1 else ""
-                is_force = component in AXES if "point" in trajectory else _slides(results, str(joint))
+                is_force = component in AXES if "point" in trajectory else slides
                 (forces if is_force else moments).append(Curve(data=f"{group}/force[{k}]", label=analysis + several))
         for kind, what, unit, curves in (
             ("force", "force", "N", forces),
@@ -178,10 +174,6 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
 def _components(results: Results, group: str) -> list[str]:
     """Of a trajectory: what its forces act along or about."""
     return [str(each) for each in results.attributes(group)["components"]]
-
-
-def _slides(results: Results, joint: str) -> bool:
-    return any(coordinate.unit == "m" for coordinate in joint_coordinates(results.scene, joint))
 
 
 def _actuators(results: Results) -> Iterator[FigureRecord]:

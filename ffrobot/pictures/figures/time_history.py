@@ -70,9 +70,7 @@ def is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
 
 def is_crowded(values: Array, limits: tuple[float, ...]) -> bool:
     """Whether many columns of values (T, n) go from limit to limit, so that the last line hides the others."""
-    if values.shape[1] <= MANY or not limits:
-        return False
-    return bool(is_at_limit(values, limits).mean() > OFTEN)
+    return values.shape[1] > MANY and bool(limits) and bool(is_at_limit(values, limits).mean() > OFTEN)
 
 
 def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: FigureRecord) -> None:

@@ -198,7 +198,10 @@ def _looks(
 
     `colors` are by (source, analysis); `before`: curves that the chart has already.
     """
-    names = [_run_of(curve) for curve in record.curves]
+    names = [  # of analyses; a prescribed path, which all have, has none
+        "" if curve.data.partition("[")[0].endswith("/target") else curve.data.partition("/")[0]
+        for curve in record.curves
+    ]
     is_one = len(set(names)) == 1 and len(names) > 1  # components of one run
     parts: Counter[str] = Counter()
     for k, (curve, name) in enumerate(zip(record.curves, names, strict=True), before):
@@ -207,11 +210,6 @@ def _looks(
         else:
             yield curve, style(k) if is_one else style(k, colors[source, name], parts[name])
         parts[name] += 1
-
-
-def _run_of(curve: Curve) -> str:
-    """The analysis of a curve; of a prescribed path, which all have, none."""
-    return "" if curve.data.partition("[")[0].endswith("/target") else curve.data.partition("/")[0]
 
 
 def _add(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +23,6 @@ from ..studies.study import (
     Points,
     Progress,
     Study,
-    StudyTable,
     wrapped,
 )
 from .charts import encoded, plain
@@ -169,15 +168,8 @@ def _texts(k: int, axis: Axis) -> Iterator[dict[str, Any]]:
     """The name above an axis and its ticks at the left."""
     name = "<br>".join(plain(line) for line in wrapped(axis.label, LETTERS))
     yield {"x": k, "y": 1.03, "text": name, "showarrow": False, "yanchor": "bottom", "font": {"size": 11}}
-    for place, text in axis.ticks:
-        yield {
-            "x": k,
-            "y": place,
-            "text": f"{plain(text)} –",
-            "showarrow": False,
-            "xanchor": "right",
-            "font": {"size": 10},
-        }
+    look = {"showarrow": False, "xanchor": "right", "font": {"size": 10}}
+    yield from ({"x": k, "y": place, "text": f"{plain(text)} –", **look} for place, text in axis.ticks)
 
 
 def _progress(diagram: Progress) -> Iterator[Trace]:
@@ -205,13 +197,8 @@ def _band(band: Band) -> Iterator[Trace]:
         (band.lowest, band.highest, band.worst_label, "rgba(230, 159, 0, 0.3)"),
         (band.low, band.high, band.band_label, "rgba(86, 180, 233, 0.6)"),
     ):
-        edge = {
-            "type": "scatter",
-            "mode": "lines",
-            "line": {"width": 0},
-            "x": encoded(time, "f8"),
-            "legendgroup": label,
-        }
+        edge = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "legendgroup": label}
+        edge |= {"x": encoded(time, "f8")}
         yield edge | {"y": encoded(np.array(low)), "showlegend": False, "name": f"{plain(label)}: lower end"}
         yield edge | {"y": encoded(np.array(high)), "fill": "tonexty", "fillcolor": color, "name": plain(label)}
     for values, label, line in (
@@ -264,16 +251,6 @@ class StudyPart:
         return {True: "good", False: "bad", None: ""}[self.study.good]
 
     @property
-    def tables(self) -> Sequence[StudyTable]:
-        """As the command prints them."""
-        return self.study.tables
-
-    @property
     def charts(self) -> list[DrawnDiagram]:
         """Its diagrams."""
         return [drawn(one, f"study_{self.number}_{one.name}") for one in self.study.diagrams]
-
-
-def study_parts(studies: Sequence[tuple[Path, Study]]) -> list[StudyPart]:
-    """Numbered in order."""
-    return [StudyPart(number, file, study) for number, (file, study) in enumerate(studies, start=1)]

@@ -222,10 +222,6 @@ def _entry(link: LinkModes, points: Array, triangles: Integers, shapes: Array) -
         "points": encoded(points[kept]),
         "triangles": encoded(triangles, "i4"),
         "modes": encoded(np.round(FINEST * np.array(modes)), "i2"),
-        "names": [_name(body, k) for k in range(count)],
+        "names": [f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(count)],
         "amplitude": AMPLITUDE * body.length / FINEST,
     }
-
-
-def _name(body: ModalBody, k: int) -> str:
-    return f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}"

@@ -15,7 +15,7 @@ from ...common.version import VERSION
 from ...results.file import Results
 from ..studies.study import Study, read_study, study_files
 from .charts import Chart, folded, history_charts
-from .diagrams import DrawnDiagram, StudyPart, study_parts
+from .diagrams import DrawnDiagram, StudyPart
 from .mechanism import link_modes, mechanism, surface_modes
 from .runs import runs, sources
 from .tables import (
@@ -31,6 +31,7 @@ from .tables import (
 )
 
 HERE = Path(__file__).parent
+OWN = ("page.js", "modes.js", "player.js", "mechanism.js", "page.css")  # what the template calls page_js, …
 
 
 def write_report(paths: Sequence[Path], path: Path) -> None:
@@ -62,17 +63,11 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    return environment.get_template("page.html").render(
-        _content(files, study_parts(studies)),
-        plotly_js=get_plotlyjs(),
-        plotly_version=get_plotlyjs_version(),
-        page_js=(HERE / "page.js").read_text(encoding="utf-8"),
-        modes_js=(HERE / "modes.js").read_text(encoding="utf-8"),
-        player_js=(HERE / "player.js").read_text(encoding="utf-8"),
-        mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
-        page_css=(HERE / "page.css").read_text(encoding="utf-8"),
-        ffrobot_version=VERSION,
-    )
+    parts = [StudyPart(number, file, study) for number, (file, study) in enumerate(studies, start=1)]
+    own = {name.replace(".", "_"): (HERE / name).read_text(encoding="utf-8") for name in OWN}
+    versions = {"plotly_version": get_plotlyjs_version(), "ffrobot_version": VERSION}
+    page = environment.get_template("page.html")
+    return page.render(_content(files, parts), plotly_js=get_plotlyjs(), **own, **versions)
 
 
 def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str, Any]:

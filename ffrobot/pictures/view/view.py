@@ -95,9 +95,13 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
         for analysis in analyses:
             frames = _frames(results, analysis, options.frames)
             grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
-            pictures = [_snapshot(results, analysis, frames, grid, options, color) for color in _colors(grid)]
-            pictures[0] = replace(pictures[0], path=f"{name}.png")
-            yield name, grid, [pictures[0], *(replace(other, path=f"{name}.stress.png") for other in pictures[1:])]
+            colors = {"deflection": f"{name}.png", "von_mises": f"{name}.stress.png"}
+            pictures = [
+                replace(_snapshot(results, analysis, frames, grid, options, color), path=path)
+                for color, path in colors.items()
+                if color in grid.point_data
+            ]
+            yield name, grid, pictures
 
 
 def _analyses(results: Results, wanted: str | None) -> Sequence[str]:
@@ -116,14 +120,7 @@ def _frames(results: Results, analysis: str, count: int) -> Indices:
     return np.unique(np.linspace(0, outputs - 1, min(outputs, count)).round().astype(np.intp))
 
 
-def _colors(grid: Grid) -> list[str]:
-    """What bodies are coloured by: a picture each."""
-    return ["deflection", *(["von_mises"] if "von_mises" in grid.point_data else [])]
-
-
-def _snapshot(
-    results: Results, analysis: str, frames: Indices, grid: Grid, options: Options, color: str = "deflection"
-) -> Picture:
+def _snapshot(results: Results, analysis: str, frames: Indices, grid: Grid, options: Options, color: str) -> Picture:
     """At the step nearest to the time asked for, or where what it is coloured by is largest."""
     assert grid.time is not None
     values = grid.point_data[color]

@@ -103,13 +103,9 @@ def _write(group: h5py.Group, name: str, values: NDArray[np.generic]) -> None:
 def modes_grid(body: ModalBody) -> Grid:
     """The surface of a link, undeformed, with every mode as a vector: displacement per unit of modal coordinate."""
     mesh = body_surface(body)
-    modes = {mode_name(body, k): mesh.mode_shapes[None, :, :, k] for k in range(body.mode_count)}
+    names = [f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {family}" for k, family in enumerate(body.family)]
+    modes = {name: mesh.mode_shapes[None, :, :, k] for k, name in enumerate(names)}
     return Grid([mesh.cells], mesh.points[None], point_data=modes)
-
-
-def mode_name(body: ModalBody, k: int) -> str:
-    """Of mode k, from 0: its number, frequency and family."""
-    return f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {body.family[k]}"
 
 
 def results_grid(results: Results, analysis: str, frames: Indices, notes: list[str]) -> Grid:
