@@ -9,7 +9,7 @@ Richardson's extrapolation of central differences, of order h⁶.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, Literal, NamedTuple
@@ -176,25 +176,15 @@ def entries(base: Base, known: Known) -> tuple[tuple[Entry, ...], ...]:
     return tuple(tuple(_entry(base, g, k, known) for k in range(len(base.keys))) for g in range(len(base.goals)))
 
 
-def wants_smaller_steps(base: Base, known: Known) -> list[int]:
-    """Keys by number with an entry whose error is above `AIM` and least with the smallest steps there are."""
-    return _rough_keys(base, known, lambda sizes: sizes[-LEVELS:][0])
-
-
-def wants_larger_steps(base: Base, known: Known) -> list[int]:
-    """Likewise, least with the largest ones."""
-    return _rough_keys(base, known, lambda sizes: sizes[0])
-
-
-def _rough_keys(base: Base, known: Known, best: Callable[[list[float]], float]) -> list[int]:
-    """Keys by number with an entry whose error is above `AIM` and least with the step that is `best` of all sizes."""
+def rough_keys(base: Base, known: Known, *, smaller: bool) -> list[int]:
+    """Keys by number with an entry whose error is above `AIM`, and least with the smallest steps, or the largest."""
     rough, rows = set(), entries(base, known)
     for g, row in enumerate(rows):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
         for k, one in enumerate(row):
             sizes = sorted({abs(sample.offset) for sample in known.of_key(k) if sample.goals}, reverse=True)
             is_good = _relative(one.error - one.unresolved, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
-            if sizes and not is_good and np.isclose(abs(one.step), best(sizes)):
+            if sizes and not is_good and np.isclose(abs(one.step), sizes[-LEVELS:][0] if smaller else sizes[0]):
                 rough.add(k)
     return sorted(rough)
 

@@ -16,7 +16,6 @@ from .finding import CsvFile, Finding, Section, failed_runs, numbers, with_unit
 from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
 from .optimality import Conflict, Optimality
-from .readings import Reading
 from .variables import Space, Variable
 
 
@@ -217,7 +216,7 @@ class Optimum(Finding):
     def headline(self) -> str:
         """The best value and what it saves, or that no design keeps all limits."""
         word = "least" if self.problem.sense > 0 else "largest"
-        text = f"{word} {self.problem.objective.text}: {_value(self.best.readings[0])}"
+        text = f"{word} {self.problem.objective.text}: {self.best.readings[0].in_words()}"
         if self.start.completed and (own := self.start.values[0]):
             text += f", {100 * (self.value - own) / abs(own):+.4g} % of the start's {own:.6g}"
         return text if self.feasible else f"no design found that keeps all limits; nearest is one with {text}"
@@ -344,8 +343,4 @@ def _reached(price: float) -> tuple[str, object]:
 
 
 def _at(design: Evaluated, k: int) -> str:
-    return _value(design.readings[k]) if design.completed else "failed"
-
-
-def _value(reading: Reading) -> str:
-    return f"{reading.value:.6g}{' ' if reading.unit else ''}{reading.unit}"
+    return design.readings[k].in_words() if design.completed else "failed"

@@ -56,6 +56,10 @@ class Reading:
     missed_by: float = float("nan")
     doubt: str = ""
 
+    def in_words(self, digits: int = 6) -> str:
+        """The value with its unit."""
+        return f"{self.value:.{digits}g} {self.unit}".rstrip()
+
     @property
     def is_between(self) -> bool:
         """Whether outputs miss it: it has no place, and is compared with those of other runs."""
@@ -165,9 +169,9 @@ def read_history(results: Results, name: str, option: str) -> History:
     wanted = match["dataset"] if match else name
     found = _known(results).get(wanted.replace("/", "."))
     if found is None:
-        known = [key for key in _known(results) if "." in key]
+        known = sorted((key for key in _known(results) if "." in key), key=lambda key: not key.startswith("joints."))
         raise InputError(
-            f'{option}: expected the name of a history, such as "{_example(known)}", found'
+            f'{option}: expected the name of a history, such as "{next(iter(known), "tip_error")}", found'
             f' "{wanted}"{did_you_mean(wanted.replace("/", "."), known)}'
         )
     is_power = found.endswith(f"/{POWER}")
@@ -237,10 +241,6 @@ def _unit(results: Results, name: str) -> str:
     units = set(JOINT_TYPES[kinds[match["joint"]]].units)  # types that the plane has too have the same there
     turning, sliding = known.unit.split(", ")
     return {"rad": turning, "m": sliding}[units.pop()] if len(units) == 1 else ""
-
-
-def _example(known: list[str]) -> str:
-    return next((name for name in known if name.startswith("joints.")), known[0] if known else "tip_error")
 
 
 NEAR = 0.5  # of the largest value: local peaks that have a window of their own

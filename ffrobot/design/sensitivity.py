@@ -38,9 +38,8 @@ from .derivatives import (
     Known,
     Sample,
     entries,
+    rough_keys,
     values_of,
-    wants_larger_steps,
-    wants_smaller_steps,
 )
 from .designs import Designs, Point, Runs, changes_for, may_repeat, parse_key, repeated_steps
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, numbers
@@ -123,7 +122,8 @@ class Sensitivity(Finding):
         """A table for each goal, the key that matters most first."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             rows = [self._row(g, k) for k in self.ranked(g)]
-            yield Section(HEADING, rows, line=f"{goal}: {_reading(reading)}", of=goal)
+            when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
+            yield Section(HEADING, rows, line=f"{goal}: {reading.in_words(8)}{when}", of=goal)
 
     def _row(self, g: int, k: int) -> tuple[str, ...]:
         one = self.entries[g][k]
@@ -153,10 +153,9 @@ class Sensitivity(Finding):
     def _tornado(self, g: int) -> Bars:
         """Percent of goal g per percent of each key, the largest on top; keys without a number are left out."""
         known = [k for k in self.ranked(g) if np.isfinite(self.logarithmic[g, k])]
-        reading = self.readings[g]
         return Bars(
             name=f"tornado_{file_name(self.goals[g])}",
-            title=f"{self.goals[g]}: {reading.value:.5g} {reading.unit}".rstrip(),
+            title=f"{self.goals[g]}: {self.readings[g].in_words(5)}",
             x_label="change of the response (%) with +1 % of the parameter",
             labels=tuple(self.keys[k] for k in known),
             series=(Series(values=numbers(self.logarithmic[g, known])),),
@@ -177,11 +176,6 @@ class Sensitivity(Finding):
             f"how        {self.runs} run{'s' if self.runs > 1 else ''} with a tolerance of at most {self.tolerance:g};"
             f" {'; '.join([*texts, ERRORS])}"
         )
-
-
-def _reading(reading: Reading) -> str:
-    when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
-    return f"{reading.value:.8g}{' ' if reading.unit else ''}{reading.unit}{when}"
 
 
 def _number(value: float, form: str) -> str:
@@ -262,12 +256,12 @@ def _all_known(designs: Designs, base: Base) -> Known:
     if base.repeats:
         take_pairs(designs, base, known, wanted)
         for parts in OTHERS:
-            wanted = wants_larger_steps(base, known)
+            wanted = rough_keys(base, known, smaller=False)
             known.samples += _beside(designs, base, known, wanted, parts)
-        wanted = wants_larger_steps(base, known)
+        wanted = rough_keys(base, known, smaller=False)
     known.samples += _beside(designs, base, known, wanted, SIZES)
     for sizes in () if base.repeats else FINER:
-        known.samples += _beside(designs, base, known, wants_smaller_steps(base, known), sizes)
+        known.samples += _beside(designs, base, known, rough_keys(base, known, smaller=True), sizes)
     return known
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -26,6 +27,7 @@ from .designs import Design, Designs, Point, Runs, changes_for, parse_key
 from .readings import Goal
 
 LEVELS = (0.05, 0.5, 0.95)
+NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 RESAMPLES = 200  # of a bootstrap
 
 
@@ -45,6 +47,22 @@ class Statistics:
     quantile_errors: Array
     lowest: Array
     highest: Array
+
+    @property
+    def named(self) -> dict[str, tuple[Array, Array]]:
+        """What has an error (…), with it, by name."""
+        quantiles = dict(zip(NAMES, zip(self.quantiles, self.quantile_errors, strict=True), strict=True))
+        return {"mean": (self.mean, self.mean_error), "deviation": (self.deviation, self.deviation_error), **quantiles}
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of `numbers`."""
+        return [*(f"{name}{error}" for name in self.named for error in ("", "_error")), "lowest", "highest"]
+
+    def numbers(self, k: int) -> list[float]:
+        """All of quantity k."""
+        values = [value for pair in self.named.values() for value in pair]
+        return [float(one[k]) for one in (*values, self.lowest, self.highest)]
 
 
 def statistics(values: Array) -> Statistics:
@@ -160,16 +178,20 @@ def parse_spread(text: str, path: Path) -> Spread:
     for sign in ("±", "+-", "+/-"):
         if word.startswith(sign):
             word, numbers = "±", [word.removeprefix(sign), *numbers]
-    match word, numbers:
-        case "±", [half] if equals:
-            return Spread(key, text, own, "uniform", own, _size(half, own, text) / math.sqrt(3.0))
-        case "normal", [sigma]:
-            return Spread(key, text, own, "normal", own, _size(sigma, own, text))
-        case "uniform", [low, high]:
-            a, b = _number(low, text), _number(high, text)
-            if a < b:
-                return Spread(key, text, own, "uniform", (a + b) / 2.0, (b - a) / math.sqrt(12.0))
-    raise _wrong(text)
+    with suppress(ValueError):
+        match word, numbers:
+            case "±", [half] if equals:
+                return Spread(key, text, own, "uniform", own, _size(half, own, text) / math.sqrt(3.0))
+            case "normal", [sigma]:
+                return Spread(key, text, own, "normal", own, _size(sigma, own, text))
+            case "uniform", [low, high]:
+                a, b = float(low), float(high)
+                if -math.inf < a < b < math.inf:
+                    return Spread(key, text, own, "uniform", (a + b) / 2.0, (b - a) / math.sqrt(12.0))
+    raise InputError(
+        "--spread: expected KEY=±2%, KEY=±0.1, KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=normal:2%, with positive"
+        f' spreads, found "{shown(text)}"'
+    )
 
 
 def spread_points(spreads: Sequence[Spread], u: Array) -> list[tuple[float, ...]]:
@@ -179,32 +201,15 @@ def spread_points(spreads: Sequence[Spread], u: Array) -> list[tuple[float, ...]
 
 
 def _size(text: str, own: float, whole: str) -> float:
-    """A positive number, or so many percent of the key's value."""
+    """A positive number, or so many percent of the key's value. Raises `ValueError` for what is neither."""
     percent = text.strip().endswith("%")
-    value = _number(text.strip().removesuffix("%"), whole)
+    value = float(text.strip().removesuffix("%"))
     if percent and own == 0.0:
         raise InputError(f'--spread: expected a spread in the unit of a key whose value is 0, found "{shown(whole)}"')
     size = value / 100.0 * abs(own) if percent else value
-    if not size > 0.0:
-        raise _wrong(whole)
+    if not 0.0 < size < math.inf:
+        raise ValueError
     return size
-
-
-def _number(text: str, whole: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise _wrong(whole) from None
-    if not math.isfinite(value):
-        raise _wrong(whole)
-    return value
-
-
-def _wrong(text: str) -> InputError:
-    return InputError(
-        "--spread: expected KEY=±2%, KEY=±0.1, KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=normal:2%, with positive"
-        f' spreads, found "{shown(text)}"'
-    )
 
 
 DRAWS = 4096  # of the model, for quantiles: no runs
@@ -288,7 +293,14 @@ class SpreadDesigns:
         keys, own = [one.key for one in spreads], tuple(one.own for one in spreads)
         self._designs = Designs(runs, keys, own, changes_for(runs.path, (*goals, *others), tolerance))
         self.failures: list[str] = []
-        self.middle = self._run_middle()
+        centre = tuple(one.mean for one in self.spreads)
+        for k, one in enumerate(self.spreads):
+            for end in one.ends:
+                if problem := self._designs.problem((*centre[:k], end, *centre[k + 1 :])):
+                    raise InputError(
+                        f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
+                    )
+        self.middle = self._designs.run_first(centre)
         self.readings = self.middle.read(goals)
 
     @property
@@ -316,17 +328,6 @@ class SpreadDesigns:
         return ", ".join(
             f"{'.'.join(one.key)} = {value:.6g}" for one, value in zip(self.spreads, design.point, strict=True)
         )
-
-    def _run_middle(self) -> Design:
-        """The design all parameters at nominal values, which has to be there, and to make sense at their ends."""
-        centre = tuple(one.mean for one in self.spreads)
-        for k, one in enumerate(self.spreads):
-            for end in one.ends:
-                if problem := self._designs.problem((*centre[:k], end, *centre[k + 1 :])):
-                    raise InputError(
-                        f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
-                    )
-        return self._designs.run_first(centre)
 
 
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:

@@ -65,33 +65,29 @@ class RunOptions(TypedDict, total=False):
 def _checked(function: Callable[P, R]) -> Callable[P, R]:
     """Raise `InputError` for what a signature does not have: numbers out of ranges, other choices, text for lists."""
     signature = inspect.signature(function)
+    annotations = {name: parameter.annotation for name, parameter in signature.parameters.items()}
+    annotations["processes"] = RunOptions.__annotations__["processes"]
 
     @wraps(function)
     def call(*args: P.args, **given: P.kwargs) -> R:
         from ..common.validation import check_texts  # loads pydantic, which --help does without
 
-        bound = signature.bind(*args, **given).arguments
-        options = bound.get("how", {})
-        annotations = {name: signature.parameters[name].annotation for name in bound.keys() - {"how"}}
-        annotations |= {name: RunOptions.__annotations__[name] for name in options.keys() & {"processes"}}
-        for name, annotation in annotations.items():
-            if get_origin(_kind(annotation)) is Sequence:
-                check_texts(bound[name], f"{function.__name__}: {name}")
-            if problem := _problem(annotation, {**bound, **options}[name]):
-                raise InputError(f"{function.__name__}: {name}: {problem}")
+        bound = dict(signature.bind(*args, **given).arguments)
+        bound |= bound.pop("how", {})
+        for name, value in bound.items():
+            annotation, label = annotations.get(name), f"{function.__name__}: {name}"
+            kind, *about = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+            if get_origin(kind) is Sequence:
+                check_texts(value, label)
+            if problem := _problem(kind, about, value):
+                raise InputError(f"{label}: {problem}")
         return function(*args, **given)
 
     return call
 
 
-def _kind(annotation: object) -> object:
-    """Without what is said of it."""
-    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
-
-
-def _problem(annotation: object, value: object) -> str:
+def _problem(kind: object, about: Sequence[object], value: object) -> str:
     """What is wrong with the value of a parameter; empty if nothing is."""
-    kind, about = _kind(annotation), getattr(annotation, "__metadata__", ())
     if get_origin(kind) is Literal and value not in get_args(kind):
         return f"expected {either(get_args(kind))}, found {value!r}"
     if isinstance(value, float) and kind is int:

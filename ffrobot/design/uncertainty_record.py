@@ -14,10 +14,9 @@ from ..pictures.studies.study import Band as BandDiagram
 from ..pictures.studies.study import Bars, Diagram, Series, StudyTable
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, numbers, with_unit
 from .readings import Reading
-from .spreads import LEVELS, Indices, Spread, Statistics
+from .spreads import NAMES, Indices, Spread, Statistics
 
 LinearOrSampled = Literal["samples", "gradients"]
-NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 ROUNDING = 1e-13  # of a goal: smaller deviations are none
 UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, a note says that shares by regression are small
@@ -84,7 +83,8 @@ class Uncertainty(Finding):
     def sections(self) -> Iterator[Section]:
         """Each goal with what the keys do to it, then the bands."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
-            yield Section(_statistics_heading(), [self._statistics_row(g)], line=goal_line(goal, reading))
+            heading = (*self.statistics.named, "worst case")
+            yield Section(heading, [self._statistics_row(g)], line=goal_line(goal, reading))
             yield self._parts(g)
         if self.bands:
             yield Section(BAND_HEADINGS, self._band_rows())
@@ -96,7 +96,8 @@ class Uncertainty(Finding):
                 (goal, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
                 for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True))
             ]
-            yield Section(("goal", "unit", "nominal values", *_statistics_heading()), rows).for_report()
+            heading = ("goal", "unit", "nominal values", *self.statistics.named, "worst case")
+            yield Section(heading, rows).for_report()
         yield from (self._parts(g).for_report() for g in range(len(self.goals)))
         if self.bands:
             yield Section(BAND_HEADINGS, self._band_rows()).for_report()
@@ -104,9 +105,8 @@ class Uncertainty(Finding):
     def _statistics_row(self, g: int) -> tuple[str, ...]:
         """Of goal g, each with its error."""
         s = self.statistics
-        pairs = [(s.mean[g], s.mean_error[g]), (s.deviation[g], s.deviation_error[g])]
-        pairs += list(zip(s.quantiles[:, g], s.quantile_errors[:, g], strict=True))
-        return (*(with_error(*pair) for pair in pairs), f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
+        cells = (with_error(value[g], error[g]) for value, error in s.named.values())
+        return (*cells, f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
 
     def _parts(self, g: int) -> Section:
         """The keys' shares of the variance of goal g, the largest first; Sobol indices where known."""
@@ -166,8 +166,8 @@ class Uncertainty(Finding):
         if self.goals:
             yield CsvFile("uncertainty.csv", "table of uncertainties", self._goal_columns(), self._goal_rows())
         for band in self.bands:
-            lines = ([t, band.nominal[k], *_numbers(band.statistics, k)] for k, t in enumerate(band.time))
-            columns = ("time", "nominal", *_columns())
+            lines = ([t, band.nominal[k], *band.statistics.numbers(k)] for k, t in enumerate(band.time))
+            columns = ("time", "nominal", *band.statistics.columns)
             yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", columns, lines)
 
     def _goal_columns(self) -> list[str]:
@@ -175,14 +175,14 @@ class Uncertainty(Finding):
         parts = [f"share {key}" for key in keys]
         if self.indices:
             parts += [f"{word} {key}" for word in ("first", "first_error", "total", "total_error") for key in keys]
-        return ["goal", "unit", "middle", *_columns(), "linear", *parts]
+        return ["goal", "unit", "middle", *self.statistics.columns, "linear", *parts]
 
     def _goal_rows(self) -> Iterator[list[object]]:
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             parts = list(self.shares[g])
             if i := self.indices:
                 parts += [*i.first[g], *i.first_error[g], *i.total[g], *i.total_error[g]]
-            yield [goal, reading.unit, reading.value, *_numbers(self.statistics, g), self.explained[g], *parts]
+            yield [goal, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
 
     def diagrams(self) -> list[Diagram]:
         """The ranking of keys for each goal, and the bands."""
@@ -218,29 +218,7 @@ class Uncertainty(Finding):
 
 def goal_line(goal: str, reading: Reading) -> str:
     """With all nominal values."""
-    return f"{goal}: {reading.value:.6g} {reading.unit}".rstrip() + " all parameters at nominal values"
-
-
-def _statistics_heading() -> tuple[str, ...]:
-    return ("mean", "deviation", *NAMES, "worst case")
-
-
-def _columns() -> list[str]:
-    return [
-        "mean",
-        "mean_error",
-        "deviation",
-        "deviation_error",
-        *(f"{name}{e}" for name in NAMES for e in ("", "_error")),
-        "lowest",
-        "highest",
-    ]
-
-
-def _numbers(s: Statistics, k: int) -> list[float]:
-    pairs: list[Array] = [s.mean, s.mean_error, s.deviation, s.deviation_error]
-    quantiles = zip(s.quantiles, s.quantile_errors, strict=True)
-    return [float(one[k]) for one in (*pairs, *(value for pair in quantiles for value in pair), s.lowest, s.highest)]
+    return f"{goal}: {reading.in_words()} all parameters at nominal values"
 
 
 def with_error(value: float, error: float) -> str:
