@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import os
 import platform
@@ -20,6 +18,7 @@ from rich.table import Table
 
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
+from ..common.tables import as_csv
 from ..mbs import _core
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ..pictures.figures.plot import write_figure
@@ -55,12 +54,9 @@ def write_record(folder: Path, part: str, rows: Sequence[Row], about: Mapping[st
     Columns are those of all rows; cells are empty where a row has no such value. `about` goes into the JSON only.
     """
     columns = list(dict.fromkeys(key for row in rows for key in row))
-    table = io.StringIO(newline="")
-    writer = csv.DictWriter(table, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({key: _short(value) for key, value in row.items()} for row in rows)
+    table = as_csv([columns, *([_short(row.get(key, "")) for key in columns] for row in rows)])
     record = {"format": FORMAT, "format_version": FORMAT_VERSION, "part": part, **about, "rows": rows}
-    texts = {"csv": table.getvalue(), "json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"}
+    texts = {"csv": table, "json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"}
     paths = [folder / f"{part.replace('-', '_')}.{extension}" for extension in texts]
     for path, text in zip(paths, texts.values(), strict=True):
         write_atomically(path, text.encode(), "record", make_folder=True)
@@ -76,13 +72,9 @@ def as_text(rows: Sequence[Row], part: str) -> tuple[list[str], list[list[str]]]
     """Headings and cells of what is shown of a part; columns that are empty in all rows are left out."""
     shown = [column for column in COLUMNS[part] if any(row.get(column) is not None for row in rows)]
     headings = [HEADINGS.get(column, column.removeprefix("error_").replace("_", " ")) for column in shown]
-    return headings, [[_cell(row.get(column)) for column in shown] for row in rows]
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    values = ([row.get(column) for column in shown] for row in rows)
+    cells = [["" if v is None else f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in values]
+    return headings, cells
 
 
 LIBRARIES = ("ffrobot", "numpy", "scipy", "h5py")
@@ -183,7 +175,7 @@ class Campaign:
         )  # fmt: skip
         rows = [point.row() for point in points]
         about = {"inputs": inputs_of(scene, reference.bodies), "analysis": name, "reference": reference.about()}
-        self.keep("work-precision", rows, about, folder, f"{scene.name}, {name}: {_about(reference)}")
+        self.keep("work-precision", rows, about, folder, f"{scene.name}, {name}: {reference.in_words}")
         self.drawn(draw_work_precision(rows, (), scene.name, folder))
         return reference, points
 
@@ -191,16 +183,15 @@ class Campaign:
         """Write and print the rows of a part; `about` goes into its JSON, beside machine and settings."""
         settings = asdict(self.settings)
         inputs = content_hash(repr((settings, about.get("inputs"))))
-        record = {
-            "machine": self.machine,
-            "load": load(),
-            "settings": settings,
-            "inputs_hash": inputs,
-            "title": title,
-            **about,
-        }
-        self.drawn(write_record(folder, part, rows, record))
-        self.console.print(_table(title, rows, part))
+        record = {"machine": self.machine, "load": load(), "settings": settings, "inputs_hash": inputs, "title": title}
+        self.drawn(write_record(folder, part, rows, record | dict(about)))
+        columns, lines = as_text(rows, part)
+        table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0), pad_edge=False)
+        for column in columns:
+            table.add_column(column, overflow="fold")
+        for line in lines:
+            table.add_row(*line)
+        self.console.print(table)
 
     def drawn(self, paths: Sequence[Path]) -> None:
         """Print the files written."""
@@ -211,24 +202,6 @@ class Campaign:
 def inputs_of(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:
     """Hashes of a scene and its modal bodies, for records."""
     return {"name": scene.name, "scene": content_hash(scene.text), "bodies": dict(bodies)}
-
-
-def _about(reference: Reference) -> str:
-    error = ", ".join(f"{kind} {value:.0e}" for kind, value in reference.error.items())
-    return (
-        f"against {reference.integrator} at {reference.tolerance:.0e}, which {reference.other} at"
-        f" {reference.other_tolerance:.0e} agrees with to: {error}"
-    )
-
-
-def _table(title: str, rows: Sequence[Row], part: str) -> Table:
-    columns, lines = as_text(rows, part)
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    for line in lines:
-        table.add_row(*line)
-    return table
 
 
 Rows = Sequence[Mapping[str, Any]]

@@ -48,14 +48,13 @@ def _datasets(results: Results, analysis: str, kinds: Mapping[tuple[str, str], s
             name = f"{group}/{member}/{dataset}"
             if results.has(f"{analysis}/{name}"):
                 found.setdefault(kind, {})[name] = results[f"{analysis}/{name}"]
-    notable = {kind: _without_rounding(datasets) for kind, datasets in found.items()}
-    return {kind: datasets for kind, datasets in notable.items() if datasets}
-
-
-def _without_rounding(datasets: Mapping[str, Array]) -> dict[str, Array]:
-    peaks = {name: float(np.abs(values).max(initial=0.0)) for name, values in datasets.items()}
-    largest = max(peaks.values())
-    return {name: values for name, values in datasets.items() if peaks[name] > NEGLIGIBLE_PEAK * largest}
+    notable: dict[str, dict[str, Array]] = {}
+    for kind, datasets in found.items():
+        peaks = {name: float(np.abs(values).max(initial=0.0)) for name, values in datasets.items()}
+        least = NEGLIGIBLE_PEAK * max(peaks.values())
+        if kept := {name: values for name, values in datasets.items() if peaks[name] > least}:
+            notable[kind] = kept
+    return notable
 
 
 def errors(found: Mapping[str, Mapping[str, Array]], reference: Mapping[str, Mapping[str, Array]]) -> dict[str, float]:
@@ -132,20 +131,17 @@ def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
         raise InputError(
             f"{scene.path}: analysis: expected one that integrates over time, pcid or forward, found {kinds}"
         )
-    if name is None:
-        return integrated[0]
-    for analysis in scene.analysis:
-        if analysis.name != name:
-            continue
-        if analysis not in integrated:
-            raise InputError(
-                f'{scene.path}: analysis "{name}": expected one that integrates over time, pcid or forward, found'
-                f' kind = "{analysis.kind}"'
-            )
-        return analysis
+    for one in integrated:
+        if name in (None, one.name):
+            return one
+    if other := next((analysis for analysis in scene.analysis if analysis.name == name), None):
+        raise InputError(
+            f'{scene.path}: analysis "{name}": expected one that integrates over time, pcid or forward, found'
+            f' kind = "{other.kind}"'
+        )
     names = [analysis.name for analysis in integrated]
     raise InputError(
-        f'{scene.path}: analysis: expected one of {quoted(names)}, found "{name}"{did_you_mean(name, names)}'
+        f'{scene.path}: analysis: expected one of {quoted(names)}, found "{name}"{did_you_mean(name or "", names)}'
     )
 
 

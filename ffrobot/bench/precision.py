@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -55,6 +55,13 @@ class Reference:
         """For the record."""
         keys = ("integrator", "tolerance", "other", "other_tolerance")
         return {**{key: getattr(self, key) for key in keys}, "error": dict(self.error)}
+
+    @property
+    def in_words(self) -> str:
+        """For the title of a table."""
+        error = ", ".join(f"{kind} {value:.0e}" for kind, value in self.error.items())
+        other = f"which {self.other} at {self.other_tolerance:.0e} agrees with to"
+        return f"against {self.integrator} at {self.tolerance:.0e}, {other}: {error}"
 
 
 @dataclass
@@ -144,16 +151,12 @@ def measure_points(
 
 def _is_hopeless(points: Sequence[Point], integrator: str, tolerance: float) -> bool:
     """Whether an integrator was that slow at this tolerance, or a looser one, against others at the same."""
-    own = [point for point in points if point.integrator == integrator and point.tolerance >= tolerance]
-    return any(
-        point.seconds[0]
-        > HOPELESS * min((other.seconds[0] for other in points if _rivals(other, point)), default=np.inf)
-        for point in own
-    )
-
-
-def _rivals(other: Point, point: Point) -> bool:
-    return other.integrator != point.integrator and other.tolerance == point.tolerance and other.first.completed
+    for point in (one for one in points if one.integrator == integrator and one.tolerance >= tolerance):
+        alike = [one for one in points if one.tolerance == point.tolerance and one.first.completed]
+        rivals = [one.seconds[0] for one in alike if one.integrator != integrator]
+        if point.seconds[0] > HOPELESS * min(rivals, default=np.inf):
+            return True
+    return False
 
 
 def repeat_point(scene: Scene, name: str, point: Point, budget: float, display: Watcher) -> float:
@@ -208,20 +211,13 @@ def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene 
     return scene.model_copy(update=update) if changed else None
 
 
-def elements_of(scene: Scene) -> str:
-    """What the mesh tables of the link files say, for the record: "20" or "20, 40"."""
-    return _listed(scene, lambda keys: keys.get("mesh", {}))
-
-
-def modes_of(scene: Scene) -> str:
-    """Likewise for the numbers of modes."""
-    return _listed(scene, lambda keys: {"count": keys.get("modes", {}).get("count", "")})
-
-
-def _listed(scene: Scene, table: Callable[[Keys], Keys]) -> str:
+def sizes_of(scene: Scene) -> dict[str, str]:
+    """What the link files say of elements and modes, for the record: "20" or "20, 40"."""
     links = [link_keys(body.link) for body in scene.body if body.link is not None]
-    values = [str(value) for keys in links for key, value in table(keys).items() if key not in ("cell", "order")]
-    return ", ".join(dict.fromkeys(values))
+    meshes = (item for keys in links for item in keys.get("mesh", {}).items())
+    elements = [str(value) for key, value in meshes if key not in ("cell", "order")]
+    modes = [str(keys.get("modes", {}).get("count", "")) for keys in links]
+    return {"elements": ", ".join(dict.fromkeys(elements)), "modes": ", ".join(dict.fromkeys(modes))}
 
 
 def _scale_mesh(keys: Keys, factor: float) -> bool:
@@ -307,8 +303,7 @@ class _Trials:
         return {
             "axis": axis,
             "times": modes if axis == "modes" else elements,
-            "elements": elements_of(scene),
-            "modes": modes_of(scene),
+            **sizes_of(scene),
             "tolerance": tolerance,
             "status": found.status if isinstance(found, Run) else "refused",
             "against": best.status if isinstance(best, Run) else "refused",
@@ -319,9 +314,7 @@ class _Trials:
         }
 
     def _scene(self, elements: float, modes: float) -> Scene | None:
-        if elements == modes == 1.0:
-            return self.scene
-        return refined(self.scene, elements, modes, self.folder)
+        return self.scene if elements == modes == 1.0 else refined(self.scene, elements, modes, self.folder)
 
     def _run(self, scene: Scene, tolerance: float) -> Run | str:
         name = self.analysis.name

@@ -145,7 +145,9 @@ def plan_map(
     check_folder(folder)
     loaded = load_scene(scene)
     axes = parse_grid(over, loaded)
-    keeps = _keeps_orientation(loaded, axes, orientation)
+    keeps = orientation == "start"
+    if orientation == "auto":
+        keeps = axes[0].is_place and any(path.orientation is not None for path in loaded.trajectory)
     omega = np.zeros(0) if frequencies is None else frequencies
     return MapPlan(scene, axes, point or _default_point(loaded), keeps, count, omega, folder)
 
@@ -157,12 +159,6 @@ def _default_point(scene: Scene) -> str:
     points = ["tip"] if body.rigid is None else list(body.rigid.points)
     last = "tip" if "tip" in points else points[-1]
     return scene.tool_point or (carried[-1] if carried else f"{body.name}.{last}")
-
-
-def _keeps_orientation(scene: Scene, axes: tuple[GridAxis, ...], wanted: str) -> bool:
-    if wanted != "auto":
-        return wanted == "start"
-    return axes[0].is_place and any(path.orientation is not None for path in scene.trajectory)
 
 
 def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
@@ -190,9 +186,11 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     )
     if kept is None:
         _claim(plan, request, postures)
-    parts = {_name(part, postures): part for part in _parts(np.flatnonzero(good))}
-    found = dict(_judged(plan, evaluator, postures, parts, processes, watcher))
-    return _assembled(plan, solution, evaluator, postures, [(parts[name], found[name]) for name in parts])
+    numbers = np.flatnonzero(good)
+    parts = [numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART)]
+    named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
+    found = dict(_judged(plan, evaluator, postures, named, processes, watcher))
+    return _assembled(plan, solution, evaluator, postures, [(part, found[name]) for name, part in named.items()])
 
 
 def _check_point(solution: Solution, point: str) -> None:
@@ -202,15 +200,6 @@ def _check_point(solution: Solution, point: str) -> None:
             f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{point}"'
             f"{did_you_mean(point, known)}"
         )
-
-
-def _parts(numbers: Indices) -> Iterator[Indices]:
-    yield from (numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART))
-
-
-def _name(part: Indices, postures: Postures) -> str:
-    """Of the file of a part: by its postures."""
-    return hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24] + ".npz"
 
 
 def _judged(
@@ -224,7 +213,7 @@ def _judged(
     """By name of the part what was found, from files or by processes of their own."""
     folder, left, done = plan.folder / PARTS, {}, 0
     for name, part in parts.items():
-        if (found := _read(folder / name)) is None:
+        if (found := _read(folder / f"{name}.npz")) is None:
             left[name] = part
         else:
             done += 1
@@ -238,7 +227,7 @@ def _judged(
         try:
             for future in as_completed(futures):
                 name, done = futures[future], done + 1
-                _write(folder / name, found := future.result())
+                _write(folder / f"{name}.npz", found := future.result())
                 watcher.advance(done, len(parts))
                 yield name, found
         except BaseException:
