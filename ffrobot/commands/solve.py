@@ -102,8 +102,9 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarked))
         click.echo("\n".join(lines))
     _check_ended(solution, display, scene_file, again)
-    if strict:
-        _check_without_warnings(solution, scene_file)
+    if warned := [(name, text) for name, result in solution.analyses.items() for text in result.warnings if strict]:
+        name, text = warned[0]
+        raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
 def _check_ended(solution: Solution, display: Display, scene_file: Path, again: str) -> None:
@@ -120,12 +121,3 @@ def _check_ended(solution: Solution, display: Display, scene_file: Path, again: 
     if display.signal:
         done = "before all analyses" if left_out(solution) else "when all was computed and written"
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
-
-
-def _check_without_warnings(solution: Solution, scene_file: Path) -> None:
-    """Raise `SolveError` for the first warning."""
-    from ..common.errors import SolveError
-
-    for name, result in solution.analyses.items():
-        for text in result.warnings:
-            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')

@@ -16,7 +16,7 @@ from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml
 from ..common.validation import check_texts
 from ..fe_models.link_records.measured import MeasuredMode, paired, read_measured
-from ..present.lines import plain_table
+from ..present.lines import print_table
 from .least_squares import Fit, fit_frequencies
 from .robot_target import Key, LinkTarget, RobotTarget
 
@@ -130,17 +130,17 @@ ALIKE = 0.95  # correlation of two parameters' errors from which their values ar
 
 def print_fit(fit: Fit, console: Console) -> None:
     """Tables of parameters and modes, remarks, and the files written."""
-    parameters = plain_table("key", "start", "fitted", "standard deviation")
-    for key, start, value, spread in zip(fit.keys, fit.start, fit.value, fit.relative_deviation, strict=True):
-        deviation = "not known" if np.isnan(spread) else f"{spread * value:.2g} ({100 * spread:.2g} %)"
-        parameters.add_row(key, f"{start:.6g}", f"{value:.6g}", deviation)
-    modes = plain_table("mode", "measured (Hz)", "start (Hz)", "fitted (Hz)", "error")
-    rows = zip(fit.labels, fit.measured, fit.before, fit.after, fit.error, strict=True)
-    for label, measured, before, after, error in rows:
-        modes.add_row(label, f"{measured:.6g}", f"{before:.6g}", f"{after:.6g}", f"{100 * error:+.3f} %")
-    for table in (parameters, modes):
-        console.print(table)
-        console.print()
+    parameters = (
+        (key, f"{start:.6g}", f"{value:.6g}",
+         "not known" if np.isnan(spread) else f"{spread * value:.2g} ({100 * spread:.2g} %)")
+        for key, start, value, spread in zip(fit.keys, fit.start, fit.value, fit.relative_deviation, strict=True)
+    )  # fmt: skip
+    print_table(console, ("key", "start", "fitted", "standard deviation"), parameters)
+    modes = (
+        (label, *(f"{frequency:.6g}" for frequency in frequencies), f"{100 * error:+.3f} %")
+        for label, *frequencies, error in zip(fit.labels, fit.measured, fit.before, fit.after, fit.error, strict=True)
+    )
+    print_table(console, ("mode", "measured (Hz)", "start (Hz)", "fitted (Hz)", "error"), modes)
     for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
         console.print(line, soft_wrap=True)
 

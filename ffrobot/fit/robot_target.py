@@ -14,7 +14,7 @@ from typing import Any
 import tomli_w
 
 from ..actuation.control.linear import LinearModels
-from ..actuation.control.linear_model import LinearModel, locked_frequencies, robot_modes
+from ..actuation.control.linear_model import locked_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
@@ -127,7 +127,8 @@ class RobotTarget:
         solution = solve_scene(make_scene(folder=self._path.parent, **scene), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
-        frequency = locked_frequencies(details.models[0]) if self._motors == "held" else _free(details.models[0])
+        free = robot_modes(model := details.models[0]).frequency
+        frequency = locked_frequencies(model) if self._motors == "held" else as_floats(free[free > 0.0])
         return ("",) * len(frequency), frequency
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
@@ -147,15 +148,6 @@ class RobotTarget:
             old = self._links[body]
             new = fitted_name(old, f".{body}")
             found[new] = with_values(read_text(old, "link file"), values)
-            of_scene["body", body, "link"] = Path(_link_of(self._scene, body)).with_name(new.name).as_posix()
+            link = next(entry["link"] for entry in self._scene["body"] if entry["name"] == body)
+            of_scene["body", body, "link"] = Path(link).with_name(new.name).as_posix()
         return found | {path: with_values(read_text(self._path, "scene file"), of_scene)}
-
-
-def _link_of(scene: Mapping[str, Any], body: str) -> str:
-    """What the scene calls the link file of a body."""
-    return str(next(entry["link"] for entry in scene["body"] if entry["name"] == body))
-
-
-def _free(model: LinearModel) -> Array:
-    found = robot_modes(model).frequency
-    return as_floats(found[found > 0.0])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -25,23 +26,24 @@ UNDAMPED = 1e-9  # ratios below are rounding
 
 def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
     """A table of each kind that was found, from what analyses found by name."""
-    kinds = {"closed loop": _loop, "linear model": _linear, "joints": _conditions, "placement": _placement}
-    for first, rows_of in kinds.items():
-        yield from named_tables(first, (row for name, found in details.items() for row in rows_of(name, found)))
+    loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
+    yield from named_tables("closed loop", ((name, loop_cells(metrics)) for name, metrics in loops.items()))
+    kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {
+        "linear model": (LinearModels, _linear),
+        "joints": (LinearModels | RobotAtRest, _conditions),
+        "placement": (Placed, _placement),
+    }
+    for first, (kind, rows_of) in kinds.items():
+        mine = ((name, found) for name, found in details.items() if isinstance(found, kind))
+        yield from named_tables(first, (row for name, found in mine for row in rows_of(name, found)))
 
 
 Rows = Iterator[tuple[str, Cells]]
 
 
-def _loop(name: str, found: Details) -> Rows:
-    if isinstance(found, LoopRecord):
-        yield name, loop_cells(found.metrics)
-
-
-def _linear(name: str, found: Details) -> Rows:
+def _linear(name: str, found: LinearModels) -> Rows:
     """Frequencies and growth at every time."""
-    pairs = zip(found.models, found.modes, strict=True) if isinstance(found, LinearModels) else ()
-    for model, modes in pairs:
+    for model, modes in zip(found.models, found.modes, strict=True):
         cells = {
             "t (s)": f"{model.time:g}",
             "DOF": f"{model.freedom}",
@@ -55,10 +57,9 @@ def _lowest(frequency: Array) -> str:
     return ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES])
 
 
-def _conditions(name: str, found: Details) -> Rows:
+def _conditions(name: str, found: LinearModels | RobotAtRest) -> Rows:
     """Natural frequencies with motors at rest, and the stiffness of points, at every time."""
-    pairs = zip(found.times, found.conditions, strict=True) if isinstance(found, LinearModels | RobotAtRest) else ()
-    for t, at in pairs:
+    for t, at in zip(found.times, found.conditions, strict=True):
         for condition, held in at.items():
             stiffness = [(point, *_stiffness(C)) for point, C in held.compliance.items()] or [("", "", "")]
             for k, (point, along, least) in enumerate(stiffness):
@@ -82,10 +83,8 @@ def _stiffness(compliance: Array) -> tuple[str, str]:
     return ", ".join(f"{k / 1e3:.4g}" for k in along), f"{least / 1e3:.4g} ({way})"
 
 
-def _placement(name: str, placed: Details) -> Rows:
+def _placement(name: str, placed: Placed) -> Rows:
     """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
-    if not isinstance(placed, Placed):
-        return
     over_path = placed.wanted.criterion == "voltage"
     pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
     best, even = (f"{value:.4g}" + (" V" if over_path else "") for value in pair)
@@ -109,23 +108,19 @@ def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
             yield f"{name}: vibration at {metrics.lowest_frequency:.3g} Hz and above"
     for name, found in details.items():
         if isinstance(found, LinearModels):
-            yield from _damping(name, found)
-            yield from _zeros_and_lost(name, found)
+            yield from _of_linear(name, found)
     for name, found in details.items():
         if isinstance(found, Placed):
             yield f"{name}: centers at {', '.join(f'{x:.4g}' for x in found.best.centers)} m"
 
 
-def _damping(name: str, linear: LinearModels) -> Iterator[str]:
-    """Of the frequencies that are listed for the first time of an analysis; nothing of a robot without damping."""
+def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:
+    """Damping of the frequencies that are listed for the first time of an analysis, zeros, modes out of reach."""
     modes = linear.modes[0]
     ratios = modes.damping_ratio[modes.frequency > 0.0][:FREQUENCIES]
     if np.any(np.abs(ratios) > UNDAMPED):
         listed = ", ".join(f"{ratio:.3g}" for ratio in ratios)
         yield f"{name}, t = {linear.models[0].time:g} s: damping ratios {listed}"
-
-
-def _zeros_and_lost(name: str, linear: LinearModels) -> Iterator[str]:
     worst = {
         pair: next((zeros for zeros in found if not zeros.minimum_phase), found[0])
         for pair, found in linear.zeros.items()
@@ -137,9 +132,7 @@ def _zeros_and_lost(name: str, linear: LinearModels) -> Iterator[str]:
         yield f"{name}: {', '.join(pair[:half])} → {', '.join(pair[half:])}: {worst[pair].describe()}"
     if len(worst) > len(shown):
         yield f"{name}: zeros of {len(worst) - len(shown)} more transfers are in the results file, linear/zeros"
-    for verb, reaches in (
-        ("uncontrollable:", linear.controllable), ("unobservable:", linear.observable)
-    ):  # fmt: skip
+    for verb, reaches in (("uncontrollable:", linear.controllable), ("unobservable:", linear.observable)):
         for model, reach in zip(linear.models, reaches, strict=True):
             if reach.lost:
                 yield f"{name}, t = {model.time:g} s: {verb} {', '.join(reach.lost)}"

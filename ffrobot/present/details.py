@@ -18,9 +18,8 @@ from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, voltage_cells
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
-from ..scene.pieces import BodyInPieces
 from .control import control_lines, control_tables
-from .lines import alike, error_budget, integrated, integrator_lines, named_tables, warning_lines
+from .lines import alike, error_budget, integrated, named_tables, warning_lines
 
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 
@@ -71,15 +70,16 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     runs = {result.analysis.name: result.run for result in integrated(solution)}
     yield from (("path", note) for note in solution.path_notes)
-    chosen = {name: run.statistics.integrator for name, run in runs.items()}
-    yield from (("integrator", line) for line in integrator_lines(chosen))
+    chosen = ((name, run.statistics.integrator) for name, run in runs.items())
+    said = alike((name, f"{one.in_words}; {one.reason}") for name, one in chosen if one.is_automatic)
+    yield from (("integrator", line) for line in said)
     for name, run in runs.items():
         if isinstance(run.details, AroundPath) and run.details.inversion is not None:
             yield "motors only", f"{name}: {_inversion(run, run.details)}"
     if solution.mode_choice is not None:
         yield "modes", chosen_modes([body.spatial for body in solution.bodies.values()], solution.mode_choice)
     if solution.divided:
-        yield "pieces", pieces_in_words(solution.divided)
+        yield "pieces", ", ".join(f"{name}: {len(body.names)}" for name, body in solution.divided.items())
     yield from (("links", note) for note in solution.notes)
     yield "accuracy", "\n".join(error_budget(solution))
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
@@ -112,10 +112,7 @@ def _stresses(name: str, result: AnalysisResult) -> Iterator[tuple[str, Cells]]:
     for body, stress in result.histories.stresses.items():
         value, k, place = stress.largest()
         most, at, by = f"{value / 1e6:.4g}", f"{result.histories.run.time[k]:g}", stress.recovery.method
-        yield (
-            name,
-            {"of": body, "largest von Mises (MPa)": most, "at": place, "t (s)": at, "by": by},
-        )
+        yield name, {"of": body, "largest von Mises (MPa)": most, "at": place, "t (s)": at, "by": by}
 
 
 def chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
@@ -140,8 +137,3 @@ def chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
         f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
     )
     return "\n".join(lines)
-
-
-def pieces_in_words(divided: Mapping[str, BodyInPieces]) -> str:
-    """How many of each link."""
-    return ", ".join(f"{name}: {len(body.names)}" for name, body in divided.items())

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from ..mbs.quantities.attachment_error import JOLT
 from ..mbs.quantities.validity import Bending, deflection_warning, largest
-from ..mbs.solve.integrators import Choice
 from ..run.solution import AnalysisResult, Solution
 
 if TYPE_CHECKING:
@@ -42,11 +41,6 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
         return "links are rigid"
     name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
     return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
-
-
-def integrator_lines(choices: Mapping[str, Choice]) -> Iterator[str]:
-    """By analysis: which integrators the program has chosen, and why."""
-    return alike((name, f"{one.in_words}; {one.reason}") for name, one in choices.items() if one.is_automatic)
 
 
 def plain_table(*headers: str) -> Table:

@@ -23,9 +23,8 @@ def print_map(found: PoseMap, console: Console) -> None:
 def _rows(found: PoseMap) -> Iterator[tuple[str, ...]]:
     for quantity in quantities(found).values():
         if np.isfinite(quantity.values).any():
-            ends = (f"{quantity.values[k]:.4g}" for k in (quantity.worst, quantity.best))
-            worst, best = ends
-            yield quantity.title, worst, _place(found, quantity.worst), best, _place(found, quantity.best)
+            ends = ((f"{quantity.values[k]:.4g}", _place(found, k)) for k in (quantity.worst, quantity.best))
+            yield quantity.title, *(cell for end in ends for cell in end)
 
 
 def _place(found: PoseMap, number: int) -> str:
