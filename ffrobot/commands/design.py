@@ -15,7 +15,7 @@ import click
 
 from ..common.errors import InputError, SolveError
 from ..design import studies
-from ..present.logs import FILE, logging_options, python_option
+from ..present.logs import FILE, logging_options, python_option, together
 from .options import F, options_of, protect, runs_options
 
 if TYPE_CHECKING:
@@ -24,19 +24,13 @@ if TYPE_CHECKING:
 
 def study_options(folder: str, figures: str) -> Callable[[F], F]:
     """Give a command its scene and the options of all studies: `figures` says what these are."""
-
-    def add(command: F) -> F:
-        for option in (
-            logging_options,
-            python_option,
-            runs_options(folder),
-            click.option("--figures/--no-figures", default=True, show_default=True, help=figures),
-            click.argument("scene_file", metavar="SCENE.toml", type=FILE),
-        ):
-            command = option(command)
-        return command
-
-    return add
+    return together(
+        logging_options,
+        python_option,
+        runs_options(folder),
+        click.option("--figures/--no-figures", default=True, show_default=True, help=figures),
+        click.argument("scene_file", metavar="SCENE.toml", type=FILE),
+    )
 
 
 def _study(

@@ -13,7 +13,7 @@ import click
 from ..common.outputs import protected
 from ..common.parallel import processors
 from ..design.studies import FiniteRange
-from ..present.logs import FILE
+from ..present.logs import FILE, together
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -30,17 +30,11 @@ def processes_option(text: str) -> Callable[[F], F]:
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
     """Give a command `-j`, `--retry` and `-o`, by default `folder`; `of`: what is in it."""
-
-    def add(command: F) -> F:
-        for option in (
-            click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} next to the input]."),
-            click.option("--retry", is_flag=True, help="Repetition of failed runs."),
-            processes_option("Number of parallel runs."),
-        ):
-            command = option(command)
-        return command
-
-    return add
+    return together(
+        click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} next to the input]."),
+        click.option("--retry", is_flag=True, help="Repetition of failed runs."),
+        processes_option("Number of parallel runs."),
+    )
 
 
 def options_of(function: Callable[..., object], *names: str) -> Callable[[F], F]:
@@ -49,13 +43,11 @@ def options_of(function: Callable[..., object], *names: str) -> Callable[[F], F]
     args = (inspect.getdoc(function) or "").partition("Args:\n")[2].partition("\n\n")[0]
     entries = dict(re.findall(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", args, re.MULTILINE))
 
-    def add(command: F) -> F:
-        for name in reversed(names):
-            flags = dict.fromkeys(f"--{one.replace('_', '-')}" for one in (name, name.replace("mise", "mize")))
-            command = click.option(*flags, **_settings(parameters[name], entries[name]))(command)
-        return command
+    def option(name: str) -> Callable[[F], F]:
+        flags = dict.fromkeys(f"--{one.replace('_', '-')}" for one in (name, name.replace("mise", "mize")))
+        return click.option(*flags, **_settings(parameters[name], entries[name]))
 
-    return add
+    return together(*map(option, reversed(names)))
 
 
 def _settings(parameter: inspect.Parameter, entry: str) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +11,19 @@ from click.core import ParameterSource
 
 from ..common.errors import InputError
 from ..design.studies import FiniteRange
-from ..present.logs import FILE
+from ..present.logs import FILE, together
 
 MOST = 100_000  # frames of a view
 
 
-def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Which movie, of what, and how."""
-    seconds, scale = FiniteRange(0.1, 600.0), FiniteRange(0.0)
-    for option in (
-        click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Movie of the motion, and no other file."),
-        click.option("--seconds", metavar="S", type=seconds, default=8.0, help="Duration of the movie [8]."),
-        click.option("--analysis", metavar="NAME", help="Analysis of the movie, or of the grid."),
-        click.option("--scale", metavar="S", type=scale, help="Scale of deflections [chosen for visibility]."),
-    ):
-        command = option(command)
-    return command
+SECONDS, SCALE = FiniteRange(0.1, 600.0), FiniteRange(0.0)
+movie_options = together(
+    click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Movie of the motion, and no other file."),
+    click.option("--seconds", metavar="S", type=SECONDS, default=8.0, help="Duration of the movie [8]."),
+    click.option("--analysis", metavar="NAME", help="Analysis of the movie, or of the grid."),
+    click.option("--scale", metavar="S", type=SCALE, help="Scale of deflections [chosen for visibility]."),
+)
+"""Which movie, of what, and how."""
 
 
 @click.command()

@@ -44,18 +44,15 @@ LOGGER = logging.getLogger("ffrobot")
 LOGGER.addHandler(logging.NullHandler())
 
 
-def python_option(command: F) -> F:
-    """Give a command that solves scenes the option `--allow-python`."""
-    option = click.option(
-        "--allow-python",
-        metavar="PATH",
-        multiple=True,
-        type=_THERE,
-        expose_value=False,
-        callback=_allow_python,
-        help="Run Python files that the scene names from here too [its own folder]; repeatable.",
-    )
-    return option(command)
+def together(*options: Callable[[F], F]) -> Callable[[F], F]:
+    """Give a command all of these options."""
+
+    def add(command: F) -> F:
+        for option in options:
+            command = option(command)
+        return command
+
+    return add
 
 
 def _allow_python(context: click.Context, parameter: click.Parameter, paths: tuple[Path, ...]) -> None:
@@ -64,15 +61,11 @@ def _allow_python(context: click.Context, parameter: click.Parameter, paths: tup
     allow_python(paths)
 
 
-def logging_options(command: F) -> F:
-    """Give a command the options `--verbose` and `--log-file`."""
-    verbose = click.option(
-        "-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Verbose output."
-    )
-    log_file = click.option(
-        "--log-file", metavar="FILE", type=_LOG, expose_value=False, callback=_log_file, help="Append a log to FILE."
-    )
-    return verbose(log_file(command))
+python_option = click.option(
+    "--allow-python", metavar="PATH", multiple=True, type=_THERE, expose_value=False, callback=_allow_python,
+    help="Run Python files that the scene names from here too [its own folder]; repeatable.",
+)  # fmt: skip
+"""Of commands that solve scenes."""
 
 
 def _verbose(context: click.Context, parameter: click.Parameter, verbose: bool) -> None:
@@ -146,3 +139,11 @@ def _add(handler: logging.Handler, layout: str) -> None:
     handler.setFormatter(logging.Formatter(layout))
     LOGGER.addHandler(handler)
     LOGGER.setLevel(logging.INFO)
+
+
+logging_options = together(
+    click.option(
+        "--log-file", metavar="FILE", type=_LOG, expose_value=False, callback=_log_file, help="Append a log to FILE."
+    ),
+    click.option("-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Verbose output."),
+)

@@ -161,7 +161,7 @@ def _is_in_both(modal: Section, slope: Array, layout: Layout) -> bool:
 
 def _inertia(J: Taylor) -> tuple[Array, Array]:
     """(3, 3) and (3, 3, n), from six rows or from (3, 3)."""
-    if J.nrow == 3:
+    if len(J.m0) == 3:
         return J.m0, J.m1.transpose(0, 2, 1)
     J0, J1 = np.zeros((3, 3)), np.zeros((3, 3, J.m1.shape[1]))
     for row, (a, b) in enumerate(ROWS):
@@ -201,17 +201,11 @@ MOST = 10**7  # entries of a matrix: a file that asks for more is damaged
 SYMMETRIC, IDENTITY = 2, 4  # values of `structure`
 
 
-@dataclass
-class Taylor:
+class Taylor(NamedTuple):
     """A matrix M0 (rows, columns) + Σ_l M1[:, l] q_l with M1 (rows, modes, columns)."""
 
     m0: Array
     m1: Array
-
-    @property
-    def nrow(self) -> int:
-        """Number of rows."""
-        return len(self.m0)
 
 
 @dataclass
