@@ -53,13 +53,8 @@ class Finding(ABC):
     title: ClassVar[str]
 
     @property
-    def shortfall(self) -> str:
-        """Why it is not what was asked for; empty where it is."""
-        return ""
-
-    @property
-    def good(self) -> bool | None:
-        """Whether it is what was asked for; None where that is no question."""
+    def shortfall(self) -> str | None:
+        """Why it is not what was asked for; empty where it is, None where that is no question."""
         return None
 
     @abstractmethod
@@ -112,7 +107,8 @@ class Finding(ABC):
         return Study(
             ffrobot_version=VERSION, name=self.name, title=self.title, scene=str(self.scene),
             scene_name=str(load_toml(self.scene, "scene").get("name", self.scene.stem)), headline=self.headline(),
-            good=self.good, facts=facts, tables=tuple(self.report_tables()), diagrams=tuple(self.diagrams()),
+            good=None if self.shortfall is None else not self.shortfall, facts=facts,
+            tables=tuple(self.report_tables()), diagrams=tuple(self.diagrams()),
         )  # fmt: skip
 
     def write_study(self, folder: Path, *, figures: bool) -> Iterator[Path]:

@@ -80,14 +80,10 @@ class Front(Finding):
         return np.array([(one.goal, one.against) for one in self.points])
 
     @property
-    def good(self) -> bool:
-        """Whether all designs of the curve keep the limits."""
-        return all(one.feasible for one in self.points)
-
-    @property
     def shortfall(self) -> str:
-        """That some do not."""
-        return "" if self.good else "not all designs of the curve keep the limits: see the table"
+        """That some designs do not keep the limits."""
+        good = all(one.feasible for one in self.points)
+        return "" if good else "not all designs of the curve keep the limits: see the table"
 
     def headline(self) -> str:
         """How many designs, of which goals."""

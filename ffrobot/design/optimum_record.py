@@ -190,13 +190,8 @@ class Optimum(Finding):
         return np.array(found / [np.nan if variable.is_catalogue else variable.slope(u) for variable, u in pairs])
 
     @property
-    def good(self) -> bool:
-        """Whether it keeps all limits."""
-        return self.feasible
-
-    @property
     def shortfall(self) -> str:
-        """That it does not."""
+        """That it does not keep all limits."""
         return "" if self.feasible else "no design found that keeps all limits: see the table of limits"
 
     def sections(self) -> Iterator[Section]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -88,18 +88,9 @@ def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeas
     """Of the feasibility of an analysis: what every motor has to do, in the order of `joints`."""
     from ..actuation.motors import MotorFeasibility
 
-    entries = group.get("joints", {})
-    return {
-        name: MotorFeasibility(
-            **{
-                key.name: entries[name].attrs[key.name]
-                for key in fields(MotorFeasibility)
-                if key.default is MISSING or key.name in entries[name].attrs
-            }
-        )
-        for name in joints
-        if name in entries
-    }
+    known, entries = {field.name for field in fields(MotorFeasibility)}, group.get("joints", {})
+    about = {name: entries[name].attrs.items() for name in joints if name in entries}
+    return {name: MotorFeasibility(**{key: value for key, value in of if key in known}) for name, of in about.items()}
 
 
 def read_unsupplied(group: h5py.Group) -> Unsupplied | None:

@@ -24,7 +24,7 @@ from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_scene
 from ...scene.scene import Scene
 from .names import Names
-from .robot import Inertial, Mimic, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
+from .robot import Mimic, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
 from .scene import GRAVITY
 from .shape_masses import SLENDER, bars, beam_visuals
 
@@ -287,7 +287,10 @@ def urdf_text(robot: Robot, visuals: Mapping[str, Sequence[Primitive]]) -> str:
     for link in robot.links.values():
         element = ElementTree.SubElement(root, "link", name=link.name)
         if link.inertial is not None:
-            _add_inertial(element, link.inertial)
+            inertial, J = _add(element, "inertial"), link.inertial.inertia
+            _add_origin(inertial, Origin(three(link.inertial.center)))
+            _add(inertial, "mass", value=link.inertial.mass)
+            _add(inertial, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
         for visual in visuals.get(link.name, ()):
             _add_visual(element, visual)
     for joint in robot.joints.values():
@@ -309,13 +312,6 @@ def _triple(values: Sequence[float]) -> str:
 def _add_origin(parent: Element, origin: Origin) -> None:
     if any(origin.xyz) or any(origin.rpy):
         _add(parent, "origin", xyz=_triple(origin.xyz), rpy=_triple(origin.rpy))
-
-
-def _add_inertial(link: Element, inertial: Inertial) -> None:
-    element, J = _add(link, "inertial"), inertial.inertia
-    _add_origin(element, Origin(three(inertial.center)))
-    _add(element, "mass", value=inertial.mass)
-    _add(element, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
 
 
 def _add_visual(link: Element, visual: Primitive) -> None:

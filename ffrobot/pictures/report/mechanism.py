@@ -36,16 +36,11 @@ PLAYING_SECONDS = 8.0
 SLOWEST = 1e-3  # the slider's end
 
 
-@dataclass(frozen=True)
-class Mechanism:
-    """What the script of the page draws, and notes on what could not be drawn as it is."""
+def mechanism(runs: Sequence[Run]) -> tuple[dict[str, Any], list[str]]:
+    """What the script of the page draws of several runs, and notes on what could not be drawn as it is.
 
-    data: dict[str, Any]
-    notes: list[str]
-
-
-def mechanism(runs: Sequence[Run]) -> Mechanism:
-    """The moving picture of several runs, each in a colour of its own; planar scenes are seen along z."""
+    Each run has a colour of its own; planar scenes are seen along z.
+    """
     notes: list[str] = []
     moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]
     shown = [k for k, run in enumerate(runs) if run.analysis == run.results.analyses[0]]  # others are hidden at first
@@ -80,7 +75,7 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
         "above": ABOVE * size if is_plane else 0.0,
         "ground": ground_places(run.results.scene for run in runs).tolist(),
     }
-    return Mechanism(data, list(dict.fromkeys(notes)))
+    return data, list(dict.fromkeys(notes))
 
 
 def _frames(run: Run) -> Indices:

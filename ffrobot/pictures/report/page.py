@@ -18,17 +18,7 @@ from .charts import Chart, folded, history_charts
 from .diagrams import DrawnDiagram, StudyPart
 from .mechanism import link_modes, mechanism, surface_modes
 from .runs import runs, sources
-from .tables import (
-    analyses_table,
-    bending_table,
-    loops_table,
-    origins_table,
-    peaks_table,
-    verdicts,
-    voltages_table,
-    warnings_table,
-    zeros_table,
-)
+from .tables import TABLES, analyses_table, origins_table, verdicts
 
 HERE = Path(__file__).parent
 OWN = ("page.js", "modes.js", "player.js", "mechanism.js", "page.css")  # what the template calls page_js, …
@@ -90,11 +80,11 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     """The parts of the page that need solved scenes, and their charts."""
     all_runs = runs(files)
     is_plane = _is_plane(files)
-    moving = mechanism(all_runs)
+    moving, notes = mechanism(all_runs)
     modes, histories, answers = link_modes(all_runs), history_charts(files), verdicts(all_runs)
     shapes = surface_modes(modes)
     content = {
-        "mechanism": _script_data(moving.data),
+        "mechanism": _script_data(moving),
         "is_plane": is_plane,
         "shapes": shapes["links"],
         "modes_3d": _script_data(shapes),
@@ -102,13 +92,8 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "modes": modes,
         "analyses": analyses_table(all_runs, answers),
         "verdicts": answers,
-        "loops": loops_table(all_runs),
-        "zeros": zeros_table(all_runs),
-        "warnings": warnings_table(all_runs),
-        "bending": bending_table(all_runs),
-        "peaks": peaks_table(all_runs),
-        "voltages": voltages_table(all_runs),
-        "notes": moving.notes,
+        **{name: table(all_runs) for name, table in TABLES.items()},
+        "notes": notes,
         "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
     }
     return content, [*histories, *(chart for link in modes for chart in link.charts)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...common.peaks import largest
@@ -171,3 +171,14 @@ def zeros_table(runs: Sequence[Run]) -> Table:
     heading = ("motors only", "zeros along the path", "of the vibration in the output", "largest real part (1/s)",
                "nearest to the axis (1/s)")  # fmt: skip
     return Table(heading, rows)
+
+
+TABLES: Mapping[str, Callable[[Sequence[Run]], Table]] = {
+    "loops": loops_table,
+    "zeros": zeros_table,
+    "warnings": warnings_table,
+    "bending": bending_table,
+    "peaks": peaks_table,
+    "voltages": voltages_table,
+}
+"""What the page calls them."""
