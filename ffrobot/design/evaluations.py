@@ -211,7 +211,7 @@ class Evaluations:
                 raise
             return Evaluated(place, design, (), str(error))
         if first:
-            self.problem = self.problem.sized_by(found.values[0])
+            self.problem = replace(self.problem, scale=found.values[0] or 1.0)
         return found
 
     def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:

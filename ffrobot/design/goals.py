@@ -324,10 +324,6 @@ class Problem:
         excess = self.excess([reading.value for reading in readings])
         return max(0.0, float(excess.max())) if excess.size else 0.0
 
-    def sized_by(self, value: float) -> Problem:
-        """The same with the objective relative to its size at some design."""
-        return replace(self, scale=value or 1.0)
-
 
 def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> Problem:
     """By what the command line says. Raises `InputError`."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import product
 from math import prod
 
 import numpy as np
@@ -328,11 +327,6 @@ SPREAD = 1e-3  # of the objective in the last generation
 def combinations(space: Space) -> int:
     """How many designs there are; 0 where numbers are between bounds."""
     return prod(len(variable.rows) for variable in space.variables)
-
-
-def try_all(evaluations: Evaluations) -> None:
-    """Every combination of rows."""
-    evaluations.at(list(product(*(map(float, range(len(v.rows))) for v in evaluations.space.variables))))
 
 
 def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Callable[[str], None]) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 from scipy.stats.qmc import LatinHypercube
@@ -20,7 +21,7 @@ from ..sweep.files import run_files
 from .designs import Designs, Runs, changes_for, may_repeat
 from .evaluations import Evaluations, SpentError, write_designs
 from .goals import read_problem, with_motors
-from .local_search import Local, best_of, combinations, evolve, rank, search_from, try_all
+from .local_search import Local, best_of, combinations, evolve, rank, search_from
 from .optimality import Differentiation
 from .optimum_record import Optimum
 from .variables import Place, Space, read_space
@@ -113,7 +114,7 @@ def _search(
         return _from_starts(method, differentiation, starts, watcher)
     message = ""
     if method == "all":
-        try_all(evaluations)
+        evaluations.at(list(product(*(map(float, range(len(v.rows))) for v in evaluations.space.variables))))
     else:
         message = evolve(evaluations, seed, starts[0] if starts else None, watcher.stage)
     first, best = evaluations.searched[0], best_of(evaluations, evaluations.searched)

@@ -221,7 +221,7 @@ def thickened(shape: Shape, radius: float) -> Shape:
         points, shapes = shape.points + offsets, np.repeat(shape.shapes, 6, axis=0)
         return replace(shape, points=points, shapes=shapes, cells=OCTAHEDRON)
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
-    rings, bar = [], _bar()
+    rings, bar = [], triangles_of(_tube(2, SIDES))
     for first, last in shape.cells:
         across = smallest_turn(shape.points[last] - shape.points[first])[:, :2]
         ring = radius * (np.outer(np.cos(angle), across[:, 0]) + np.outer(np.sin(angle), across[:, 1]))
@@ -232,15 +232,6 @@ def thickened(shape: Shape, radius: float) -> Shape:
         shapes=shape.shapes[np.repeat(shape.cells.ravel(), SIDES)],
         cells=np.concatenate([bar + 2 * SIDES * k for k in range(len(shape.cells))]),
     )
-
-
-def _bar() -> Integers:
-    """(t, 3) between a ring of `SIDES` points and the next, with caps."""
-    k = np.arange(SIDES)
-    after = (k + 1) % SIDES
-    sides = np.concatenate([np.stack([k, after, SIDES + after], 1), np.stack([k, SIDES + after, SIDES + k], 1)])
-    fan = np.stack([np.zeros(SIDES - 2, dtype=np.int64), k[1:-1], k[2:]], axis=1)
-    return np.concatenate([sides, fan[:, ::-1], SIDES + fan]).astype(np.int64)
 
 
 def shortest_tree(points: Array) -> Integers:

@@ -14,7 +14,7 @@ from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
 from .peaks import POWER, peak_of
-from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict, millimeters, off_path_in_words, tool_error
+from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict, millimeters, off_path, tool_error
 
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
@@ -34,7 +34,10 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
     units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
     answer, feasible = _answer(group, motors, patches)
-    answer = answer or off_path_in_words(group, scene)
+    answer = answer or ", ".join(
+        f"{point} off its path by {millimeters(most)} at most, {millimeters(rms)} RMS"
+        for point, most, rms in off_path(group, scene)
+    )
     about = group.attrs
     return AnalysisVerdict(
         name=name,

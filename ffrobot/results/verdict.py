@@ -90,14 +90,6 @@ def _apart(group: h5py.Group, source: h5py.Group, scene: Scene) -> Iterator[tupl
             yield str(record["point"]), float(off.max()), float(np.sqrt(np.mean(off**2)))
 
 
-def off_path_in_words(group: h5py.Group, scene: Scene) -> str:
-    """As text; empty where there is nothing of that kind."""
-    found = off_path(group, scene)
-    return ", ".join(
-        f"{name} off its path by {millimeters(most)} at most, {millimeters(rms)} RMS" for name, most, rms in found
-    )
-
-
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
 
@@ -158,7 +150,9 @@ class AnalysisVerdict:
         ended = "" if self.status == "completed" else f"ended early ({self.status})"
         yield f"{self.name}: {'; '.join(text for text in (ended, self.answer) if text) or 'completed'}"
         if self.feasible is not None:  # of closed loops, a table has them
-            yield from (f"  motor of {name}: {text}" for name, text in self.motor_texts.items())
+            interval = " over the path" if self.kind == "motors-only" else ""
+            for name, motor in self.motors.items():
+                yield f"  motor of {name}: {_motor(motor, self.units[name], interval)}"
         if self.deflection is not None:
             yield f"  largest deflection {_place(millimeters(self.deflection[0]), *self.deflection[1:])}"
         if self.stress is not None:
@@ -192,12 +186,6 @@ class AnalysisVerdict:
         patches = [(f"patches of {name}", need.factor) for name, need in self.patches.items()]
         return max((*motors, *patches), key=lambda one: one[1], default=("", 0.0))
 
-    @property
-    def motor_texts(self) -> dict[str, str]:
-        """Peaks and RMS of each motor, with limits where it has them."""
-        interval = " over the path" if self.kind == "motors-only" else ""
-        return {name: _motor(motor, self.units[name], interval) for name, motor in self.motors.items()}
-
 
 @struct
 class Verdict:
@@ -224,6 +212,7 @@ class Verdict:
 
 
 def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
+    """Peaks and RMS, with limits where it has them."""
     speed = "rad/s" if unit == "N·m" else "m/s"
     parts = [
         f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {number(motor.rms_moment)} {unit}{interval}",

@@ -197,7 +197,10 @@ def import_urdf(
         links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
         scene = _scene(urdf, robot, links, folder, fix_inertia=fix_inertia)
         masses, about_meshes = mesh_masses(robot, urdf)
-        remarks += [*scene.remarks, *_remarks_on_links(links)]
+        remarks += scene.remarks
+        for link in links.values():
+            about = f'link "{link.name}" is flexible: {link.file_name} determines its inertia, not its <inertial>'
+            remarks += [about, *(f"{link.file_name}: {remark}" for remark in link.remarks)]
         payloads, about_rest = _compared(robot, links, folder, scene, keep_rest=keep_rest)
         keys = {**scene.keys, **({"payload": payloads} if payloads else {})}
         remarks += [*about_rest, *about_meshes, *remarks_on_scale(robot)]
@@ -248,12 +251,6 @@ def _compared(
         if payload is not None:
             payloads.append(payload | {"point": f"{scene.bodies[link.name]}.{payload['point']}"})
     return payloads, remarks
-
-
-def _remarks_on_links(links: Mapping[str, FlexibleLink]) -> Iterator[str]:
-    for link in links.values():
-        yield f'link "{link.name}" is flexible: {link.file_name} determines its inertia, not its <inertial>'
-        yield from (f"{link.file_name}: {remark}" for remark in link.remarks)
 
 
 def _scene_text(urdf: Path, keys: Mapping[str, Any], remarks: list[str]) -> str:

@@ -155,7 +155,10 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
                 continue
             if record.name == "tip_error" and any(chart.name.startswith("error_") for chart in charts.values()):
                 continue  # the distance from the path again
-            chart = charts.setdefault(record.name, _empty(record))
+            is_path = record.kind == "path"
+            x_label = "x (m)" if is_path else record.x_label
+            empty = Chart(record.name, record.title, record.y_label, x_label, limits=record.limits, equal_axes=is_path)
+            chart = charts.setdefault(record.name, empty)
             for curve, look in _looks(record, source, colors, len(chart.traces)):
                 _add(chart, results, record, curve, source, look, DASHES[number % len(DASHES)])
             if record.joint is not None and len(limits := motor_limits(results, record)):
@@ -180,12 +183,6 @@ def folded(charts: Sequence[Chart]) -> list[tuple[str, list[Chart]]]:
         fits = (title for title, starts in FOLDS if chart.name.startswith(starts))
         parts[next(fits, "Bodies and energies")].append(chart)
     return [(title, members) for title, members in parts.items() if members]
-
-
-def _empty(record: FigureRecord) -> Chart:
-    if record.kind == "path":
-        return Chart(record.name, record.title, record.y_label or "y (m)", x_label="x (m)", equal_axes=True)
-    return Chart(record.name, record.title, record.y_label, record.x_label, limits=record.limits)
 
 
 PRESCRIBED = {"color": "#8b95a3", "width": 4}
