@@ -23,10 +23,7 @@ from .options import POSITIVE, protect
     help="Folder of the scene; file of a body or of waypoints.",
 )
 @click.option(
-    "--flexible",
-    metavar="LINK=FILE.toml",
-    multiple=True,
-    help="Flexible link with its link file; repeatable.",
+    "--flexible", metavar="LINK=FILE.toml", multiple=True, help="Flexible link with its link file; repeatable."
 )
 @click.option("--force", is_flag=True, help="Replacement of existing files.")
 @click.option("--fix-inertia", is_flag=True, help="Smallest correction of unphysical inertias, with a report.")
@@ -37,10 +34,7 @@ from .options import POSITIVE, protect
     help="Estimate masses of links without <inertial> from their shapes, filled with this density.",
 )
 @click.option(
-    "--radius",
-    metavar="M",
-    type=POSITIVE,
-    help="Radius of cylinders along links without shapes, with --density.",
+    "--radius", metavar="M", type=POSITIVE, help="Radius of cylinders along links without shapes, with --density."
 )
 @click.option(
     "--keep-rest",

@@ -29,12 +29,7 @@ if TYPE_CHECKING:
     help="Size, likely unit and faces of a STEP file or mesh; with --output a draft of its link file.",
 )
 @click.option("--unit", type=click.Choice(["m", "mm", "in"]), help="Unit of the part, with --inspect.")
-@click.option(
-    "--density",
-    metavar="KG/M3",
-    type=POSITIVE,
-    help="Density for the mass of the part, with --inspect.",
-)
+@click.option("--density", metavar="KG/M3", type=POSITIVE, help="Density for the mass of the part, with --inspect.")
 @logging_options
 def link(
     link_file: Path, output: Path | None, unit: Unit | None, density: float | None, *, force: bool, inspect: bool

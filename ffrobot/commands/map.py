@@ -30,9 +30,7 @@ if TYPE_CHECKING:
 )
 @click.option("--modes", type=click.IntRange(1, 50), default=3, show_default=True, help="Natural frequencies per pose.")
 @click.option(
-    "--response",
-    metavar="FIRST:LAST:COUNT",
-    help="Frequency response of the point, with these frequencies (Hz).",
+    "--response", metavar="FIRST:LAST:COUNT", help="Frequency response of the point, with these frequencies (Hz)."
 )
 @click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
 @processes_option("Number of parallel processes.")

@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option(
-    "-o",
-    "--output",
-    metavar="RESULTS.h5",
-    type=FILE,
-    help="Output file [SCENE.results.h5 next to the input].",
+    "-o", "--output", metavar="RESULTS.h5", type=FILE, help="Output file [SCENE.results.h5 next to the input]."
 )
 @click.option("--resume", is_flag=True, help="Resume a stopped run from its results file.")
 @click.option("--strict", is_flag=True, help="Exit code 1 if there is a warning; results are written nevertheless.")

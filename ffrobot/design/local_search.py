@@ -200,11 +200,7 @@ class Steps:
 def _slsqp(steps: Steps) -> str:
     """Sequential quadratic programming (Kraft 1988)."""
     steps.shortest = SHORTEST
-    limits = {
-        "type": "ineq",
-        "fun": lambda x: -steps.excesses(x),
-        "jac": lambda x: -steps.excess_gradients(x),
-    }
+    limits = {"type": "ineq", "fun": lambda x: -steps.excesses(x), "jac": lambda x: -steps.excess_gradients(x)}
     done = minimize(
         steps.objective, steps.start, jac=steps.objective_gradient, method="SLSQP", bounds=steps.bounds,
         constraints=[limits] if steps.has_limits else [], options={"ftol": FTOL, "maxiter": ITERATIONS},

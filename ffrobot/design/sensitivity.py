@@ -30,17 +30,7 @@ from ..common.errors import InputError
 from ..pictures.studies.study import Bars, Series
 from ..sweep.files import number_at
 from ..sweep.sweep import Key
-from .derivatives import (
-    AIM,
-    SIZES,
-    Base,
-    Entry,
-    Known,
-    Sample,
-    entries,
-    rough_keys,
-    values_of,
-)
+from .derivatives import AIM, SIZES, Base, Entry, Known, Sample, entries, rough_keys, values_of
 from .designs import Designs, Point, Runs, changes_for, may_repeat, parse_key, repeated_steps
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, numbers
 from .goals import parse_goal

@@ -7,18 +7,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from functools import wraps
 from math import isfinite
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    Literal,
-    ParamSpec,
-    TypedDict,
-    TypeVar,
-    Unpack,
-    get_args,
-    get_origin,
-)
+from typing import TYPE_CHECKING, Annotated, Any, Literal, ParamSpec, TypedDict, TypeVar, Unpack, get_args, get_origin
 
 from click import BadParameter, Context, FloatRange, IntRange, Parameter, ParamType
 

@@ -18,13 +18,7 @@ from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.redundancy import resolving_joints
 from ..run.solution import AnalysisResult, Solution
-from .actuators import (
-    write_feasibility,
-    write_placement,
-    write_point_forces,
-    write_tracking,
-    write_voltages,
-)
+from .actuators import write_feasibility, write_placement, write_point_forces, write_tracking, write_voltages
 from .file import FORMAT
 from .linear import write_joint_conditions, write_linear, write_loop
 from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress

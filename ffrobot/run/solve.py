@@ -29,13 +29,7 @@ from .bodies import load_bodies
 from .fastest import with_paths
 from .mode_choice import mode_levels, reported_modes
 from .pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces
-from .prepare import (
-    made_solution,
-    with_bodies,
-    with_pieces,
-    with_scene,
-    with_stiffening,
-)
+from .prepare import made_solution, with_bodies, with_pieces, with_scene, with_stiffening
 from .solution import AnalysisResult, Histories, Solution
 from .stresses import find_stresses
 from .watcher import Interruption, Watcher
@@ -203,10 +197,7 @@ def _unread(solution: Solution, run: Outcome, error: Exception) -> Solution:
 
 
 def _context(
-    solution: Solution,
-    analysis: Analysis,
-    results: Mapping[str, AnalysisResult],
-    interruption: Interruption,
+    solution: Solution, analysis: Analysis, results: Mapping[str, AnalysisResult], interruption: Interruption
 ) -> ActuatedContext:
     others = (other for other in solution.scene.analysis if other.takes_actuation)
     return ActuatedContext(

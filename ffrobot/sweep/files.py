@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,9 +144,8 @@ def _body(scene: Table, name: str) -> Table:
 def _bodies(scene: Table) -> list[Table]:
     """The bodies with a name: that the scene is right otherwise is seen later."""
     bodies = scene.get("body")
-    return (
-        [body for _, body in _tables(bodies) if isinstance(body.get("name"), str)] if isinstance(bodies, list) else []
-    )
+    tables = [body for body in bodies if isinstance(body, dict)] if isinstance(bodies, list) else []
+    return [body for body in tables if isinstance(body.get("name"), str)]
 
 
 def _resolve(data: Node, folder: Path) -> None:
@@ -161,12 +160,12 @@ def _resolve(data: Node, folder: Path) -> None:
 
 def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), option: str = "--vary") -> Value:
     """data[key], entries of a list as in `set_key`; None where there is none. `option`: of the command, in messages."""
-    if isinstance(data, dict) and key[0] not in data:
-        return None
-    value = data[_index(data, key[0], whole or key, option)]  # type: ignore[index]
-    if len(key) == 1 or value is None:
-        return value
-    return value_of(value, key[1:], whole or key, option) if isinstance(value, dict | list) else None
+    value: Value = data
+    for part in key:
+        if not isinstance(value, dict | list) or (isinstance(value, dict) and part not in value):
+            return None
+        value = value[_index(value, part, whole or key, option)]  # type: ignore[index]
+    return value
 
 
 def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...] = ()) -> None:
@@ -175,21 +174,20 @@ def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ..
     `whole` is what messages call the key, where that is not `key` itself.
     """
     whole = whole or key
-    if len(key) == 1:
-        data[_index(data, key[0], whole)] = value  # type: ignore[index]
-        return
-    if isinstance(data, dict):
-        data.setdefault(key[0], {})
-    inner = data[_index(data, key[0], whole)]  # type: ignore[index]
-    if not isinstance(inner, dict | list):
-        raise InputError(f'--vary: expected a table or a list at "{key[0]}" of "{".".join(whole)}", found {inner!r}')
-    set_key(inner, key[1:], value, whole)
+    for part in key[:-1]:
+        if isinstance(data, dict):
+            data.setdefault(part, {})
+        inner = data[_index(data, part, whole)]  # type: ignore[index]
+        if not isinstance(inner, dict | list):
+            raise InputError(f'--vary: expected a table or a list at "{part}" of "{".".join(whole)}", found {inner!r}')
+        data = inner
+    data[_index(data, key[-1], whole)] = value  # type: ignore[index]
 
 
 def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary") -> str | int:
     if isinstance(data, dict):
         return part
-    names = [str(entry.get("name", entry.get("body", k))) for k, entry in _tables(data)]
+    names = [str(one.get("name", one.get("body", k))) for k, one in enumerate(data) if isinstance(one, dict)]
     if part in names:
         return names.index(part)
     if part.isdecimal() and int(part) < len(data):
@@ -198,7 +196,3 @@ def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary"
     raise InputError(
         f'{option}: expected one of {quoted(known)} in "{".".join(whole)}", found "{part}"{did_you_mean(part, known)}'
     )
-
-
-def _tables(data: list[Any]) -> Iterable[tuple[int, Table]]:
-    return ((k, entry) for k, entry in enumerate(data) if isinstance(entry, dict))

@@ -95,12 +95,7 @@ def check_once(keys: Sequence[Key]) -> None:
 
 
 def plan_sweep(
-    scene: Path,
-    vary: Sequence[str],
-    folder: Path,
-    sample: int | None,
-    seed: int,
-    collect: Sequence[str],
+    scene: Path, vary: Sequence[str], folder: Path, sample: int | None, seed: int, collect: Sequence[str]
 ) -> Sweep:
     """Every combination of the values, or `sample` points of a Latin hypercube.
 

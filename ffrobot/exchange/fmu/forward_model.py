@@ -141,11 +141,7 @@ class ForwardUnit:
 
 
 def forward_unit(
-    model: Model,
-    voltages: Iterable[Input],
-    links: Mapping[str, ModalBody],
-    analysis: Forward,
-    axes: str = AXES,
+    model: Model, voltages: Iterable[Input], links: Mapping[str, ModalBody], analysis: Forward, axes: str = AXES
 ) -> ForwardUnit:
     """The motion of `analysis` from its initial state under moments of motors and `voltages` of patches.
 

@@ -11,20 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..projection import COLORS
-from ..studies.study import (
-    LOOKS,
-    Axis,
-    Band,
-    Bars,
-    Diagram,
-    Look,
-    Numbers,
-    Parallel,
-    Points,
-    Progress,
-    Study,
-    wrapped,
-)
+from ..studies.study import LOOKS, Axis, Band, Bars, Diagram, Look, Numbers, Parallel, Points, Progress, Study, wrapped
 from .charts import encoded, plain
 
 AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages
