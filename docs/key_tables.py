@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ffrobot.scene.checks import UNSUPPORTED
 from ffrobot.schema import scene_in, schema
 
 INTRODUCTION = {
@@ -23,6 +22,37 @@ INTRODUCTION = {
     " figures are drawn.",
 }
 HERE = Path(__file__).parent / "reference"
+UNSUPPORTED = (
+    (
+        "`motor = true` of spherical and free joints, which have no coordinates",
+        "revolute and prismatic joints in series; loads on points",
+        "ffrobot.mbs.joints.joint",
+    ),
+    (
+        '`coupling = "surface"` of patches on ±z, of fibers and of twist: link files outline patches on ±y',
+        '`coupling = "rotation"`',
+        "ffrobot.actuation.patches.records",
+    ),
+    (
+        'compliant gears (`stiffness` of joints) with `motors = "frame"` in joints whose axis modes tilt, where they'
+        " are driven, controlled or linear: no angle goes with a moment between frames there",
+        '`motors = "section"`',
+        "ffrobot.mbs.analysis.gears",
+    ),
+    (
+        "kinematic loops with a motor without `rotor_inertia`, or a compliant gear, in each joint (rotors,"
+        " trajectories, friction, loads and limits of positions may be in all)",
+        "a rotor in front of a rigid gear in one of them, or no motor there: ffrobot cuts the loop there",
+        "ffrobot.mbs.model.model",
+    ),
+    (
+        "sensors and controllers on spherical and free joints, which have no coordinates, and on all joints of a"
+        " kinematic loop where none has a `rotor_inertia`",
+        "sensors of points, or of other joints of the loop",
+        "ffrobot.actuation.control.signals",
+    ),
+)
+"""What keys of scenes can say and ffrobot does not support, what to write instead, and the module that rejects it."""
 
 
 LINK_TABLES = tuple(schema("link")["$defs"])
@@ -49,7 +79,7 @@ def key_pages() -> dict[str, str]:
 def _lacks() -> Iterator[str]:
     """Unsupported features, and what to use instead."""
     yield from ("## Unsupported", "", "| feature | instead |", "|---|---|")
-    yield from (f"| {lack.what} | {lack.instead} |" for lack in UNSUPPORTED)
+    yield from (f"| {what} | {instead} |" for what, instead, _ in UNSUPPORTED)
 
 
 def _sections(kind: str) -> Iterator[Iterator[str]]:

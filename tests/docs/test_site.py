@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -94,6 +95,17 @@ def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
         assert (measured if name == measured.name else DOCS / "reference" / name).read_text(encoding="utf-8") == text, (
             name
         )
+
+
+def test_modules_that_refuse_what_is_not_supported_exist(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    from key_tables import UNSUPPORTED
+
+    for name in {where for _, _, where in UNSUPPORTED}:
+        spec = find_spec(name)
+        assert spec is not None, name
+        text = Path(spec.origin).read_text(encoding="utf-8")
+        assert "raise InputError" in text or "raise ValueError" in text, name
 
 
 def test_first_page_lists_all_pages_for_readers_of_the_repository():
