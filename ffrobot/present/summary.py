@@ -6,9 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, number
+from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, number, of_limit
 from .lines import alike
 
 if TYPE_CHECKING:
@@ -101,10 +99,10 @@ def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
     speed = "rad/s" if unit == "N·m" else "m/s"
     return (
         name,
-        _of(motor.moment, motor.moment_limit, unit),
+        f"{of_limit(motor.moment, motor.moment_limit)} {unit}",
         f"{number(motor.rms_moment)} {unit}",
-        _of(motor.speed, motor.speed_limit, speed),
-        _of(motor.power, motor.power_limit, "W"),
+        f"{of_limit(motor.speed, motor.speed_limit)} {speed}",
+        f"{of_limit(motor.power, motor.power_limit)} W",
         _percent(motor.factor) if motor.has_limits else "none",
         one.name,
     )
@@ -165,7 +163,3 @@ def _length(value: float | None) -> str:
 
 def _percent(factor: float) -> str:
     return f"{100 * factor if factor > ROUND_OFF else 0:.3g} %" if factor < 10.0 else f"{factor:.3g} ×"
-
-
-def _of(peak: float, limit: float, unit: str) -> str:
-    return number(peak) + (f" of {limit:g}" if np.isfinite(limit) else "") + f" {unit}"

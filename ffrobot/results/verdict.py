@@ -215,15 +215,16 @@ def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
     """Peaks and RMS, with limits where it has them."""
     speed = "rad/s" if unit == "N·m" else "m/s"
     parts = [
-        f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {number(motor.rms_moment)} {unit}{interval}",
-        f"{_of(motor.speed, motor.speed_limit)} {speed}",
-        f"{_of(motor.power, motor.power_limit)} W",
+        f"peak {of_limit(motor.moment, motor.moment_limit)} {unit}, RMS {number(motor.rms_moment)} {unit}{interval}",
+        f"{of_limit(motor.speed, motor.speed_limit)} {speed}",
+        f"{of_limit(motor.power, motor.power_limit)} W",
     ]
     share = f"; above a limit for {100 * motor.share_beyond:.3g} % of the time" if motor.share_beyond > 0.0 else ""
     return ", ".join(parts) + share
 
 
-def _of(peak: float, limit: float) -> str:
+def of_limit(peak: float, limit: float) -> str:
+    """A peak, and the limit where there is one."""
     return number(peak) + (f" of {limit:g}" if np.isfinite(limit) else "")
 
 

@@ -71,22 +71,22 @@ class Chart:
         if lines:
             text = "limits " + ", ".join(f"{limit:g}".replace("-", "−") for limit in self.limits)
             lines[0]["label"] = {"text": text, "textposition": "start"}
-        y_axis: dict[str, Any] = {
-            "title": {"text": self.y_label, "standoff": 8},
-            "automargin": True,
-            "exponentformat": "power",
-        }
+        found = axes_layout(self.title, self.x_label, self.y_label, legend=len(self.traces) > 1) | {"shapes": lines}
         if self.includes:
-            y_axis |= {"autorangeoptions": {"include": list(self.includes)}}
+            found["yaxis"] |= {"autorangeoptions": {"include": list(self.includes)}}
         if self.equal_axes:
-            y_axis |= {"scaleanchor": "x"}
-        return {
-            "title": {"text": plain(self.title)},
-            "xaxis": {"title": {"text": self.x_label, "standoff": 5}},
-            "yaxis": y_axis,
-            "shapes": lines,
-            "showlegend": len(self.traces) > 1,
-        }
+            found["yaxis"] |= {"scaleanchor": "x"}
+        return found
+
+
+def axes_layout(title: str, x: str, y: str, *, legend: bool = True) -> dict[str, Any]:
+    """Plotly's, of a chart with a title and labels of both axes."""
+    return {
+        "title": {"text": plain(title)},
+        "xaxis": {"title": {"text": plain(x), "standoff": 5}},
+        "yaxis": {"title": {"text": plain(y), "standoff": 8}, "automargin": True, "exponentformat": "power"},
+        "showlegend": legend,
+    }
 
 
 def plain(text: str) -> str:

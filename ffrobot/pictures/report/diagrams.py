@@ -12,7 +12,7 @@ import numpy as np
 from ...common.arrays import Array
 from ..projection import COLORS
 from ..studies.study import LOOKS, Axis, Band, Bars, Diagram, Look, Numbers, Parallel, Points, Progress, Study, wrapped
-from .charts import encoded, plain
+from .charts import axes_layout, encoded, plain
 
 AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages
 LETTERS, LINE = 15, 15  # of a label, in a line; pixels that a line takes
@@ -42,25 +42,14 @@ def drawn(diagram: Diagram, name: str) -> DrawnDiagram:
         case Parallel():
             return _parallel(diagram, name)
         case Progress():
-            return DrawnDiagram(name, list(_progress(diagram)), _layout(
-                diagram.title, "design, in the order of the search", diagram.y_label, logarithmic=diagram.logarithmic
-            ))  # fmt: skip
+            of_search = axes_layout(diagram.title, "design, in the order of the search", diagram.y_label)
+            of_search["yaxis"] |= {"type": "log"} if diagram.logarithmic else {}
+            return DrawnDiagram(name, list(_progress(diagram)), of_search)
         case Band():
-            return DrawnDiagram(name, list(_band(diagram)), _layout(diagram.title, "time (s)", diagram.y_label))
+            return DrawnDiagram(name, list(_band(diagram)), axes_layout(diagram.title, "time (s)", diagram.y_label))
         case Points():
-            return DrawnDiagram(
-                name, [_points(diagram)], _layout(diagram.title, diagram.x_label, diagram.y_label, legend=False)
-            )
-
-
-def _layout(title: str, x: str, y: str, *, legend: bool = True, logarithmic: bool = False) -> dict[str, Any]:
-    y_axis = {"title": {"text": plain(y)}, "automargin": True, "exponentformat": "power"}
-    return {
-        "title": {"text": plain(title)},
-        "xaxis": {"title": {"text": plain(x), "standoff": 5}},
-        "yaxis": y_axis | ({"type": "log"} if logarithmic else {}),
-        "showlegend": legend,
-    }
+            of_points = axes_layout(diagram.title, diagram.x_label, diagram.y_label, legend=False)
+            return DrawnDiagram(name, [_points(diagram)], of_points)
 
 
 def _bars(diagram: Bars, name: str) -> DrawnDiagram:
@@ -77,10 +66,10 @@ def _bars(diagram: Bars, name: str) -> DrawnDiagram:
         })  # fmt: skip
         if series.errors:
             traces[-1]["error_x"] = {"type": "data", "array": list(series.errors), "thickness": 1, "color": AXIS}
-    layout = _layout(diagram.title, diagram.x_label, "", legend=len(traces) > 1)
-    layout["yaxis"] |= {"autorange": "reversed", "type": "category"}
-    layout |= {"bargap": 0.25, "barmode": "group"}
-    return DrawnDiagram(name, traces, layout, "long", REST + BAR * len(diagram.labels) * len(traces))
+    look = axes_layout(diagram.title, diagram.x_label, "", legend=len(traces) > 1)
+    look |= {"bargap": 0.25, "barmode": "group"}
+    look["yaxis"] |= {"autorange": "reversed", "type": "category"}
+    return DrawnDiagram(name, traces, look, "long", REST + BAR * len(diagram.labels) * len(traces))
 
 
 def _parallel(diagram: Parallel, name: str) -> DrawnDiagram:

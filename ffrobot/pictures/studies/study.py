@@ -57,6 +57,13 @@ DECADES = 2.0  # goals, all of one sign, that span more are drawn by their logar
 TICKS = 5  # about so many
 
 
+class Drawing(Record):
+    """What all diagrams have: the name of their files, without suffix, and a title."""
+
+    name: str
+    title: str
+
+
 class Series(Record):
     """Bars of one colour: a value for each label and its error, 0 where it is not known."""
 
@@ -65,12 +72,10 @@ class Series(Record):
     errors: tuple[float, ...] = ()
 
 
-class Bars(Record):
+class Bars(Drawing):
     """Horizontal bars, the first label on top; a single series has one colour for each sign where `signed`."""
 
     kind: Literal["bars"] = "bars"
-    name: str
-    title: str
     x_label: str
     labels: tuple[str, ...]
     series: tuple[Series, ...]
@@ -128,24 +133,20 @@ def axis_of_goal(label: str, values: Numbers, limit: float | None = None, sense:
     return Axis(label=label, values=values, low=low, high=high, logarithmic=logarithmic, limit=limit, sense=sense)
 
 
-class Parallel(Record):
+class Parallel(Drawing):
     """Parallel coordinates (Inselberg 1985): a line for each design over variables, goals and limits."""
 
     kind: Literal["parallel"] = "parallel"
-    name: str
-    title: str
     axes: tuple[Axis, ...]
     states: tuple[State, ...]
     designs: tuple[str, ...]  # what each is called
     best_label: str = "best"
 
 
-class Progress(Record):
+class Progress(Drawing):
     """The goal of one design after the other; `best` is the best so far that keeps all limits."""
 
     kind: Literal["progress"] = "progress"
-    name: str
-    title: str
     y_label: str
     values: Numbers
     states: tuple[State, ...]
@@ -153,12 +154,10 @@ class Progress(Record):
     logarithmic: bool = False
 
 
-class Band(Record):
+class Band(Drawing):
     """A history with the band that keys which are spread make of it, at `time` (s)."""
 
     kind: Literal["band"] = "band"
-    name: str
-    title: str
     y_label: str
     time: tuple[float, ...]
     nominal: tuple[float, ...]
@@ -171,12 +170,10 @@ class Band(Record):
     worst_label: str
 
 
-class Points(Record):
+class Points(Drawing):
     """Named points with the errors of both coordinates; `joined` along a curve, hollow where not `sure`."""
 
     kind: Literal["points"] = "points"
-    name: str
-    title: str
     x_label: str
     y_label: str
     labels: tuple[str, ...]
