@@ -97,6 +97,16 @@ Point = tuple[float, ...]
 """A value for each key."""
 
 
+def number(value: object) -> str:
+    """Of a key, in words."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def in_words(keys: Iterable[Key], point: Point) -> str:
+    """`payload.0.mass = 0.5, …`."""
+    return ", ".join(f"{'.'.join(key)} = {number(value)}" for key, value in zip(keys, point, strict=True))
+
+
 @dataclass(frozen=True)
 class Runs:
     """How designs are run: of which scene file, in which folder, whether they are `kept` there, so many in parallel.

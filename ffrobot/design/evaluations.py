@@ -21,7 +21,7 @@ from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..results.file import Results
 from ..sweep.sweep import Key
-from .designs import Design, Designs, Point, repeated_steps
+from .designs import Design, Designs, Point, in_words, repeated_steps
 from .goals import Limit, Problem
 from .readings import Followed, Goal, Peak, Reading, parts
 from .variables import Place, Space
@@ -143,7 +143,7 @@ class Evaluations:
         """Designs that failed, in words."""
         unread = {one.design.point: one.failure for one in self.searched if not one.completed}
         unrun = {d.point: d.failure for d in self._designs.values() if not d.completed}
-        return [f"{self._words(point)}: {why}" for point, why in (unread | unrun).items()]
+        return [f"{in_words(self.space.keys, point)}: {why}" for point, why in (unread | unrun).items()]
 
     @property
     def split(self) -> Split:
@@ -220,9 +220,6 @@ class Evaluations:
             self._followed[known] = design.follow(self.split.goals, self.rows(base))
         return self._followed[known]
 
-    def _words(self, point: Point) -> str:
-        return ", ".join(f"{'.'.join(key)} = {number(v)}" for key, v in zip(self.space.keys, point, strict=True))
-
 
 def write_designs(found: Evaluations, path: Path) -> None:
     """One line for each design of a search: values of keys and goals, the largest excess of a limit, its folder."""
@@ -237,8 +234,3 @@ def write_designs(found: Evaluations, path: Path) -> None:
         status = row.status if one.completed or row.status != "completed" else "failed"
         rows.append([k, *row.values, status, *values, violation, one.design.folder.name, one.failure])
     write_atomically(path, as_csv([columns, *rows]).encode(), "table of designs", ours=True)
-
-
-def number(value: object) -> str:
-    """Of a key, in words."""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -17,8 +17,8 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
-from .designs import Designs, Runs, changes_for, may_repeat
-from .evaluations import Evaluated, Evaluations, SpentError, number
+from .designs import Designs, Runs, changes_for, may_repeat, number
+from .evaluations import Evaluated, Evaluations, SpentError
 from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
 from .goals import KEPT, Limit, Problem, parse_goal, read_problem
 from .local_search import AIM, Local, search_from

@@ -11,7 +11,8 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_goal
 from ..results.verdict import Verdict
-from .evaluations import Evaluated, number
+from .designs import number
+from .evaluations import Evaluated
 from .finding import CsvFile, Finding, Section, failed_runs, numbers, with_unit
 from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
@@ -284,14 +285,11 @@ class Optimum(Finding):
 
     def _key_rows(self) -> Iterator[tuple[str, str, str, str]]:
         """Of each key its name, where the search began, its best value, and its bounds."""
-        start, best = self.space.point(self.start.place), self.values
-        for variable in self.space.variables:
-            for key in variable.keys:
-                k = self.space.keys.index(key)
-                bounds = (
-                    f"{len(variable.rows)} rows" if variable.is_catalogue else f"{variable.low:g} to {variable.high:g}"
-                )
-                yield self.keys[k], number(start[k]), number(best[k]), bounds
+        owners = [variable for variable in self.space.variables for _ in variable.keys]
+        start = self.space.point(self.start.place)
+        for name, begin, best, of in zip(self.keys, start, self.values, owners, strict=True):
+            bounds = f"{len(of.rows)} rows" if of.is_catalogue else f"{of.low:g} to {of.high:g}"
+            yield name, number(begin), number(best), bounds
 
     def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         """Of each limit its text, the goal at first and in the best design, whether it is reached, its price."""

@@ -1,19 +1,15 @@
 """Derivatives of goals by numbers of a scene and its links: `ffrobot sensitivity`.
 
 Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/steps.py`). Their
-differences have no noise but rounding, and central pairs with small steps are enough, which are checked all together
-(see below). Where they err by more than `AIM`, larger steps follow, as far as these are better.
+differences have no noise but rounding, which many thousand steps, and modes of links that are computed anew, make 1e-13
+to 1e-11 of a goal. Truncation grows with the number of periods that vibrations pass through. So the central pair of
+each key is `WIDE`, or `NARROW` where that is too much, as two pairs tell that change all keys at once, with random
+signs. The sum of what all pairs have found is then checked by that of the two that has their width. Where pairs err by
+more than `AIM`, larger steps follow, as far as these are better.
 
 Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
 integrated with a tighter tolerance than the scene's; `derivatives` has the extrapolation. Where errors are above `AIM`
 and still fall with smaller steps, steps of a quarter follow, twice at most.
-
-Derivatives by runs that take the steps of the base again: a central pair for each key, and two that all share.
-
-Differences of such runs have no noise but rounding, which many thousand steps, and modes of links that are computed
-anew, make 1e-13 to 1e-11 of a goal. Truncation grows with the number of periods that vibrations pass through. So pairs
-are `WIDE`, or `NARROW` where that is too much, as two pairs tell that change all keys at once, with random signs. The
-sum of what all pairs have found is then checked by that of the two that has their width.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from ..common.errors import InputError
 from ..common.tables import shown
 from ..sweep.files import number_at
 from ..sweep.sweep import Key
-from .designs import Design, Designs, Point, Runs, changes_for, parse_key
+from .designs import Design, Designs, Point, Runs, changes_for, in_words, parse_key
 from .readings import Goal
 
 LEVELS = (0.05, 0.5, 0.95)
@@ -325,9 +325,7 @@ class SpreadDesigns:
 
     def where(self, design: Design) -> str:
         """Its keys in words."""
-        return ", ".join(
-            f"{'.'.join(one.key)} = {value:.6g}" for one, value in zip(self.spreads, design.point, strict=True)
-        )
+        return in_words((one.key for one in self.spreads), design.point)
 
 
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:
