@@ -13,36 +13,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..results.file import Results
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point, in_words, repeated_steps
-from .goals import Limit, Problem
+from .goals import Problem
 from .readings import Followed, Goal, Peak, Reading, parts
 from .variables import Place, Space
 
 
 @dataclass(frozen=True)
-class Split:
-    """Rows of a search: the objective's goals, whose largest is to be least, then those of `limits`.
+class Split(Problem):
+    """The problem of a search, with local peaks in place of peaks: rows are those of its `goals`.
 
-    `objectives`: one, or the local peaks of one. `owners`: of each of `limits` the number of the problem's own limit.
+    `owners`: of each of the limits the number of the problem's own limit.
     """
 
-    problem: Problem
-    objectives: tuple[Goal, ...]
-    limits: tuple[Limit, ...]
-    owners: tuple[int, ...]
-
-    @property
-    def goals(self) -> tuple[Goal, ...]:
-        """Of all rows."""
-        return (*self.objectives, *(limit.goal for limit in self.limits))
+    owners: tuple[int, ...] = ()
 
     @property
     def objective_rows(self) -> list[int]:
@@ -54,34 +43,18 @@ class Split:
         """By number."""
         return list(range(len(self.objectives), len(self.goals)))
 
-    def scaled(self, values: Sequence[float]) -> Array:
-        """(rows) as of `Problem.scaled`: objectives, and excesses of limits, which are to be 0 or less."""
-        return as_floats(np.concatenate([rows.scaled(part)[skip:] for rows, part, skip in self._of(values)]))
-
-    def factors(self, values: Sequence[float]) -> Array:
-        """(rows) what turns slopes of goals with these values into those of `scaled`."""
-        return as_floats(np.concatenate([rows.factors(part)[skip:] for rows, part, skip in self._of(values)]))
-
-    def _of(self, values: Sequence[float]) -> list[tuple[Problem, Sequence[float], int]]:
-        """Problems with one objective each, their goals' values, and how many rows of theirs are of others."""
-        count = len(self.objectives)
-        alone = replace(self.problem, limits=())
-        limited = replace(self.problem, limits=self.limits)
-        return [*((alone, [value], 0) for value in values[:count]), (limited, [values[0], *values[count:]], 1)]
-
 
 def split(problem: Problem, results: Results) -> Split:
     """By the local peaks of a design. Peaks that are to be large have no parts: one of them is enough."""
-    objectives: tuple[Goal, ...] = (problem.objective,)
-    if problem.sense > 0 and isinstance(problem.objective, Peak):
-        objectives = parts(problem.objective, results)
-    limits: list[Limit] = []
-    owners: list[int] = []
-    for k, limit in enumerate(problem.limits):
-        goals = parts(limit.goal, results) if limit.sense > 0 and isinstance(limit.goal, Peak) else (limit.goal,)
-        limits += [replace(limit, goal=goal) for goal in goals]
-        owners += [k] * len(goals)
-    return Split(problem, objectives, tuple(limits), tuple(owners))
+
+    def parts_of(goal: Goal, sense: float) -> tuple[Goal, ...]:
+        return parts(goal, results) if sense > 0 and isinstance(goal, Peak) else (goal,)
+
+    pairs = [(k, limit, goal) for k, limit in enumerate(problem.limits) for goal in parts_of(limit.goal, limit.sense)]
+    return Split(
+        problem.objective, problem.sense, tuple(replace(limit, goal=goal) for _, limit, goal in pairs), problem.scale,
+        parts_of(problem.objective, problem.sense), tuple(k for k, _, _ in pairs),
+    )  # fmt: skip
 
 
 class SpentError(Exception):
