@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..mbs.fields.functions import check_derivatives, check_domain
 from ..mbs.fields.orientations import OrientationLaw
 from ..mbs.joints.joint import JointRecord
 from ..mbs.scene.analysis import Analysis, Surroundings
+from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS
 from .scene import SceneKeys
@@ -24,11 +25,8 @@ from .scene import SceneKeys
 def problems(scene: SceneKeys) -> Iterator[str]:
     """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
     yield from _all_duplicates(scene)
-    yield from _body_problems(scene)
-    yield from _joint_problems(scene)
+    yield from _reference_problems(scene)
     yield from _guess_problems(scene)
-    yield from _flexible_body_problems(scene)
-    yield from _patch_problems(scene)
     yield from _load_problems(scene)
     yield from _stiffening_problems(scene)
     for k, analysis in enumerate(scene.analysis):
@@ -97,45 +95,48 @@ def _all_duplicates(scene: SceneKeys) -> Iterator[str]:
             yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
 
 
-def _body_problems(scene: SceneKeys) -> Iterator[str]:
+def _reference_problems(scene: SceneKeys) -> Iterator[str]:
+    """What records refer to that does not exist, or is of another kind."""
     bodies = {body.name: body for body in scene.body}
-    tools: dict[str, list[str]] = {}
-    for tool in scene.tool:
-        body, _, point = tool.reference.partition(".")
-        tools.setdefault(body, []).append(point)
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
-    for reference in scene.references():
-        if reference.kind != "body":
-            continue
-        name, _, point = reference.name.partition(".")
-        if name not in bodies:
-            hint = did_you_mean(name, bodies)
-            yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{reference.name}"{hint}'
-            continue
-        rigid = bodies[name].rigid
-        known = [] if rigid is None else [*rigid.points, *tools.get(name, ())]
-        if point and rigid is not None and point not in known:
-            hint = did_you_mean(point, known)
-            yield (
-                f'{reference.key}: expected one of the points {quoted(known)} of "{name}", found'
-                f' "{reference.name}"{hint}'
-            )
-
-
-def _joint_problems(scene: SceneKeys) -> Iterator[str]:
     joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     elastic = [name for name, joint in joints.items() if getattr(joint, "stiffness", None) is not None]
     moving = [name for name, joint in joints.items() if _moves(joint)]
+    patched = list(dict.fromkeys(layout.body for layout in scene.pzt))
+    layouts = [layout.label for layout in scene.pzt]
     for reference in scene.references():
         key, name = reference.key, reference.name
-        if reference.kind == "elastic joint" and name not in elastic:
-            yield f'{key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
-        elif reference.kind == "joint" and name not in joints:
-            yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
-        elif reference.kind == "joint" and name not in moving:
-            found = f'"{name}", a {joints[name].type}'
-            yield f"{key}: expected a joint that moves ({quoted(moving)}), found {found}"
+        match reference.kind:
+            case "body":
+                yield from _body_problems(scene, bodies, key, name)
+            case "elastic joint" if name not in elastic:
+                yield f'{key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
+            case "joint" if name not in joints:
+                yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
+            case "joint" if name not in moving:
+                yield f'{key}: expected a joint that moves ({quoted(moving)}), found "{name}", a {joints[name].type}'
+            case "flexible body" if name in bodies and bodies[name].rigid is not None:
+                yield f'{key}: expected a flexible body, found "{name}", which is rigid'
+            case "patched body" if name not in patched:
+                hint = did_you_mean(name, patched)
+                yield f'{key}: expected a body with patches, {quoted(patched)}, found "{name}"{hint}'
+            case "patches" if name not in layouts:
+                wanted = f"one of the layouts {quoted(layouts)}" if layouts else "a layout of patches ([[pzt]])"
+                yield f'{key}: expected {wanted}, found "{name}"{did_you_mean(name, layouts)}'
+
+
+def _body_problems(scene: SceneKeys, bodies: Mapping[str, BodyKeys], key: str, reference: str) -> Iterator[str]:
+    """Of "BODY" or "BODY.POINT"; points of links are known with their files."""
+    name, _, point = reference.partition(".")
+    if name not in bodies:
+        yield f'{key}: expected one of the bodies {quoted(bodies)}, found "{reference}"{did_you_mean(name, bodies)}'
+    elif point and (rigid := bodies[name].rigid) is not None:
+        tools = (tool.reference.partition(".") for tool in scene.tool)
+        known = [*rigid.points, *(tool for body, _, tool in tools if body == name)]
+        if point not in known:
+            hint = did_you_mean(point, known)
+            yield f'{key}: expected one of the points {quoted(known)} of "{name}", found "{reference}"{hint}'
 
 
 def _moves(joint: JointRecord) -> bool:
@@ -158,27 +159,6 @@ def _guess_problems(scene: SceneKeys) -> Iterator[str]:
                     f"initial.{key}.{joint.name}: expected no guess where initial.{bodies} has {quoted(known)},"
                     " found one"
                 )
-
-
-def _flexible_body_problems(scene: SceneKeys) -> Iterator[str]:
-    rigid = [body.name for body in scene.body if body.rigid is not None]
-    for reference in scene.references():
-        if reference.kind == "flexible body" and reference.name in rigid:
-            yield f'{reference.key}: expected a flexible body, found "{reference.name}", which is rigid'
-
-
-def _patch_problems(scene: SceneKeys) -> Iterator[str]:
-    """References to bodies with patches, and to layouts of these."""
-    bodies = list(dict.fromkeys(layout.body for layout in scene.pzt))
-    layouts = [layout.label for layout in scene.pzt]
-    for reference in scene.references():
-        known = {"patched body": bodies, "patches": layouts}.get(reference.kind)
-        if known is not None and reference.name not in known:
-            what = f"a body with patches, {quoted(known)}"
-            if reference.kind == "patches":
-                what = f"one of the layouts {quoted(known)}" if known else "a layout of patches ([[pzt]])"
-            hint = did_you_mean(reference.name, known)
-            yield f'{reference.key}: expected {what}, found "{reference.name}"{hint}'
 
 
 def _load_problems(scene: SceneKeys) -> Iterator[str]:
