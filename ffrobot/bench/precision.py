@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, SolveError
-from ..fe_models.link_source import link_keys, link_path
+from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, IntegratedAnalysis
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
@@ -187,23 +184,19 @@ Keys = dict[str, Any]
 _ANY_NUMBER_OF_MODES = {"allocation": "least-squares", "mode_weights": None}
 
 
-def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene | None:
+def refined(scene: Scene, elements: float, modes: float) -> Scene | None:
     """The scene with `elements` and `modes` times as many of them in every link that is given by its link file.
 
-    Written to `folder`, one file a link. None where neither changes anything: no link files, or none with such keys.
+    None where neither changes anything: no link files, or none with such keys.
     """
     changed = False
     bodies = []
-    for k, body in enumerate(scene.body):
+    for body in scene.body:
         if body.link is not None:
             keys = link_keys(body.link)
             changed |= elements != 1 and _scale_mesh(keys, elements)
             changed |= modes != 1 and _scale_modes(keys, modes)
-            if "file" in keys["geometry"]:
-                keys["geometry"]["file"] = str((link_path(body.link).parent / keys["geometry"]["file"]).absolute())
-            path = folder / f"{k}_{elements:g}_{modes:g}_{body.name}.toml"
-            path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-            body = body.model_copy(update={"link": path})
+            body = body.model_copy(update={"link": LinkTable(keys, link_path(body.link))})
         bodies.append(body)
     update: Keys = {"body": tuple(bodies)}
     if modes != 1:
@@ -257,28 +250,25 @@ def measure_axes(scene: Scene, analysis: IntegratedAnalysis, budget: float, disp
     """
     tight = max(TIGHTEST_TOLERANCE, UNSEEN * analysis.tolerance)
     rows: list[Row] = []
-    with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as name:
-        trial = _Trials(scene, analysis, budget, display, Path(name))
-        fine = ELEMENTS[-1] if trial(ELEMENTS[-1], 1.0, tight) is not None else 1.0
-        axes = {"mesh": [(f, 1.0) for f in ELEMENTS], "modes": [(fine, f) for f in MODES]}
-        for axis, factors in axes.items():
-            best = trial(*factors[-1], tight)
-            if best is not None:
-                rows += [trial.row(axis, *factor, tight, best) for factor in factors[:-1]]
-        rows.append(trial.row("time", 1.0, 1.0, analysis.tolerance, trial(1.0, 1.0, tight)))
-        everything = trial(fine, MODES[-1], tight)
-        if everything is not None:
-            rows.append(trial.row("total", 1.0, 1.0, analysis.tolerance, everything))
+    trial = _Trials(scene, analysis, budget, display)
+    fine = ELEMENTS[-1] if trial(ELEMENTS[-1], 1.0, tight) is not None else 1.0
+    axes = {"mesh": [(f, 1.0) for f in ELEMENTS], "modes": [(fine, f) for f in MODES]}
+    for axis, factors in axes.items():
+        best = trial(*factors[-1], tight)
+        if best is not None:
+            rows += [trial.row(axis, *factor, tight, best) for factor in factors[:-1]]
+    rows.append(trial.row("time", 1.0, 1.0, analysis.tolerance, trial(1.0, 1.0, tight)))
+    everything = trial(fine, MODES[-1], tight)
+    if everything is not None:
+        rows.append(trial.row("total", 1.0, 1.0, analysis.tolerance, everything))
     return rows
 
 
 class _Trials:
     """Runs of one analysis with links refined; each combination once."""
 
-    def __init__(
-        self, scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher, folder: Path
-    ) -> None:
-        self.scene, self.analysis, self.budget, self.display, self.folder = scene, analysis, budget, display, folder
+    def __init__(self, scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher) -> None:
+        self.scene, self.analysis, self.budget, self.display = scene, analysis, budget, display
         self.done: dict[tuple[float, float, float], Run | str] = {}
 
     def __call__(self, elements: float, modes: float, tolerance: float) -> Run | str | None:
@@ -314,11 +304,11 @@ class _Trials:
         }
 
     def _scene(self, elements: float, modes: float) -> Scene | None:
-        return self.scene if elements == modes == 1.0 else refined(self.scene, elements, modes, self.folder)
+        return self.scene if elements == modes == 1.0 else refined(self.scene, elements, modes)
 
     def _run(self, scene: Scene, tolerance: float) -> Run | str:
         name = self.analysis.name
         try:
             return run(with_analysis(scene, name, tolerance=tolerance), name, self.budget, self.display)
         except FfrobotError as error:  # such as more modes than half the mesh has
-            return str(error).replace(f"{self.folder}/", "").splitlines()[0]
+            return str(error).splitlines()[0]
