@@ -26,7 +26,7 @@ from ..results.datasets import COLUMN
 from ..results.file import Results
 from ..results.meanings import meaning
 from ..results.peaks import POWER as PEAK_POWER
-from ..sweep.runs import is_vector
+from ..sweep.runs import by_dots, is_vector
 
 
 @dataclass(frozen=True)
@@ -202,13 +202,10 @@ def _rms(results: Results, name: str, column: int | None) -> tuple[float, float]
 
 
 def _known(results: Results) -> dict[str, str]:
-    """Datasets over time by the names they go by, with dots; those of the first analysis without its name, too."""
+    """Datasets over time by the names they go by."""
     found = [f"{analysis}/{name}" for analysis in results.analyses for name in _histories(results, analysis)]
     found += [f"{m[0]}/{POWER}" for m in map(JOINT.match, found) if m and f"{m[0]}/moment" in results]
-    by_name = {name.replace("/", "."): name for name in found}
-    first = f"{results.analyses[0]}/" if results.analyses else "/"
-    short = {name.removeprefix(first).replace("/", "."): name for name in found if name.startswith(first)}
-    return short | by_name
+    return by_dots(results, found)
 
 
 def _histories(results: Results, analysis: str) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,10 +72,26 @@ def movie_outputs(time: NDArray[np.float64], seconds: float) -> Indices:
     return np.asarray(np.searchsorted(time, wanted + reach, side="right") - 1, dtype=np.intp)
 
 
-def write_movie(path: Path, frames: Iterable[Frame]) -> None:
-    """Write frames, all of the same size, as a movie: the suffix of `path` says of which kind."""
-    image = gif_image if path.suffix.lower() == ".gif" else mp4_image
-    write_atomically(path, image(frames), "movie", make_folder=True)
+Draw = Callable[[Results, str, Indices, Indices, float | None, list[str]], Iterator[Frame]]
+"""Of an analysis, the outputs that are seen, which of these each frame shows, a scale of deflections, and notes."""
+
+
+def make_movie(results_path: Path, path: Path, options: MovieOptions | None, draw: Draw) -> list[str]:
+    """Write a movie (.gif, .mp4) of a results file, whose frames `draw` draws; notes on what is not drawn as it is.
+
+    Raises `InputError` where the results cannot be read, have no such analysis or none that goes through time, or for
+    another suffix; `SolveError` where the movie cannot be made or written.
+    """
+    options = options or MovieOptions()
+    notes: list[str] = []
+    check_movie(path)
+    with Results(results_path) as results:
+        analysis = moving_analysis(results, options.analysis)
+        outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
+        image = gif_image if path.suffix.lower() == ".gif" else mp4_image
+        frames = draw(results, analysis, outputs, shown, options.scale, notes)
+        write_atomically(path, image(frames), "movie", make_folder=True)
+    return list(dict.fromkeys(notes))
 
 
 def gif_image(frames: Iterable[Frame]) -> bytes:

@@ -145,10 +145,15 @@ def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:
 def _meant(results: Results, name: str) -> str:
     """The dataset, also with dots for "/", and of the first analysis without its name; `name` where there is none."""
     wanted, bracket, column = name.partition("[")
-    known = {dataset.replace("/", "."): dataset for dataset in results}
-    dotted = wanted.replace("/", ".")
-    found = known.get(dotted) or known.get(".".join((*results.analyses[:1], dotted)))
+    found = by_dots(results, list(results)).get(wanted.replace("/", "."))
     return name if found is None else f"{found}{bracket}{column}"
+
+
+def by_dots(results: Results, datasets: Sequence[str]) -> dict[str, str]:
+    """Datasets by the names they go by, with dots; those of the first analysis without its name, too."""
+    first = f"{results.analyses[0]}/" if results.analyses else "/"
+    short = {name.removeprefix(first).replace("/", "."): name for name in datasets if name.startswith(first)}
+    return short | {name.replace("/", "."): name for name in datasets}
 
 
 def missing_columns(rows: Sequence[Row], requests: Sequence[str], folder: Path) -> Iterator[str]:

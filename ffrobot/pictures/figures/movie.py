@@ -27,7 +27,7 @@ from ..motion import (
     tool_markers,
     visible_exaggeration,
 )
-from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
+from ..movie_file import Frame, MovieOptions, make_movie
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
 from ..shapes import coarsened, surface_shape, thickened, triangles_of
 from .style import directions, lit, literal, normals, projected, style
@@ -42,27 +42,18 @@ TAKEN = COLORS[3]  # no colour of a tool
 
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
-    """Write a movie (.gif, .mp4) of a results file. Returns notes on what could not be drawn as it is.
-
-    Raises `InputError` where the results cannot be read, have no such analysis or none that goes through time, or for
-    another suffix; `SolveError` where the movie cannot be made or written.
-    """
-    options = options or MovieOptions()
-    notes: list[str] = []
-    check_movie(path)
-    with Results(results_path) as results, style():
-        analysis = moving_analysis(results, options.analysis)
-        write_movie(path, _frames(results, analysis, options, notes))
-    return list(dict.fromkeys(notes))
+    """As `make_movie`, drawn by matplotlib."""
+    with style():
+        return make_movie(results_path, path, options, _frames)
 
 
-def _frames(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
+def _frames(
+    results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
+) -> Iterator[Frame]:
     """One after the other; of planar scenes seen along z, of 3D ones from a corner."""
-    time = results.time(analysis)
-    frames, shown = np.unique(movie_outputs(time, options.seconds), return_inverse=True)
-    scene = moving_scene(results, analysis, frames, options.scale, notes)
+    scene = moving_scene(results, analysis, outputs, scale, notes)
     exaggerated = "" if scene.scale == 1.0 else f", deformations × {scene.scale:g}"
-    picture = _Picture(results, f"{results.name}: {analysis}{exaggerated}", time[frames], scene)
+    picture = _Picture(results, f"{results.name}: {analysis}{exaggerated}", results.time(analysis)[outputs], scene)
     for k in shown:
         yield picture.at(int(k))
 

@@ -16,7 +16,7 @@ from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from ..figures.shared import file_name
 from ..motion import Marker, ground_places, joint_markers, moving_bodies, targets, tool_markers, visible_exaggeration
-from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
+from ..movie_file import Frame, MovieOptions, make_movie
 from .pictures import Picture, draw_pictures
 from .vtkhdf import Grid, modes_grid, results_grid, vtkhdf_image
 
@@ -179,33 +179,25 @@ def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
 
 
 def view_movie(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
-    """Write a movie (.gif, .mp4) of a results file. Returns notes on what could not be drawn as it is.
-
-    Raises `InputError` where the results cannot be read, have no such analysis or none that goes through time, or for
-    another suffix; `SolveError` where the movie cannot be made or written.
-    """
-    options = options or MovieOptions()
-    notes: list[str] = []
-    check_movie(path)
+    """As `make_movie`, rendered by PyVista."""
     if is_modal_body_file(results_path):
         raise InputError(f"{results_path}: movie: expected a results file, found a modal body: it does not move")
-    with Results(results_path) as results, tempfile.TemporaryDirectory() as place:
-        analysis = moving_analysis(results, options.analysis)
-        outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
-        grid = results_grid(results, analysis, outputs, notes)
-        steps = tuple(range(len(outputs)))
-        scale = visible_scale(grid, steps) if options.scale is None else options.scale
-        picture = motion_picture(results, analysis, outputs, grid, steps, scale, "deflection")
+    return make_movie(results_path, path, options, _rendered)
+
+
+def _rendered(
+    results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
+) -> Iterator[Frame]:
+    """The frames of a movie, which are drawn all at once."""
+    from PIL import Image
+
+    grid, steps = results_grid(results, analysis, outputs, notes), tuple(range(len(outputs)))
+    scale = visible_scale(grid, steps) if scale is None else scale
+    picture = motion_picture(results, analysis, outputs, grid, steps, scale, "deflection")
+    with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "grid.vtkhdf"
         write_atomically(file, vtkhdf_image(grid), "grid", ours=True)
         draw_pictures([replace(picture, grid=str(file), path=place, movie=True)])
-        write_movie(path, _images(Path(place), [int(k) for k in shown]))
-    return list(dict.fromkeys(notes))
-
-
-def _images(folder: Path, shown: Sequence[int]) -> Iterator[Frame]:
-    from PIL import Image
-
-    for k in shown:
-        with Image.open(folder / f"{k:05d}.png") as image:
-            yield np.asarray(image.convert("RGB"))
+        for k in shown:
+            with Image.open(Path(place) / f"{k:05d}.png") as image:
+                yield np.asarray(image.convert("RGB"))
