@@ -52,28 +52,20 @@ class Controller(Protocol):
 
 @struct
 class Setup:
-    """What a controller may know when it is made.
+    """What a controller may know when it is made."""
 
-    Attributes:
-        robot: what is known of it; see `robot.Robot`.
-        model: its equations of motion; `patches` by body.
-        inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them.
-        times: (K,) of the samples, s; `sample_time`, and the `delay` after which a command acts.
-        reference: (K, outputs) what the sensors would read on the motion of the inverse analysis `source`.
-        feed_forward: (K, inputs) what is commanded anyhow.
-    """
-
-    robot: Robot
-    model: Model
-    patches: Mapping[str, LinkPatches]
+    robot: Robot  # what is known of it; see `robot.Robot`
+    model: Model  # its equations of motion
+    patches: Mapping[str, LinkPatches]  # by body
+    # inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    times: Array
-    sample_time: float
-    delay: float
-    reference: Array
-    feed_forward: Array
-    source: Outcome
+    times: Array  # (K,) of the samples, s
+    sample_time: float  # s
+    delay: float  # s, after which a command acts
+    reference: Array  # (K, outputs) what the sensors would read on the motion of `source`
+    feed_forward: Array  # (K, inputs) what is commanded anyhow
+    source: Outcome  # of the inverse analysis
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Joints with the names of their coordinates, one after the other."""

@@ -38,17 +38,11 @@ class Integrals:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Invariants(Integrals):
-    """With the inertia of lines of mass about their axis, along which φ is the twist of the modes.
+    """With the inertia of lines of mass about their axis, along which φ is the twist of the modes."""
 
-    Attributes:
-        J_spin: J_s = ∫ρI_p dx in kg·m².
-        h_spin: (n,) h_s = ∫ρI_p φ dx.
-        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx.
-    """
-
-    J_spin: float
-    h_spin: Array
-    S_spin: Array
+    J_spin: float  # J_s = ∫ρI_p dx in kg·m²
+    h_spin: Array  # (n,) h_s = ∫ρI_p φ dx
+    S_spin: Array  # (n, n) S_s = ∫ρI_p φᵀφ dx
 
 
 class Frozen:
@@ -73,100 +67,67 @@ def _frozen(value: object) -> object:
 
 @struct
 class Interface(Frozen):
-    """What the modes do at one point of the axis, in the link's frame.
+    """What the modes do at one point of the axis, in the link's frame."""
 
-    Attributes:
-        position: (3,) in m, undeformed.
-        translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
-        rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
-        coupling: of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so.
-    """
-
-    position: Array
-    translation: Array
-    rotation: Array
+    position: Array  # (3,) in m, undeformed
+    translation: Array  # (3, n) displacement of mode l in column l, in m per unit of its modal coordinate
+    rotation: Array  # (3, n) small rotation of the cross section, in rad per unit of modal coordinate
+    # of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so
     coupling: str = ""
 
 
 @struct
 class Stations(Frozen):
-    """Points along the axis, ascending in x, at which the modes are known.
+    """Points along the axis, ascending in x, at which the modes are known."""
 
-    Attributes:
-        position: (k, 3) in m.
-        translation: (k, 3, n), as in `Interface`.
-        rotation: (k, 3, n), as in `Interface`.
-        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
-            taper, the height in the middle between the two).
-        element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
-        outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
-            known.
-        rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
-        width: (k,) extent along z in m, likewise.
-        out_of_plane_rigidity: (k,) EI in N·m² of bending along z, likewise.
-        torsional_rigidity: (k,) GJ in N·m², likewise.
-    """
-
-    position: Array
-    translation: Array
-    rotation: Array
+    position: Array  # (k, 3) in m
+    translation: Array  # (k, 3, n), as in `Interface`
+    rotation: Array  # (k, 3, n), as in `Interface`
+    # (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a taper, the
+    # height in the middle between the two)
     height: Array
+    # (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known
     element: Integers | None = None
+    # (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not known
     outline: Array | None = None
+    # (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known
     rigidity: Array | None = None
-    width: Array | None = None
-    out_of_plane_rigidity: Array | None = None
-    torsional_rigidity: Array | None = None
+    width: Array | None = None  # (k,) extent along z in m, likewise
+    out_of_plane_rigidity: Array | None = None  # (k,) EI in N·m² of bending along z, likewise
+    torsional_rigidity: Array | None = None  # (k,) GJ in N·m², likewise
 
 
 @struct
 class PictureMesh(Frozen):
-    """What a picture of the link needs.
+    """What a picture of the link needs."""
 
-    Attributes:
-        points: (p, 3) in m.
-        cells: (c, v) points of each cell.
-        mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
-        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
-    """
-
-    points: Array
-    cells: Integers
-    mode_shapes: Array
+    points: Array  # (p, 3) in m
+    cells: Integers  # (c, v) points of each cell
+    mode_shapes: Array  # (p, 3, n) displacement per unit of modal coordinate
+    # (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture
     edges: Integers | None = None
 
 
 @struct
 class StressPoint(Frozen):
-    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
+    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy."""
 
-    Attributes:
-        position: (3,) in m, undeformed.
-        stress: (6, n) in Pa per unit of modal coordinate.
-        strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
-        static: (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link held by its reference
-            condition; None where not known.
-    """
-
-    position: Array
-    stress: Array
+    position: Array  # (3,) in m, undeformed
+    stress: Array  # (6, n) in Pa per unit of modal coordinate
+    # (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain
     strain: Array
+    # (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link held by its reference condition; None
+    # where not known
     static: Array | None = None
 
 
 @struct
 class MeasuredValues(Frozen):
-    """Which values of the modes were measured, and what the finite element model says in the place of frequencies.
+    """Which values of the modes were measured, and what the finite element model says in the place of frequencies."""
 
-    Attributes:
-        frequency: (n,) 1 of modes whose `ModalBody.frequency` was measured, else 0.
-        damping_ratio: (n,) likewise, of `ModalBody.damping_ratio`.
-        computed_frequency: (n,) in Hz, of the finite element model.
-    """
-
-    frequency: Integers
-    damping_ratio: Integers
-    computed_frequency: Array
+    frequency: Integers  # (n,) 1 of modes whose `ModalBody.frequency` was measured, else 0
+    damping_ratio: Integers  # (n,) likewise, of `ModalBody.damping_ratio`
+    computed_frequency: Array  # (n,) in Hz, of the finite element model
 
     def in_words(self) -> str:
         """Which modes they are, counted from 1."""
@@ -178,17 +139,11 @@ class MeasuredValues(Frozen):
 
 @struct
 class OutlinedPatches(Frozen):
-    """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
+    """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y."""
 
-    Attributes:
-        edges: (k, 2) begin and end of each patch, m from the root.
-        width: along z, in m.
-        top: (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force
-            (N/m, positive in tension), in m² per unit of modal coordinate; None where no patches are on that face.
-        bottom: (k, n) likewise.
-    """
-
-    edges: Array
-    width: float
+    edges: Array  # (k, 2) begin and end of each patch, m from the root
+    width: float  # along z, in m
+    # (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force (N/m,
+    # positive in tension), in m² per unit of modal coordinate; None where no patches are on that face
     top: Array | None = None
-    bottom: Array | None = None
+    bottom: Array | None = None  # (k, n) likewise
