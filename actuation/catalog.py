@@ -12,7 +12,7 @@ from pydantic import Field
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..common.numbers import NotNegative, Positive
+from ..common.keys import NotNegative, Positive
 from ..common.peaks import root_mean_square
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import Record, validate

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from .errors import SolveError
 
-PACKAGES: Mapping[str, str] = {
-    "matplotlib": "matplotlib",
-    "plotly": "plotly",
-    "jinja2": "jinja2",
-    "pyvista": "pyvista",
-    "imageio_ffmpeg": "imageio-ffmpeg",
-    "pandas": "pandas",
-    "xarray": "xarray",
-    "control": "control",
-    "rosbags": "rosbags",
-    "trimesh": "trimesh pycollada",
-}
+SAME = ("matplotlib", "plotly", "jinja2", "pyvista", "pandas", "xarray", "control", "rosbags")
+PACKAGES = {name: name for name in SAME} | {"imageio_ffmpeg": "imageio-ffmpeg", "trimesh": "trimesh pycollada"}
 """What pip installs for each of these libraries."""
 
 

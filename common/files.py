@@ -78,7 +78,8 @@ def check_output(path: Path, file_format: str) -> None:
         raise InputError(f"{path}: output: expected a file name, found a folder")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
-    if path.exists() and not (path.is_file() and _is_of_format(path, file_format)):  # no device, ever
+    replaceable = ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)
+    if path.exists() and not (path.is_file() and kind_of_file(path) in replaceable):  # no device, ever
         raise InputError(
             f'{path}: output: expected a new name or an earlier file of format "{file_format}", found a file of another'
             " kind"
@@ -109,7 +110,3 @@ def check_new_folder(folder: Path) -> None:
     check_folder(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InputError(f"{folder}: output: expected a new or empty folder, found one with files in it")
-
-
-def _is_of_format(path: Path, file_format: str) -> bool:
-    return kind_of_file(path) in ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)

@@ -154,10 +154,7 @@ def unit(vector: Array) -> Array:
 
 
 def smallest_turn(axis: Array) -> Array:
-    """The triad (3, 3), columns its axes, whose z is along `axis`: the smallest rotation that brings z there.
-
-    Of −z, a half turn about x.
-    """
+    """The triad (3, 3) in columns by the smallest rotation that brings z onto `axis`; of −z a half turn about x."""
     z = unit(np.asarray(axis, dtype=float))
     S, cosine, square = skew(np.cross([0.0, 0.0, 1.0], z)), z[2], z[0] ** 2 + z[1] ** 2  # Rodrigues: S = sin φ n~
     if cosine > 0.0:

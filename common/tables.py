@@ -20,10 +20,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def as_csv(rows: Iterable[Iterable[object]]) -> str:
-    """Lines of a CSV file (RFC 4180), numbers with all their digits.
-
-    Text that a spreadsheet would run has an apostrophe before it.
-    """
+    """Lines of a CSV file (RFC 4180), with all digits, and an apostrophe before text that a spreadsheet would run."""
     text = io.StringIO()
     cells = ([f"'{cell}" if _is_formula(cell) else cell for cell in row] for row in rows)
     csv.writer(text, lineterminator="\n").writerows(cells)
@@ -41,10 +38,7 @@ def _is_formula(cell: object) -> bool:
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass").
-
-    Parts that name the alternative of a union rather than a key of the file are left out.
-    """
+    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass"); alternatives of unions are left out."""
     path = ""
     here: Any = data
     for k, part in enumerate(loc):

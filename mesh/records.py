@@ -7,12 +7,13 @@ end of the segment before (from the root, for the first) to `until` (m from the 
 A solid has a `section` as a beam has, drawn out along x, or comes from a `file`.
 """
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..common.names import Name, Title
-from ..common.numbers import NotNegative, Positive, Vector3
+from ..common.keys import Name, NotNegative, Positive, Title, Vector3
 from ..common.structs import struct
 from ..common.validation import InputFile, Record
 from .cells import CellName
@@ -172,6 +173,17 @@ class Outlines:
     edges: tuple[tuple[float, float], ...]  # begin and end of each along x, m from the root
     width: float  # of all along z, m
     faces: Literal["top", "bottom", "both"] = "both"  # "top" at the largest y, "bottom" at the smallest
+
+
+@struct
+class PartTables:
+    """The tables of a link file that make a part."""
+
+    path: Path  # of the file: messages name it
+    geometry: SolidGeometry
+    mesh: SolidMeshRecord = SolidMeshRecord.model_construct()
+    places: Sequence[PlaceRecord] = ()  # tables `interface`
+    outlines: Outlines | None = None  # of patches, in the mesh
 
 
 # Elements along a full circle of a curved face, and along that of a solid bar: there, where a cell has two edges on the

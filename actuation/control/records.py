@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from ...common.deferred import ReadBy
 from ...common.errors import quoted
-from ...common.numbers import MOST_OUTPUTS
+from ...common.keys import MOST_OUTPUTS
 from ...common.python_files import check_python_file
 from ...common.validation import Record, existing_file
 from ...mbs._core import TimeFunction
@@ -197,10 +197,7 @@ def _python_function(value: object, info: ValidationInfo) -> object:
 
 
 class PythonController(ControllerRecord):
-    """A user's function: "FILE.py:FUNCTION" next to the scene, or the function itself in scenes made in Python.
-
-    See `actuation.control.controllers`.
-    """
+    """A user's function: "FILE.py:FUNCTION" next to the scene, or the function itself in scenes made in Python."""
 
     kind: Literal["python"]
     python: Annotated[Any, ReadBy(_python_function, str)]

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from ...common.arrays import Array
 from ...common.errors import quoted
-from ...common.numbers import MOST_PATCHES, SMALLEST
+from ...common.keys import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
 from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written

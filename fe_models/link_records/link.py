@@ -1,18 +1,19 @@
 """A whole link file as records: what stage 1 reads, checked key by key. `geometry.kind` picks beam or solid."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ...common.names import Name, Title
-from ...common.numbers import MOST_MODES, MOST_PATCHES, ModeCount, NotNegative, PatchCount, Positive, Vector3
+from ...common.keys import MOST_MODES, MOST_PATCHES, ModeCount, Name, NotNegative, PatchCount, Positive, Title, Vector3
 from ...common.validation import Record
 from ...mesh.records import (
     BeamGeometry,
     BeamMesh,
     CircleSection,
     Outlines,
+    PartTables,
     PlaceRecord,
     RectangleSection,
     SectionRecord,
@@ -107,8 +108,7 @@ def _symmetry(material: object) -> str:
 
 
 SolidMaterial = Annotated[
-    Annotated[Material, Tag("isotropic")] | Annotated[OrthotropicMaterial, Tag("orthotropic")],
-    Discriminator(_symmetry),
+    Annotated[Material, Tag("isotropic")] | Annotated[OrthotropicMaterial, Tag("orthotropic")], Discriminator(_symmetry)
 ]
 
 
@@ -281,6 +281,11 @@ class SolidLink(_Link):
     def coupling(self) -> Coupling:
         """How the supports of the reference condition hold the end faces."""
         return self.reference.coupling or ("rigid" if self.reference.holds_root else "mean")
+
+    def part(self, path: Path) -> PartTables:
+        """What its mesh is made of; `path` is the link file."""
+        outlines = self.surface_patch.outlines(self.geometry.length) if self.surface_patch else None
+        return PartTables(path, self.geometry, self.mesh, self.interface, outlines)
 
     @property
     def couplings(self) -> dict[str, Coupling]:

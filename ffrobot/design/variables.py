@@ -17,7 +17,7 @@ import numpy as np
 
 from ..actuation.catalog import CatalogMotor, read_catalog
 from ..common.errors import InputError
-from ..common.numbers import MOST_RUNS
+from ..common.keys import MOST_RUNS
 from ..common.tables import shown
 from ..sweep.files import number_at, value_at
 from ..sweep.sweep import Key, check_once

@@ -23,7 +23,7 @@ from ..common.arrays import Array, Booleans, Indices
 from ..common.errors import InputError, SolveError, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
 from ..common.interrupts import SIGNALS, end_with_parent
-from ..common.numbers import MOST_RUNS
+from ..common.keys import MOST_RUNS
 from ..common.tables import shown
 from ..mbs.fields.field_types import Quantity
 from ..mbs.scene.space import SPACES

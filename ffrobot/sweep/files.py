@@ -12,7 +12,7 @@ import tomli_w
 
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import write_atomically
-from ..common.names import check_name
+from ..common.keys import check_name
 from ..common.tables import shown
 from ..common.toml_files import load_toml
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..common.errors import InputError
-from ..common.numbers import MOST_RUNS
+from ..common.keys import MOST_RUNS
 from ..common.tables import DEEPEST, shown
 
 Value: TypeAlias = Any

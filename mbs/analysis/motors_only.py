@@ -20,7 +20,7 @@ from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
-from ...common.numbers import MOST_OUTPUTS
+from ...common.keys import MOST_OUTPUTS
 from ...common.structs import struct
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline

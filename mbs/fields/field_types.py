@@ -12,13 +12,13 @@ from pydantic import AfterValidator, ValidationInfo
 
 from ...common.deferred import ReadBy
 from ...common.errors import quoted
-from ...common.names import Name as Name  # offered here, with the other types of keys
-from ...common.numbers import ModeCount as ModeCount
-from ...common.numbers import NotNegative as NotNegative
-from ...common.numbers import PatchCount as PatchCount
-from ...common.numbers import Positive as Positive
-from ...common.numbers import Vector2 as Vector2
-from ...common.numbers import Vector3 as Vector3
+from ...common.keys import ModeCount as ModeCount
+from ...common.keys import Name as Name  # offered here, with the other types of keys
+from ...common.keys import NotNegative as NotNegative
+from ...common.keys import PatchCount as PatchCount
+from ...common.keys import Positive as Positive
+from ...common.keys import Vector2 as Vector2
+from ...common.keys import Vector3 as Vector3
 from ...common.tables import LARGEST, shown
 from ...common.validation import Record, existing_file
 from .._core import TimeFunction
@@ -132,8 +132,7 @@ Side = Annotated[str, AfterValidator(_side)]
 Quantity = Annotated[float, ReadBy(_quantity, str | float)]
 Expression = Annotated[TimeFunction, ReadBy(_time_function, str | float)]
 Expressions = Annotated[
-    TimeFunction | tuple[TimeFunction, ...],
-    ReadBy(_time_functions, str | float | list[str | float]),
+    TimeFunction | tuple[TimeFunction, ...], ReadBy(_time_functions, str | float | list[str | float])
 ]
 WaypointTable = Annotated[Waypoints, ReadBy(_waypoints, str)]
 KeptSteps = Annotated[Steps, ReadBy(_steps, str)]

@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_args
 from pydantic import ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationInfo, ValidatorFunctionWrapHandler
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
-from ...common.numbers import Vector2, Vector3
+from ...common.keys import Vector2, Vector3
 from ...common.validation import OnlyIn, Record, as_tuples, is_key, space_of
 
 PLANAR, SPATIAL = "planar", "spatial"

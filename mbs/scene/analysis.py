@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import did_you_mean, either, quoted
-from ...common.numbers import MOST_OUTPUTS, MOST_STEPS
+from ...common.keys import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import KeptSteps, Name, Positive, Referring

@@ -8,8 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
 from ...common.deferred import ReadBy, Table
-from ...common.names import PathName
-from ...common.numbers import MOST_MODES, SMALLEST
+from ...common.keys import MOST_MODES, SMALLEST, PathName
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_source import LinkSource, LinkTable
 from ..fields.field_types import (

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, PrivateAttr
 
 from ...common.deferred import Table
-from ...common.names import Title
+from ...common.keys import Title
 from ...common.validation import Record
 from ..fields.field_types import NotEmpty, Quantity, Reference, Referring, under
 from ..fields.spelling import IN_PLANE, Spelled, Vector, as_written

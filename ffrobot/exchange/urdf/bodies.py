@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_rows
 from ...common.errors import InputError, quoted
-from ...common.numbers import SMALLEST
+from ...common.keys import SMALLEST
 from ...common.tables import shown
 from ...mbs.scene.bodies import ROUNDING, check_inertia
 from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ...common.names import LONGEST_NAME
+from ...common.keys import LONGEST_NAME
 
 FORBIDDEN = str.maketrans({"/": "_", ".": "_"})
 
@@ -41,7 +41,7 @@ class Names:
 
 
 def _allowed(name: str) -> str:
-    """Without what `common.names.check_name` refuses."""
+    """Without what `common.keys.check_name` refuses."""
     printable = "".join(c if c.isprintable() else "_" for c in name.translate(FORBIDDEN)).strip()
     return printable[: LONGEST_NAME - 4] if len(printable) > LONGEST_NAME else printable or "_"
 

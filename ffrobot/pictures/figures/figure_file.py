@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from ...common.numbers import Positive
+from ...common.keys import Positive
 from ...common.toml_files import load_toml
 from ...common.validation import InputFile, Record, validate
 
