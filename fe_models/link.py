@@ -176,7 +176,7 @@ def _compute(
 
     if on_first(from_same_modes):
         return LinkOutcome(path, read_modal_body(path), True, time.perf_counter() - start, "modes")
-    meshed = on_first(lambda: not force and _has_mesh(link))
+    meshed = on_first(lambda: not force and isinstance(link, SolidLink) and kept_path(link.part(source_path)).is_file())
     compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
@@ -202,14 +202,6 @@ def _with_same_modes(link: Link, earlier: Sequence[Path]) -> ModalBody | None:
             if body.modes_hash == wanted and (same := restated(body, link)) is not None:
                 return same
     return None
-
-
-def _has_mesh(link: Link) -> bool:
-    """Whether the mesh of the link is kept from an earlier run."""
-    if not isinstance(link, SolidLink):
-        return False
-    outlines = link.surface_patch.outlines(link.geometry.length) if link.surface_patch else None
-    return kept_path(link.geometry, link.mesh, link.interface, outlines).is_file()
 
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:

@@ -25,32 +25,27 @@ def read_link(source: LinkSource) -> Link:
     data, path = link_keys(source), link_path(source)
     geometry = data.get("geometry")
     kind = geometry.get("kind", "beam") if isinstance(geometry, dict) else "beam"
-    if kind == "solid":
-        return _solid_link(validate(SolidLink, data, path), path)
-    if kind != "beam":
+    link: Link
+    if kind == "beam":
+        link = beam = validate(BeamLink, data, path)
+        _check_beam_geometry(beam, path)
+        _check_beam_mesh(beam, path)
+        _check_beam_interfaces(beam, path)
+    elif kind == "solid":
+        link = solid = validate(SolidLink, data, path)
+        _check_shape(solid, path)
+        _check_solid_mesh(solid, path)
+        _check_solid_interfaces(solid, path)
+    else:
         _reject(path, "geometry.kind", '"beam" or "solid"', repr(kind))
-    return _beam_link(validate(BeamLink, data, path), path)
-
-
-def _beam_link(link: BeamLink, path: Path) -> BeamLink:
-    _check_beam_geometry(link, path)
-    _check_beam_mesh(link, path)
-    _check_beam_interfaces(link, path)
     _check_modes(link, path)
     _check_measured(link, path)
-    _check_beam_material(link, path)
-    _check_beam_stress(link, path)
-    return link
-
-
-def _solid_link(link: SolidLink, path: Path) -> SolidLink:
-    _check_shape(link, path)
-    _check_solid_mesh(link, path)
-    _check_solid_interfaces(link, path)
-    _check_modes(link, path)
-    _check_measured(link, path)
-    _check_solid_materials(link, path)
-    _check_surface_patches(link, path)
+    if isinstance(link, BeamLink):
+        _check_beam_material(link, path)
+        _check_beam_stress(link, path)
+    else:
+        _check_solid_materials(link, path)
+        _check_surface_patches(link, path)
     return link
 
 
@@ -64,18 +59,18 @@ def _check_beam_geometry(link: BeamLink, path: Path) -> None:
     if ends and ends[-1] != geometry.length:
         _reject(path, "geometry.segment", f"the last until at the length, {geometry.length}", ends[-1])
     for record in [geometry.section, *(segment.section for segment in geometry.segment or ())]:
-        _check_section(record, "geometry.section", path)
+        _check_section(record, path)
         if isinstance(record, RectangleSection) and record.wall is not None:
             _reject(path, "geometry.section.wall", 'no wall where geometry.kind = "beam"', record.wall)
 
 
-def _check_section(record: SectionRecord | None, key: str, path: Path) -> None:
+def _check_section(record: SectionRecord | None, path: Path) -> None:
     if isinstance(record, TubeSection) and record.inner >= record.outer:
-        _reject(path, f"{key}.inner", f"less than outer, {record.outer}", record.inner)
+        _reject(path, "geometry.section.inner", f"less than outer, {record.outer}", record.inner)
     if isinstance(record, RectangleSection) and record.wall is not None:
         half = min(record.height, record.width) / 2
         if record.wall >= half:
-            _reject(path, f"{key}.wall", f"less than half of height and width, {half:g}", record.wall)
+            _reject(path, "geometry.section.wall", f"less than half of height and width, {half:g}", record.wall)
 
 
 def _check_beam_mesh(link: BeamLink, path: Path) -> None:
@@ -171,7 +166,7 @@ def _check_shape(link: SolidLink, path: Path) -> None:
     geometry = link.geometry
     if (geometry.section is None) == (geometry.file is None):
         _reject(path, "geometry", "either section or file", _both_or_neither(geometry.section))
-    _check_section(geometry.section, "geometry.section", path)
+    _check_section(geometry.section, path)
     tip = geometry.tip_section
     if tip is not None and (
         not isinstance(tip, RectangleSection)

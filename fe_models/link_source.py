@@ -13,13 +13,10 @@ from ..common.toml_files import load_toml
 
 @dataclass(frozen=True)
 class LinkTable:
-    """The `keys` of a link file that stand elsewhere.
-
-    Messages call them `path`, in whose folder files are that they name.
-    """
+    """The content of a link file that stands elsewhere."""
 
     keys: Mapping[str, Any]
-    path: Path
+    path: Path  # messages call it so; files that the keys name are in its folder
 
 
 LinkSource = Path | LinkTable

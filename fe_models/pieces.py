@@ -84,12 +84,7 @@ def _place(x: float, length: float, count: int) -> tuple[int, str]:
 
 
 def _piece(
-    link: BeamLink,
-    path: Path,
-    k: int,
-    count: int,
-    places: Mapping[str, tuple[int, str]],
-    allowed: Sequence[Family],
+    link: BeamLink, path: Path, k: int, count: int, places: Mapping[str, tuple[int, str]], allowed: Sequence[Family]
 ) -> dict[str, Any]:
     """The keys of the link file of piece k."""
     record = link.model_dump(mode="json", exclude_none=True)

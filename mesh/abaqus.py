@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -64,17 +66,15 @@ class _Assembled:
         self.points = np.concatenate([instance.points() for instance in self.scopes.values()])
 
     def mesh(self) -> RawMesh:
-        kinds: list[str] = []
-        cells: list[tuple[int, ...]] = []
+        cells: list[tuple[str, list[int]]] = []
         for name, instance in self.scopes.items():
             for number, (kind, nodes) in instance.scope.solids.items():
-                kinds.append(kind)
-                cells.append(tuple(self._node(name, node, f"element {number}") for node in nodes))
+                cells.append((kind, [self._node(name, node, f"element {number}") for node in nodes]))
         same, remarks = self._tied()
         blocks = list[tuple[str, Integers]]()
-        for begin, end in _runs(kinds):
-            block = same[np.array(cells[begin:end], dtype=np.int64)]
-            blocks.append((kinds[begin], in_gmsh_order(kinds[begin], block)))
+        for kind, run in groupby(cells, key=itemgetter(0)):
+            block = same[np.array([nodes for _, nodes in run], dtype=np.int64)]
+            blocks.append((kind, in_gmsh_order(kind, block)))
         faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
         groups = {name: same[group] for name, group in self._node_sets().items()}
         return RawMesh(
@@ -249,12 +249,3 @@ def _is_read(surface: Keyword, row: list[str]) -> bool:
     if surface.options.get("TYPE", "ELEMENT").upper() == "NODE":
         return True
     return len(row) > 1 and _SIDE.fullmatch(row[1].upper()) is not None and "COMBINE" not in surface.options
-
-
-def _runs(kinds: list[str]) -> Iterator[tuple[int, int]]:
-    """Begin and end of each run of equal entries."""
-    begin = 0
-    for end in range(1, len(kinds) + 1):
-        if end == len(kinds) or kinds[end] != kinds[begin]:
-            yield begin, end
-            begin = end

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..common.arrays import Array, Integers, as_floats
+from ..common.arrays import Array, Integers
 from ..common.structs import struct
 
 CellName = Literal["tetrahedron", "hexahedron"]
@@ -42,9 +42,7 @@ HEXAHEDRON = Cell(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.float64
     ),
     facets=np.array([[0, 3, 2, 1], [0, 1, 5, 4], [0, 4, 7, 3], [1, 2, 6, 5], [2, 3, 7, 6], [4, 5, 6, 7]]),
-    edges=np.array(
-        [[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]],
-    ),
+    edges=np.array([[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]]),
     nodes={1: 8, 2: 27},
 )
 
@@ -123,7 +121,8 @@ def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
 
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
     """(c, q, 3, 3) derivatives ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
-    slopes = _monomial_slopes(cell, degree, X) @ _coefficients(cell, degree)  # (3, q, v)
+    at_nodes = [np.prod(reference_nodes(cell, degree) ** powers, axis=1) for powers in _exponents(cell, degree)]
+    slopes = _monomial_slopes(cell, degree, X) @ np.linalg.inv(np.stack(at_nodes, axis=1))  # (3, q, v)
     return np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
 
 
@@ -147,14 +146,6 @@ def cell_quality(corners: Array, cell: CellName) -> Array:
         return np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
     sides = np.prod(np.linalg.norm(J, axis=2), axis=2)
     return np.min(determinants / np.maximum(sides, 1e-300), axis=1)
-
-
-def _coefficients(cell: CellName, degree: int) -> Array:
-    return as_floats(np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree))))
-
-
-def _monomials(cell: CellName, degree: int, X: Array) -> Array:
-    return np.stack([np.prod(X**powers, axis=1) for powers in _exponents(cell, degree)], axis=1)
 
 
 def _monomial_slopes(cell: CellName, degree: int, X: Array) -> Array:

@@ -5,7 +5,6 @@ All sources are treated alike: the facets that only one cell has, their normals,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +18,7 @@ from ..common.arrays import Array, Integers, NDArray
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.structs import struct
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
-from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry
+from .records import Outlines, PartTables, PlaceRecord, RectangleSection, SolidGeometry
 from .source import Source
 
 Choice = Integers
@@ -111,32 +110,26 @@ class SmoothFace:
         return f"center {_show(self.center)} m, {facing} {_show(np.round(direction, 2))}, {self.area:.4g} m²"
 
 
-def named_faces(
-    source: Source,
-    geometry: SolidGeometry,
-    places: Sequence[PlaceRecord],
-    outlines: Outlines | None,
-    path: Path,
-) -> PartMesh:
+def named_faces(source: Source, tables: PartTables) -> PartMesh:
     """The part of `source`, placed, with its faces named and tagged.
 
     Raises `InputError`, with the faces that the part has, where a face is not there, or two overlap.
     """
-    part = source.part
+    part, geometry, path = source.part, tables.geometry, tables.path
     boundary = Boundary.of(part)
     chosen: dict[str, Choice] = {}
-    tables = {item.name: item for item in places}
+    by_name = {item.name: item for item in tables.places}
     for name, x, outward in (("root", 0.0, -1.0), ("tip", geometry.length, 1.0)):
-        table = tables.get(name)
+        table = by_name.get(name)
         if table is None or (table.group is None and table.position is None):
             chosen[name] = _end_face(boundary, name, x, outward, geometry.length, path)
-    for table in places:
+    for table in tables.places:
         if table.group is not None:
             chosen[table.name] = _group(source, boundary, table.group, f"{path}: interface.group of {table.name}")
         elif isinstance(table.position, tuple):
             chosen[table.name] = _nearest(boundary, table, path)
-    if outlines is not None:
-        chosen |= _patch_beds(boundary, geometry, outlines, path)
+    if tables.outlines is not None:
+        chosen |= _patch_beds(boundary, geometry, tables.outlines, path)
     return _tagged(part, boundary, chosen, path)
 
 

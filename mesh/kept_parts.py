@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from io import BytesIO
@@ -22,7 +21,7 @@ from ..common.errors import SolveError
 from ..common.files import write_atomically
 from ..common.version import digest_of_code
 from .included import files_of
-from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
+from .records import PartTables, PlaceRecord, SolidGeometry
 
 if TYPE_CHECKING:
     from .part_mesh import PartMesh
@@ -48,20 +47,16 @@ def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
     return record
 
 
-def kept_path(
-    geometry: SolidGeometry,
-    record: SolidMeshRecord,
-    places: Sequence[PlaceRecord],
-    outlines: Outlines | None,
-) -> Path:
+def kept_path(tables: PartTables) -> Path:
     """Where in the cache the mesh of a part is, or would be."""
+    file = tables.geometry.file
     content = {
         "code": digest_of_mesh_code(),
-        "geometry": geometry_content(geometry),
-        "suffix": geometry.file.suffix.lower() if geometry.file is not None else "",
-        "mesh": record.model_dump(mode="json"),
-        "interfaces": [item.model_dump(mode="json", include=_OF_PLACES) for item in places],
-        "outlines": asdict(outlines) if outlines else None,
+        "geometry": geometry_content(tables.geometry),
+        "suffix": file.suffix.lower() if file is not None else "",
+        "mesh": tables.mesh.model_dump(mode="json"),
+        "interfaces": [item.model_dump(mode="json", include=_OF_PLACES) for item in tables.places],
+        "outlines": asdict(tables.outlines) if tables.outlines else None,
     }
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     return user_cache_path("ffrobot") / "meshes" / f"{digest}.npz"

@@ -5,7 +5,7 @@ Runs on one process; gmsh and meshio are loaded where they are used.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from math import prod
 from pathlib import Path
@@ -31,15 +31,7 @@ from .kept_parts import keep_part, kept_part, kept_path
 from .mesh_files import read_mesh
 from .part_mesh import PartMesh
 from .part_reader import read_apart
-from .records import (
-    Outlines,
-    PlaceRecord,
-    RectangleSection,
-    SolidGeometry,
-    SolidMeshRecord,
-    default_order,
-    default_size,
-)
+from .records import PartTables, RectangleSection, SolidGeometry, SolidMeshRecord, default_order, default_size
 from .source import Source, source_from
 from .structured import Divisions, structured_box
 
@@ -48,43 +40,28 @@ Progress = Callable[[str], None]
 _STEP = (".step", ".stp")
 
 
-def kept_or_new(
-    geometry: SolidGeometry,
-    record: SolidMeshRecord,
-    places: Sequence[PlaceRecord],
-    outlines: Outlines | None,
-    path: Path,
-    progress: Progress,
-    *,
-    remesh: bool,
-) -> PartMesh:
+def kept_or_new(tables: PartTables, progress: Progress, *, remesh: bool) -> PartMesh:
     """`part_mesh`, or what it made of the same part before, where gmsh would have to make it and not `remesh`."""
-    if not _is_meshed(geometry, record):
-        return part_mesh(geometry, record, places, outlines, path, progress)
-    kept = kept_path(geometry, record, places, outlines)
+    if not _is_meshed(tables):
+        return part_mesh(tables, progress)
+    kept = kept_path(tables)
     part = None if remesh else kept_part(kept)
     if part is None:
-        part = part_mesh(geometry, record, places, outlines, path, progress)
+        part = part_mesh(tables, progress)
         keep_part(kept, part)
     return part
 
 
-def part_mesh(
-    geometry: SolidGeometry,
-    record: SolidMeshRecord,
-    places: Sequence[PlaceRecord],
-    outlines: Outlines | None,
-    path: Path,
-    progress: Progress,
-) -> PartMesh:
+def part_mesh(tables: PartTables, progress: Progress) -> PartMesh:
     """Make or read the part of a link file, put it into the link's frame, check it, name its faces.
 
-    `record` is its table `mesh`, `places` are its tables `interface`. Raises `InputError`, which names `path`, where
-    the part cannot be read or meshed, its mesh is unsound, or a face is not there.
+    Raises `InputError`, which names the link file, where the part cannot be read or meshed, its mesh is unsound, or a
+    face is not there.
     """
-    where = f"{path}: geometry" if geometry.file is None else f"{path}: geometry.file: {geometry.file.name}"
+    geometry, where = tables.geometry, f"{tables.path}: geometry"
+    where = where if geometry.file is None else f"{where}.file: {geometry.file.name}"
     progress("meshing" if geometry.file is None or is_step(geometry.file) else f"reading {geometry.file.name}")
-    source = _source(geometry, record, outlines, path, where)
+    source = _source(tables, where)
     part = _placed(source.part, geometry) if geometry.file is not None else source.part
     check_shape(part, geometry, where)
     part = oriented(part)
@@ -96,14 +73,14 @@ def part_mesh(
     check_connected(part, where)
     if geometry.file is not None and not is_step(geometry.file):
         check_boundary(part, where)
-    return named_faces(replace(source, part=part), geometry, places, outlines, path)
+    return named_faces(replace(source, part=part), tables)
 
 
-def _is_meshed(geometry: SolidGeometry, record: SolidMeshRecord) -> bool:
+def _is_meshed(tables: PartTables) -> bool:
     """Whether gmsh makes the mesh: of a shape drawn here, or a STEP file."""
-    if geometry.file is not None:
-        return is_step(geometry.file)
-    return record.divisions is None and record.cell != "hexahedron"
+    if tables.geometry.file is not None:
+        return is_step(tables.geometry.file)
+    return tables.mesh.divisions is None and tables.mesh.cell != "hexahedron"
 
 
 def is_step(file: Path) -> bool:
@@ -111,23 +88,22 @@ def is_step(file: Path) -> bool:
     return file.suffix.lower() in _STEP
 
 
-def _source(
-    geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outlines | None, path: Path, where: str
-) -> Source:
-    file = geometry.file
+def _source(tables: PartTables, where: str) -> Source:
+    file, record = tables.geometry.file, tables.mesh
     if file is None:
-        if not _is_meshed(geometry, record):
-            return Source(_box(geometry, record, where), {}, {})
+        if not _is_meshed(tables):
+            return Source(_box(tables.geometry, record, where), {}, {})
         from .shapes import mesh_shape
 
-        return mesh_shape(geometry, record, outlines, path)
+        return mesh_shape(tables)
     if not is_step(file):
         for key in ("cell", "size", "divisions"):
             if getattr(record, key) is not None:
                 raise InputError(
-                    f"{path}: mesh.{key}: expected none, since {file.name} is a mesh, found {getattr(record, key)}"
+                    f"{tables.path}: mesh.{key}: expected none, since {file.name} is a mesh, found"
+                    f" {getattr(record, key)}"
                 )
-    return source_of_file(file, record, METRES[geometry.unit], where)
+    return source_of_file(file, record, METRES[tables.geometry.unit], where)
 
 
 def source_of_file(file: Path, record: SolidMeshRecord, metres: float, where: str) -> Source:

@@ -22,10 +22,10 @@ from .records import (
     CircleSection,
     Hole,
     Outlines,
+    PartTables,
     RectangleSection,
     SectionRecord,
     SolidGeometry,
-    SolidMeshRecord,
     default_order,
     default_size,
 )
@@ -36,14 +36,14 @@ DimTags = list[tuple[int, int]]
 Lengths = TypeVar("Lengths")
 
 
-def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outlines | None, path: Path) -> Source:
-    """Tetrahedra in the shape that `geometry` describes, the `outlines` along edges of elements.
+def mesh_shape(tables: PartTables) -> Source:
+    """Tetrahedra in the shape that the geometry describes, outlines along edges of elements.
 
     Raises `InputError` where a hole leaves the section, or the shape cannot be meshed.
     """
-    _check_holes(geometry, path)
-    unit, where = 10.0 ** round(log10(geometry.length)), f"{path}: geometry"
-    geometry, outlines = _in(unit, geometry), outlines and _in(unit, outlines)
+    _check_holes(tables.geometry, tables.path)
+    unit, where = 10.0 ** round(log10(tables.geometry.length)), f"{tables.path}: geometry"
+    geometry, outlines = _in(unit, tables.geometry), tables.outlines and _in(unit, tables.outlines)
     with gmsh_session():
         body = _body(geometry)
         for hole in geometry.hole:
@@ -52,8 +52,8 @@ def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outli
             _outline(body, geometry, outlines)
         gmsh.model.occ.synchronize()
         volume, surface = volume_and_surface()
-        order = record.order or default_order("tetrahedron")
-        size = _in(unit, record.size) if record.size else default_size(volume, surface, order)
+        order = tables.mesh.order or default_order("tetrahedron")
+        size = _in(unit, tables.mesh.size) if tables.mesh.size else default_size(volume, surface, order)
         check_size(size * unit, volume * unit**3, where)
         around = BAR if isinstance(geometry.section, CircleSection) else CIRCLE
         mesh_model(size, unit, where, around)
@@ -79,7 +79,8 @@ def _body(geometry: SolidGeometry) -> DimTags:
     section, length, occ = geometry.section, geometry.length, gmsh.model.occ
     if isinstance(section, RectangleSection):
         if isinstance(geometry.tip_section, RectangleSection):
-            return _taper(section, geometry.tip_section, length)
+            wires = [_wire(0.0, section), _wire(length, geometry.tip_section)]
+            return _dim_tags(occ.addThruSections(wires, makeSolid=True, makeRuled=True))
         body = [_box(length, section.height, section.width)]
         if section.wall is None:
             return body
@@ -94,11 +95,6 @@ def _body(geometry: SolidGeometry) -> DimTags:
 
 def _box(length: float, height: float, width: float) -> tuple[int, int]:
     return _VOLUME, gmsh.model.occ.addBox(0, -height / 2, -width / 2, length, height, width)
-
-
-def _taper(root: RectangleSection, tip: RectangleSection, length: float) -> DimTags:
-    wires = [_wire(x, section) for x, section in ((0.0, root), (length, tip))]
-    return _dim_tags(gmsh.model.occ.addThruSections(wires, makeSolid=True, makeRuled=True))
 
 
 def _wire(x: float, section: RectangleSection) -> int:

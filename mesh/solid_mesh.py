@@ -7,10 +7,9 @@ The boundary of the distributed mesh: its facets, and the triangles that a pictu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import basix
@@ -25,7 +24,7 @@ from .cells import CellName
 from .compat import coordinate_element, create_solid_mesh, geometry_nodes
 from .part import kept_or_new
 from .part_mesh import PartMesh, Tags, facet_keys
-from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
+from .records import PartTables
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
@@ -170,24 +169,16 @@ class SolidMesh:
 
 
 def solid_mesh(
-    geometry: SolidGeometry,
-    record: SolidMeshRecord,
-    places: Sequence[PlaceRecord],
-    outlines: Outlines | None,
-    path: Path,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Progress | None = None,
-    *,
-    remesh: bool = False,
+    tables: PartTables, comm: MPI.Comm = MPI.COMM_WORLD, progress: Progress = lambda _: None, *, remesh: bool = False
 ) -> SolidMesh:
-    """Mesh of a solid link, distributed over `comm`, all of whose processes call; arguments as of `part_mesh`.
+    """Mesh of a solid link, distributed over `comm`, all of whose processes call; see `part_mesh`.
 
     Unless `remesh` a mesh of the same part kept from an earlier run counts. Raises `InputError` on every process.
     """
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:
         try:
-            outcome = kept_or_new(geometry, record, places, outlines, path, progress or (lambda _: None), remesh=remesh)
+            outcome = kept_or_new(tables, progress, remesh=remesh)
         except FfrobotError as error:
             outcome = error
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)

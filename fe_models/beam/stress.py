@@ -42,8 +42,14 @@ def beam_stresses(
     rad²/s², `residual` (n,) 1 of residual attachment modes; `attached` lumps and `interfaces` have what the modes do
     there.
     """
-    W, at_interfaces = _loads_of_modes(link, omega2, families, residual, interfaces)
-    loads = [*at_interfaces.items(), *((lump.name, _inertia_of(lump) @ W) for lump in attached)]
+    if link.reference.condition == "craig-bampton":
+        W, loads_at = craig_bampton.interface_loads(omega2, families, int(residual.sum()), interfaces)
+    else:
+        W, loads_at = interface_loads(omega2, residual, interfaces)
+    loads = list(loads_at.items())
+    for lump in attached:
+        motion = np.concatenate([lump.at.translation, lump.at.rotation])
+        loads.append((lump.name, lump.weights[:, None] * motion @ W))
     E, nu = link.material.youngs_modulus, link.material.poissons_ratio
     points, places = {}, {name: float(at.position[0]) for name, at in interfaces.items()}
     for name, position in link.stress.points.items():
@@ -62,20 +68,6 @@ def beam_stresses(
         strain[:3] = np.outer([1.0, -nu, -nu], modal[0] / E)
         points[name] = StressPoint(np.array(position), modal, strain, static_stress)
     return points
-
-
-def _inertia_of(lump: Lump) -> Array:
-    """(6, n) mass times motion in each mode, at the interface."""
-    return lump.weights[:, None] * np.concatenate([lump.at.translation, lump.at.rotation])
-
-
-def _loads_of_modes(
-    link: BeamLink, omega2: Array, families: Sequence[str], residual: Integers, interfaces: Mapping[str, Interface]
-) -> tuple[Array, dict[str, Array]]:
-    """The inertia and the loads at interfaces that bend the link into its modes: see `interface_loads`."""
-    if link.reference.condition == "craig-bampton":
-        return craig_bampton.interface_loads(omega2, families, int(residual.sum()), interfaces)
-    return interface_loads(omega2, residual, interfaces)
 
 
 def stress_loads(link: BeamLink, interfaces: Mapping[str, Interface]) -> tuple[str, ...]:

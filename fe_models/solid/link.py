@@ -42,10 +42,7 @@ ELEMENTS = (20, 40)
 
 # Components (translation 0 … 2, rotation 3 … 5) that each reference condition holds at root and tip.
 _CLAMPED: dict[str, tuple[int, ...]] = {"root": (0, 1, 2, 3, 4, 5), "tip": ()}
-SUPPORTS = {
-    **dict.fromkeys(HOLDING_ROOT, _CLAMPED),
-    "simply-supported": {"root": (0, 1, 2, 3), "tip": (1, 2)},
-}
+SUPPORTS = {**dict.fromkeys(HOLDING_ROOT, _CLAMPED), "simply-supported": {"root": (0, 1, 2, 3), "tip": (1, 2)}}
 
 
 class Places(NamedTuple):
@@ -65,12 +62,7 @@ class Places(NamedTuple):
 
 
 def solid_modal_body(
-    link: SolidLink,
-    path: Path,
-    progress: Progress,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    *,
-    remesh: bool = False,
+    link: SolidLink, path: Path, progress: Progress, comm: MPI.Comm = MPI.COMM_WORLD, *, remesh: bool = False
 ) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; collective over `comm`, the same on all its processes.
 
@@ -78,8 +70,7 @@ def solid_modal_body(
     part cannot be meshed, a face is missing, or more modes are asked for than the mesh has; `SolveError` where the
     stiffness cannot be factorised, or the eigensolver did not converge.
     """
-    outlines = link.surface_patch.outlines(link.geometry.length) if link.surface_patch else None
-    solid = solid_mesh(link.geometry, link.mesh, link.interface, outlines, path, comm, progress, remesh=remesh)
+    solid = solid_mesh(link.part(path), comm, progress, remesh=remesh)
     progress(f"{link.name}: assembling")
     model = solid_model(solid.mesh, link.mesh.order or default_order(solid.cell), _materials(link, solid, path))
     places = _places(link, model, solid)
@@ -87,7 +78,8 @@ def solid_modal_body(
     sections = section_averages(model, x)
     progress(f"{link.name}: factorising {3 * model.V.dofmap.index_map.size_global} unknowns")
     flexibility = _supported(link, model, solid, places, path)
-    mass = _loaded(link, model, places)
+    weights = {record.name: lump_weights(record.mass, record.inertia) for record in link.interface}
+    mass = Mass(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])
     progress(f"{link.name}: solving for the static shapes")
     loads = unit_loads(model, places.rows)
     shapes = static_shapes(flexibility, loads)
@@ -211,12 +203,6 @@ def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Pla
         return Flexibility(model, faces, None)
     rows = [places.rows[name][list(components)] for name, components in held.items()]
     return Flexibility(model, faces, np.concatenate(rows))
-
-
-def _loaded(link: SolidLink, model: SolidModel, places: Places) -> Mass:
-    """The mass matrix with what is attached to interfaces."""
-    weights = {record.name: lump_weights(record.mass, record.inertia) for record in link.interface}
-    return Mass(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])
 
 
 def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Array, Integers]:

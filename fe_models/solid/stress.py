@@ -118,16 +118,14 @@ def recovered_stresses(
     found: dict[str, Any] = {"stress_loads": tuple(shapes)}
     if link.stress.points:
         points = point_stresses(model.V, C, fields, link.stress.points, path)
-        found["stress"] = {name: _split(point, n) for name, point in points.items()}
+        found["stress"] = {
+            name: StressPoint(point.position, point.stress[:, :n], point.strain[:, :n], point.stress[:, n:])
+            for name, point in points.items()
+        }
     if link.stress.surface:
         both = surface_stresses(model.V, C, fields, surface)
         found |= {"surface_stress": both[..., :n], "surface_static": both[..., n:]}
     return found
-
-
-def _split(point: StressPoint, n: int) -> StressPoint:
-    """The first n fields are modes, the others static shapes."""
-    return StressPoint(point.position, point.stress[:, :n], point.strain[:, :n], point.stress[:, n:])
 
 
 def point_stresses(

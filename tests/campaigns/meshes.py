@@ -27,7 +27,7 @@ from record import options, record
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.part import part_mesh
-from ffrobot.mesh.records import SolidGeometry, SolidMeshRecord
+from ffrobot.mesh.records import PartTables, SolidGeometry
 
 SECONDS = 240
 TOLD = ("same part", "rejected", "told to differ", "differs")
@@ -122,7 +122,7 @@ def _answer(path: Path) -> tuple[str, str]:
     if path.suffix == ".step":
         geometry = geometry.model_copy(update={"unit": "m"})
     try:
-        part = part_mesh(geometry, SolidMeshRecord(), (), None, Path("link.toml"), lambda _: None)
+        part = part_mesh(PartTables(Path("link.toml"), geometry), lambda _: None)
     except InputError as error:
         return (
             "hang"

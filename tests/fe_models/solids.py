@@ -68,7 +68,7 @@ def body_of(path):
 def model_of(path):
     """The free solid and its mesh."""
     link = read_link(path)
-    solid = solid_mesh(link.geometry, link.mesh, link.interface, link.surface_patch, path)
+    solid = solid_mesh(link.part(path))
     return solid_model(solid.mesh, link.mesh.order, material_map(solid.mesh, link.material)), solid
 
 

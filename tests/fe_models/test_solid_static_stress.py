@@ -58,7 +58,7 @@ def static(body, point, load):
 def clamped(path):
     """Displacements (dofs, 2) of the bar, clamped at its root, under a force along y and a moment at its tip."""
     link = read_link(path)
-    solid = solid_mesh(link.geometry, link.mesh, link.interface, None, path)
+    solid = solid_mesh(link.part(path))
     space = lagrange_space(solid.mesh, 2, vector=True)
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     mu, lambda_ = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)

@@ -161,7 +161,7 @@ def test_a_kept_mesh_gives_the_same_modal_body_and_a_damaged_one_is_made_again(s
     path, change = solid
     make_link(path)
     link = read_link(change("count = 3", "count = 2"))
-    kept = kept_path(link.geometry, link.mesh, link.interface, link.surface_patch)
+    kept = kept_path(link.part(path))
     assert kept_part(kept).faces.keys() >= {"root", "tip"}
     quick = told(path)[1].path.read_bytes()
     kept.write_bytes(kept.read_bytes()[:999])

@@ -8,7 +8,7 @@ from solid_parts import rectangle
 
 from ffrobot.mesh.gmsh_session import gmsh_session
 from ffrobot.mesh.part import part_mesh
-from ffrobot.mesh.records import SolidGeometry, SolidMeshRecord
+from ffrobot.mesh.records import PartTables, SolidGeometry, SolidMeshRecord
 
 LINK = Path("link.toml")
 
@@ -31,7 +31,7 @@ def mesh_part():
 
     def make(geometry, interfaces=(), outlines=None, said=None, **mesh):
         tell = said.append if said is not None else lambda _: None
-        return part_mesh(geometry, SolidMeshRecord(**mesh), interfaces, outlines, LINK, tell)
+        return part_mesh(PartTables(LINK, geometry, SolidMeshRecord(**mesh), interfaces, outlines), tell)
 
     return make
 

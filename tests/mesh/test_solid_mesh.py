@@ -8,7 +8,7 @@ import ufl
 from dolfinx import fem
 
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
-from ffrobot.mesh.records import CircleSection, PlaceRecord, SolidMeshRecord
+from ffrobot.mesh.records import CircleSection, PartTables, PlaceRecord, SolidMeshRecord
 from ffrobot.mesh.solid_mesh import solid_mesh
 
 LINK = Path("link.toml")
@@ -21,7 +21,7 @@ def total(form):
 @pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
 def test_faces_and_volume_by_dolfinx(solid, cell):
     grip = PlaceRecord(name="grip", position=(0.5, 0.0, 0.0125), normal=(0.0, 0.0, 1.0))
-    body = solid_mesh(solid(), SolidMeshRecord(cell=cell), (grip,), None, LINK)
+    body = solid_mesh(PartTables(LINK, solid(), SolidMeshRecord(cell=cell), (grip,)))
     ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
     one = fem.Constant(body.mesh, 1.0)
     x = ufl.SpatialCoordinate(body.mesh)
@@ -32,7 +32,7 @@ def test_faces_and_volume_by_dolfinx(solid, cell):
 
 
 def test_curved_cells_by_dolfinx(solid):
-    body = solid_mesh(solid(section=CircleSection(shape="circle", diameter=0.1)), SolidMeshRecord(), (), None, LINK)
+    body = solid_mesh(PartTables(LINK, solid(section=CircleSection(shape="circle", diameter=0.1))))
     x = ufl.SpatialCoordinate(body.mesh)
     volume = np.pi * 0.05**2
     assert total(fem.Constant(body.mesh, 1.0) * ufl.dx(body.mesh)) == pytest.approx(volume, rel=1e-3)
@@ -41,7 +41,7 @@ def test_curved_cells_by_dolfinx(solid):
 
 @pytest.mark.parametrize("mesh", [{}, {"cell": "hexahedron"}, {"divisions": (60, 6, 6)}])
 def test_the_surface_is_closed_and_faces_outward(solid, mesh):
-    surface = solid_mesh(solid(), SolidMeshRecord(**mesh), (), None, LINK).surface
+    surface = solid_mesh(PartTables(LINK, solid(), SolidMeshRecord(**mesh))).surface
     corners = surface.points[surface.triangles]
     vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(2 * (0.025 + 0.015) + 2 * 0.000375)
@@ -52,7 +52,7 @@ def test_the_surface_is_closed_and_faces_outward(solid, mesh):
 
 
 def test_surface_points_are_where_their_cells_say(solid):
-    body = solid_mesh(solid(section=CircleSection(shape="circle", diameter=0.1)), SolidMeshRecord(), (), None, LINK)
+    body = solid_mesh(PartTables(LINK, solid(section=CircleSection(shape="circle", diameter=0.1))))
     surface = body.surface
     np.testing.assert_array_equal(np.sort(surface.rows), np.arange(len(surface.points)))
     nodes = body.mesh.geometry.x[geometry_nodes(body.mesh)[surface.cells]]
