@@ -227,10 +227,7 @@ class ModalMotion(NamedTuple):
 
 
 def judge_patches(
-    patches: PatchArray,
-    voltages: Voltages,
-    motion: ModalMotion,
-    with_count: Callable[[int], float | None] | None,
+    patches: PatchArray, voltages: Voltages, motion: ModalMotion, with_count: Callable[[int], float | None] | None
 ) -> PatchFeasibility:
     """Required against available of the patches of one layout.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +10,7 @@ from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..common.structs import struct
 from ..mbs._core import TimeFunction
+from ..mbs.analysis.samples import targets_of
 from ..mbs.joints.joint import MotorLimits
 from ..mbs.model.gears import rotor
 from ..mbs.model.known_motion import mass_matrices
@@ -146,7 +146,7 @@ def path_jump(motion: RobotMotion, analysis: Analysis, at: float) -> str:
         return ""
     h = INSTANT * end
     near = NEARBY * end * (round(at / end / NEARBY) + np.arange(-1.0, 2.0))
-    for target in _targets(motion):
+    for target in (target for path in motion.model.scene.trajectory for target in targets_of(path)):
 
         def acceleration(t: Array, target: TimeFunction = target) -> Array:
             return np.where(
@@ -163,13 +163,6 @@ def path_jump(motion: RobotMotion, analysis: Analysis, at: float) -> str:
         if analysis.follows_jerk and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
             return "jerk"
     return ""
-
-
-def _targets(motion: RobotMotion) -> Iterator[TimeFunction]:
-    """The functions of time that trajectories follow."""
-    for path in motion.model.scene.trajectory:
-        yield from path.components.values()
-        yield from () if path.orientation is None else path.orientation.functions
 
 
 def _not_exceeded(time: Array, values: Array, share: float) -> float:

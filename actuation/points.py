@@ -170,14 +170,11 @@ def _automatic(key: str, name: str, body: ModalBody | None, spatial: Body, axes:
 
 
 def _named(name: str, axes: tuple[str, ...], points: list[BodyPoint], spatial: Body) -> PointSet:
-    per_length, per_mass = np.full(3, 1.0 / _length_of(spatial)), np.full(spatial.n_modes, np.sqrt(spatial.mass))
+    # Moments on a body are measured against forces by its length
+    length = spatial.length or max(float(np.linalg.norm(at.position)) for at in spatial.points.values()) or 1.0
+    per_length, per_mass = np.full(3, 1.0 / length), np.full(spatial.n_modes, np.sqrt(spatial.mass))
     scale = np.concatenate([np.ones(3), per_length, per_mass])
     return PointSet(name, tuple(f"actuation{k}" for k in range(1, len(points) + 1)), axes, tuple(points), scale)
-
-
-def _length_of(body: Body) -> float:
-    """By which moments on a body are measured against forces, m."""
-    return body.length or max(float(np.linalg.norm(point.position)) for point in body.points.values()) or 1.0
 
 
 def _candidate_places(key: str, body: ModalBody | None, points: Mapping[str, BodyPoint]) -> list[Place]:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -42,7 +41,7 @@ from .metrics import Followed, place_of_tip
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, SampledAnalysis, Sensor
 from .records import Controller as Record
 from .robot import Robot, input_names
-from .signals import Sensing, Signal, make_signals, merged
+from .signals import Sensing, make_signals, merged
 
 
 def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sensor]:
@@ -118,53 +117,51 @@ class ClosedLoop(SampledAnalysis):
         """
         assert self.actuation is not None
         source = context.outcomes[self.actuation]
-        plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
+        plant = with_compliance(without_paths(context.model))
+        moved, robot, whole = with_motor_coordinates(source, plant), _robot(context, source), context.whole
         given, more = (
-            [s for sensor in sensors for s in make_signals(plant.model, context.patches, sensor, whole)]
+            [s for sensor in sensors for s in make_signals(plant, context.patches, sensor, whole)]
             for sensors in (self.sensor, needed_sensors(robot, self.controller))
         )
         read = merged(given, more)
-        sensing = Sensing(plant.model, read)
-        outputs, tip = replay_times(source, self), place_of(whole, self.tip) or _default_tip(plant.model)
-        models = loop_models(plant.model, source.time, plant.source)
-        place_at = _place_of_tip(self, plant.model, source, tip)
+        sensing = Sensing(plant, read)
+        outputs, tip = replay_times(source, self), place_of(whole, self.tip) or _default_tip(plant)
+        models = loop_models(plant, source.time, moved)
+        place_at = _place_of_tip(self, plant, source, tip)
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
         times, rows = times_of_run(outputs, place_at, lowest)
-        setup = _setup(context, self, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
+        samples = sample_times(outputs, self.sample_time)
+        reference = between(samples, source.time, sensing.read(moved.q, moved.v, moved.a))
+        setup = Setup(
+            robot, robot.model, context.patches, input_names(robot), tuple(signal.name for signal in read), samples,
+            self.sample_time, self.delay, reference, _feed_forward(context, self, source, moved, samples), robot.source,
+        )  # fmt: skip
         acting = [make_controller(record, setup, self.controller) for record in self.controller]
         limit = np.full(len(setup.inputs), np.inf) if self.unlimited else _limits(context)
         loop = Loop(setup, read, acting, limit, self.seed)
-        splits = plant.model.tree.n_q, plant.model.tree.n_q + plant.model.tree.n_v
+        splits = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
 
         def at_sample(k: int, t: float, state: Array) -> Array:
             return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
 
         held = partial(held_commands, setup=setup, loop=loop)
-        before, inputs = partial(held, after=-1e-9), actuator_commands(plant.model, context.patches)
+        before, inputs = partial(held, after=-1e-9), actuator_commands(plant, context.patches)
         control = Control(inputs, loop.first, setup.times, self.delay, at_sample, before)
         disturbing = ((place_of(whole, str(load.point)), load.components) for load in self.disturbance)
         drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
         run = drive_robot(
-            plant.model, self, _start(context, self, plant), context.progress, drives=drives, times=times,
+            plant, self, _start(context, self, plant, moved), context.progress, drives=drives, times=times,
             control=control,
         )  # fmt: skip
         closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
         runs = _followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)
-        record = loop_record(self, setup, loop, acting, runs, models, lowest, gears=bool(plant.model.tree.gears))
+        record = loop_record(self, setup, loop, acting, runs, models, lowest, gears=bool(plant.tree.gears))
 
         def completed(of: Outcome) -> Outcome:
             commanded = context.model.by_motor(held(of.time))
             return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
-
-
-class _Plant(NamedTuple):
-    """The robot as it moves: gears are compliant where the scene says so."""
-
-    model: Model  # its equations of motion
-    # the motion of the inverse analysis in its coordinates, and what that found of compliant gears
-    source: MotorCoordinates
 
 
 def _robot(context: ActuatedContext, source: Outcome) -> Robot:
@@ -183,32 +180,8 @@ def loop_models(model: Model, time: Array, reference: MotorCoordinates) -> tuple
     return ()
 
 
-def _plant(context: ActuatedContext, source: Outcome) -> _Plant:
-    model = with_compliance(without_paths(context.model))
-    return _Plant(model, with_motor_coordinates(source, model))
-
-
-def _setup(
-    context: ActuatedContext,
-    analysis: ClosedLoop,
-    source: Outcome,
-    robot: Robot,
-    plant: _Plant,
-    read: Sequence[Signal],
-    outputs: Array,
-    readings: Array,
-) -> Setup:
-    """What controllers may know; `readings` (T, sensors) are those of the inverse analysis at its outputs."""
-    times = sample_times(outputs, analysis.sample_time)
-    return Setup(
-        robot, robot.model, context.patches, input_names(robot), tuple(s.name for s in read), times,
-        analysis.sample_time, analysis.delay, between(times, source.time, readings),
-        _feed_forward(context, analysis, source, plant, times), robot.source,
-    )  # fmt: skip
-
-
 def _feed_forward(
-    context: ActuatedContext, analysis: ClosedLoop, source: Outcome, plant: _Plant, times: Array
+    context: ActuatedContext, analysis: ClosedLoop, source: Outcome, moved: MotorCoordinates, times: Array
 ) -> Array:
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
     middle = held_until(times, analysis, source.time[-1])
@@ -221,8 +194,8 @@ def _feed_forward(
         values[:, len(most) :] = 0.0
     column = 0
     for joint, columns in context.model.motors.items():  # with compliant gears: known at outputs
-        if plant.source.gears and analysis.feed_forward != "none":
-            moments = plant.source.moments[joint]
+        if moved.gears and analysis.feed_forward != "none":
+            moments = moved.moments[joint]
             values[:, column : column + len(columns)] = between(middle, source.time, moments)
         column += len(columns)
     return values
@@ -235,15 +208,15 @@ def _limits(context: ActuatedContext) -> Array:
     )
 
 
-def _start(context: ActuatedContext, analysis: ClosedLoop, plant: _Plant) -> State:
+def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: MotorCoordinates) -> State:
     """As the inverse analysis starts, or as the scene says, compliant gears with their twist there."""
-    q, v = plant.source.q[0].copy(), plant.source.v[0].copy()
+    q, v = moved.q[0].copy(), moved.v[0].copy()
     if analysis.start == "actuation":
         return State(q, v)
     first = initial_state(context.model)
-    twists = [[part[0] for part in gear.twist(q[None], v[None])] for gear in plant.model.tree.gears]
+    twists = [[part[0] for part in gear.twist(q[None], v[None])] for gear in plant.tree.gears]
     q[: len(first.q)], v[: len(first.v)] = first.q, first.v
-    for gear, (way, rate) in zip(plant.model.tree.gears, twists, strict=True):
+    for gear, (way, rate) in zip(plant.tree.gears, twists, strict=True):
         q[gear.motor.q.start] = gear.sign * q[gear.joint.q.start] + way
         v[gear.motor.v.start] = gear.sign * v[gear.joint.v.start] + rate
     return State(q, v)

@@ -17,7 +17,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
 from ...mbs.model.gears import resistance
 from ...mbs.model.model import Model, build_model, row_values
-from ...mbs.model.rows import ConstraintRow, coordinate_row
+from ...mbs.model.rows import coordinate_row
 from ...mbs.model.system import ZERO, MultibodySystem
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
 from ..patches.link_patches import LinkPatches
@@ -51,7 +51,11 @@ class RigidArm:
             )
         scene = model.scene.model_copy(update={"load": (), "trajectory": ()})
         free = build_model(scene, [_rigid(node.body) for node in model.tree.nodes])
-        motors = list(_motor_rows(free))
+        motors = [
+            coordinate_row(joint, free.tree.nodes[free.tree.carried[joint]], ZERO, column, free.sign(joint))
+            for joint, columns in free.motors.items()
+            for column in columns.tolist()
+        ]
         self._model = replace(free, rows=(*free.rows, *motors))
         self._motors = np.arange(len(free.rows), len(free.rows) + len(motors))
         self._system = MultibodySystem(self._model)
@@ -97,15 +101,6 @@ class RigidArm:
         """τ (motors,) N·m, or N."""
         M, h = self.terms(gamma, gamma_dot)
         return M @ gamma_ddot + h
-
-
-def _motor_rows(model: Model) -> list[ConstraintRow]:
-    """The coordinates of all motors."""
-    rows = []
-    for joint, columns in model.motors.items():
-        node = model.tree.nodes[model.tree.carried[joint]]
-        rows += [coordinate_row(joint, node, ZERO, k, model.sign(joint)) for k in columns.tolist()]
-    return rows
 
 
 def _rigid(body: Body) -> Body:

@@ -170,8 +170,9 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
         one.layout.label: _array(path, one, body, spatial, of, modes[one.layout.label])
         for one, of in zip(placed, found, strict=True)
     }
+    reach: Reach
     if len(layouts) == 1:
-        reached, reach = modes[layouts[0].label], _alone(arrays[layouts[0].label])
+        reached, reach = modes[layouts[0].label], arrays[layouts[0].label]
     else:
         reached = reached_modes(Phi_V.T, body, spatial)
         reach = _together(path, layouts, arrays, reached, Phi_V.T)
@@ -251,17 +252,8 @@ def _array(path: Path, placed: Placed, body: ModalBody, spatial: Body, of: Effec
     return assembled(placed, body, of, to_modes, modes.stiffness, W_sqrt, modes.served)
 
 
-def _alone(array: PatchArray) -> Reach:
-    """Of a layout by itself, with its weights."""
-    return Reach(**{key: getattr(array, key) for key in ("Phi_V", "limit", "W_sqrt", "frequency", "served")})
-
-
 def _together(
-    path: Path,
-    layouts: Sequence[PztLayout],
-    arrays: Mapping[str, PatchArray],
-    reached: ReachedModes,
-    per_volt: Array,
+    path: Path, layouts: Sequence[PztLayout], arrays: Mapping[str, PatchArray], reached: ReachedModes, per_volt: Array
 ) -> Reach:
     """Of layouts side by side: all modal forces that are left count alike."""
     for layout in layouts:

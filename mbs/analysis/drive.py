@@ -105,8 +105,10 @@ def drive_robot(
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
     posture = describe_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
-    cause = f"{posture}: {_advice(model, times)}" if in_posture else ""
-    if not in_posture and STATUS[run.status] not in ("completed", "interrupted"):
+    cause = ""
+    if in_posture:
+        cause = f"{posture}: {out_of_reach(model, times) or 'move the path, or start in another posture'}"
+    elif STATUS[run.status] not in ("completed", "interrupted"):
         cause = find_cause(system, analysis, integrator, run)
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
     texts = (*warnings, *(text for text in (posture, scatter) if text))
@@ -137,12 +139,6 @@ def drive_robot(
         return _under(drives, found.among(between), np.concatenate([numbers, more])[order])
 
     return replace(acting, look_closer=look_closer)
-
-
-def _advice(model: Model, times: Array) -> str:
-    """How to come past a posture in which a run at `times` (T,) ended."""
-    far = out_of_reach(model, times)
-    return far if far else "move the path, or start in another posture"
 
 
 def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Outcome, known: int) -> Array:
@@ -193,12 +189,6 @@ def _between(
     return replace(found, motion=motion), replayed
 
 
-def _judged(system: MultibodySystem) -> _core.PlanarDriven | _core.SpatialDriven | None:
-    """The mechanism with its motors, where these take the place of forces on a path: their errors count, too."""
-    is_followed = any(row.is_trajectory for row in system.model.rows)
-    return integrated_mechanism(system) if is_followed and system.model.motors else None
-
-
 def _motion(system: MultibodySystem, run: _core.TreeRun, times: Array) -> Motion:
     """The motion of a run of the core, as far as it got."""
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
@@ -224,9 +214,12 @@ def _integrated(
     core, scene, _ = system.integrated
     if control is None:
         motion: Callable[..., _core.TreeRun] = _core.tree_motion  # core and motors are of one space
+        # Where motors take the place of forces on a path their errors count, too
+        is_followed = any(row.is_trajectory for row in system.model.rows) and system.model.motors
         return motion(
             core, scene, as_list(times), start.q, start.v, controls, progress, continuation.checkpoint,
-            continuation.samples, continuation.recording, system.replay, _judged(system),
+            continuation.samples, continuation.recording, system.replay,
+            integrated_mechanism(system) if is_followed else None,
         )  # fmt: skip
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,

@@ -42,11 +42,7 @@ class Supplied(NamedTuple):
 
 
 def supplied_through_gears(
-    model: Model,
-    state: States,
-    time: Array,
-    wanted: Array,
-    twists: Mapping[str, BSpline] | None = None,
+    model: Model, state: States, time: Array, wanted: Array, twists: Mapping[str, BSpline] | None = None
 ) -> Supplied:
     """What carries the motion `state` at `time` (T,), for which rigid gears need `wanted` (T, n_v).
 

@@ -100,16 +100,13 @@ class InstantAnalysis(Analysis):
 
 
 class OperatingPoints(NamedTuple):
-    """States about which a robot is linear: `model` follows nothing, its gears give where the scene says so.
+    """States about which a robot is linear."""
 
-    time (T,) s; q (T, n_q), v and a (T, n_v).
-    """
-
-    model: Model
-    time: Array
-    q: Array
-    v: Array
-    a: Array
+    model: Model  # follows nothing, its gears give where the scene says so
+    time: Array  # (T,) s
+    q: Array  # (T, n_q)
+    v: Array  # (T, n_v)
+    a: Array  # (T, n_v)
 
 
 def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Outcome, OperatingPoints]:

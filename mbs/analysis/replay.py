@@ -40,10 +40,7 @@ Reader = Callable[[Any], Any]
 
 
 def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
-    """Output times (T,) of a run under what `source` found, s.
-
-    With what it does before t = 0 and, where the run goes to the end of the path, after that.
-    """
+    """Output times (T,), s, of a run under what `source` found: with what it does before t = 0, and after the path."""
     after = source.details.post_actuation if analysis.end == source.analysis.last_time else 0.0
     return output_times(analysis.end, analysis.output_step, source.details.pre_actuation, after)
 

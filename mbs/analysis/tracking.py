@@ -132,7 +132,11 @@ class Tracking(TimedAnalysis):
             if objective == "least-voltage":  # without the effort's share
                 least = replace(found, doubt=least.doubt)
             texts = list(_warnings(context, posed, self, least))
-            texts += _of_mesh(found, self)
+            if found.unmet > self.tolerance:
+                texts.append(
+                    f"between Gauss points modal forces up to {found.unmet:.2g} of the largest elastic one are left"
+                    f" over, more than the tolerance, {self.tolerance:g}: raise intervals, or loosen the tolerance"
+                )
             bounds = _bounds(posed)
         except Stopped:
             place = where(model.scene.path, self)
@@ -209,7 +213,10 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
         )
     servo = make_servo(model, end, place, progress, 1.0, analysis.kind)
     check_rest(servo, analysis, (0.0, end))
-    Phi_V, limits = _patches(patches, servo), _limits(model, patches)
+    per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in patches.values()]
+    Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
+    voltage = np.concatenate([of_link.limit for of_link in patches.values()] or [np.zeros(0)])
+    limits = Limits(voltage, largest_moments(model, limits=True))
     if not np.any(Phi_V):
         raise InputError(f'{place}: expected patches on flexible links for kind = "tracking", found none that bend one')
     linear = linearise(servo, end)
@@ -305,15 +312,6 @@ def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracke
     yield from far_patches(context, posed.linear.zeros[[0, -1]])
 
 
-def _of_mesh(found: Tracked, analysis: Tracking) -> Iterator[str]:
-    """A warning where the mesh is too coarse for the tolerance."""
-    if found.unmet > analysis.tolerance:
-        yield (
-            f"between Gauss points modal forces up to {found.unmet:.2g} of the largest elastic one are left over, more"
-            f" than the tolerance, {analysis.tolerance:g}: raise intervals, or loosen the tolerance"
-        )
-
-
 def _bounds(posed: _Posed) -> Bounds | None:
     try:
         return bounds_of_zeros(posed.servo, posed.asked, posed.linear, posed.around, posed.asked.units)
@@ -336,17 +334,6 @@ def _with_torques_alone(context: Context, run: Outcome, around: TrackedPath) -> 
     inside = run.time[(run.time >= 0.0) & (run.time <= analysis.end)]
     way = max(float(np.ptp(target.sample(inside)[0])) for row in around.held.rows if (target := row.target))
     return replace(around, without_patches=off, is_needed=off > analysis.tolerance * way)
-
-
-def _patches(patches: Mapping[str, PatchedLink], servo: Servo) -> Array:
-    """Φ_V (n, k) on all modes, of all patches of all links."""
-    rows = [modal_directions(servo.model, of_link.per_volt) for of_link in patches.values()]
-    return np.concatenate(rows)[:, servo.of_modes].T
-
-
-def _limits(model: Model, patches: Mapping[str, PatchedLink]) -> Limits:
-    voltage = np.concatenate([of_link.limit for of_link in patches.values()] or [np.zeros(0)])
-    return Limits(voltage, largest_moments(model, limits=True))
 
 
 def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.rotations import about, of_rpy, smallest_turn
+from ...common.rotations import about, of_rpy
 from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import (
@@ -21,7 +21,6 @@ from ..fields.field_types import (
     Quantity,
     Reference,
     Side,
-    Vector3,
     body_of,
     loaded_reference,
     split_point,
@@ -268,9 +267,3 @@ class JointRecord(Record):
         """Keys that ask for its coordinate in the tree; where a loop is cut there is only that of a rotor."""
         keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
         return tuple(key for key in keys if getattr(self, key, None))
-
-
-def with_axis(axis: Vector3, orientation: Array) -> tuple[Array, Array]:
-    """Triads whose z is along `axis`, by the smallest turn on the first side; equal at zero coordinates."""
-    first = smallest_turn(np.array(axis))
-    return first, orientation.T @ first

@@ -7,9 +7,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array
+from ...common.rotations import smallest_turn
 from ..fields.field_types import NotNegative, Positive, Quantity, Vector3
 from ..fields.spelling import SPATIAL, NormalInPlane, Spelled, as_written
-from .joint import Friction, JointRecord, MotorLimits, with_axis
+from .joint import Friction, JointRecord, MotorLimits
 
 Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
 Range = tuple[Quantity, Quantity]
@@ -110,7 +111,8 @@ class AxialJoint(MovingJoint):
 
     def triads(self) -> tuple[Array, Array]:
         """Their z is along the axis."""
-        return with_axis(self.axis, self.orientation)
+        first = smallest_turn(np.array(self.axis))
+        return first, self.orientation.T @ first
 
 
 def check_direction(key: str, axis: Sequence[float]) -> None:

@@ -128,10 +128,7 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 
 def resistance(model: Model, q: Array, v: Array, frames: Sequence[Motion] | None = None) -> Array:
-    """Generalized forces (T, n_v) by which friction in all joints resists; what it dissipates is v times that.
-
-    `frames` of q where known.
-    """
+    """Generalized forces (T, n_v) by which friction in all joints resists; `frames` of q where known."""
     return tree_resistance(model.tree, v) + cut_resistance(model.tree, model.cut, q, v, frames)
 
 

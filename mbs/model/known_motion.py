@@ -31,12 +31,6 @@ class Wrench(NamedTuple):
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
 
 
-def _in_global_axes(F: Array, node: Node, force: Array, q: Array) -> Wrench:
-    """What `force` (T, freedoms) along a joint does on its outer side; F (T, 3, 3): axes of the inner one."""
-    acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
-    return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
-
-
 def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, poses: Sequence[Pose]) -> Wrench:
     """What a joint does to its outer side, about where that is, less what of it does work along the joint.
 
@@ -45,7 +39,8 @@ def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, po
     F = tree.pose(node.inner, q, poses).F
     in_axes = np.hstack([np.einsum("tji,tj->ti", F, part) for part in on_outer])
     along = np.einsum("tik,ti->tk", node.joint.motion(q[:, node.q]), in_axes)
-    return on_outer.plus(_in_global_axes(F, node, along, q), -1.0)
+    acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), along)
+    return on_outer.plus(Wrench(*(np.einsum("tij,tj->ti", F, part) for part in np.hsplit(acting, 2))), -1.0)
 
 
 @struct

@@ -175,22 +175,15 @@ class _Reduction:
     def _body(self, number: int) -> _core.PlanarBody:
         body, axes = self._parts.bodies[number], self._axes[number]
         data = body.data
-        self._check_joint(body.joint, self._normal @ self._frames[number].carrier)
+        normal = self._normal @ self._frames[number].carrier  # in axes of the joint
+        off = abs(normal[2]) if body.joint == _core.JointKind.prismatic else np.linalg.norm(normal - np.eye(3)[2])
+        if off > EXACT and body.joint != _core.JointKind.weld:
+            raise AcrossError
         found = _core.PlanarBody()
         for key in SHARED:
             setattr(found, key, getattr(body, key))
         found.joint, found.data = PLANAR[body.joint], planar_data(data, axes)
         return found
-
-    @staticmethod
-    def _check_joint(kind: _core.JointKind, normal: Array) -> None:
-        """`normal` (3,) in axes of the joint."""
-        if kind == _core.JointKind.weld:
-            return
-        slides = kind == _core.JointKind.prismatic
-        off = abs(normal[2]) if slides else np.linalg.norm(normal - np.eye(3)[2])
-        if off > EXACT:
-            raise AcrossError
 
     def _row(self, row: _core.ConstraintModel) -> _core.ConstraintModel | None:
         """In axes of planar markers; None where it does nothing in the plane."""

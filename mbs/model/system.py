@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,7 +12,6 @@ from ...common.arrays import Array, Booleans, Integers
 from ...common.errors import InputError
 from ...common.rotations import exponential
 from .. import _core
-from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
@@ -71,7 +70,7 @@ class MultibodySystem:
         self._wrenches: list[Placed] = []
         loads = [load for load in model.scene.load if load.point is not None]
         at_points = [*(PointDrive(str(load.point), load.components) for load in loads), *drives.at_points]
-        self._at_points = [self._point_drive(drive) for drive in at_points]
+        self._at_points = [(self._wrench(tree.section(drive.point)), drive.components) for drive in at_points]
         at_loads = zip(self._at_points, loads, strict=False)
         self._of_motion = [(wrench, load.force) for (wrench, _), load in at_loads if load.force is not None]
         replayed = drives.replayed.at_points if drives.replayed else {}
@@ -279,10 +278,6 @@ class MultibodySystem:
         assert load.joint is not None
         for direction, moment in zip(self.model.along(load.joint), load.moments, strict=True):
             yield Drive(direction, moment)
-
-    def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
-        """Number of the wrench, and its components over time."""
-        return self._wrench(self.model.tree.section(drive.point)), drive.components
 
     def _cut_place(self, row: ConstraintRow) -> CutPlace:
         return CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f)

@@ -53,13 +53,10 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
     T = np.hstack([np.eye(body.n_modes)[:, kept], *shapes])
     reduced = bodies.transformed(body, T, stiffness)
     static_shapes = len(stiffness) - lowest if body.attachment_modes else 0
-    reduction = bodies.Reduction(body, lowest, T, _lift(T, B_T))
+    # Modal forces on all modes from those on the coordinates, exact for forces of the loads Bᵀ
+    lift = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
+    reduction = bodies.Reduction(body, lowest, T, lift)
     return replace(reduced, reduction=reduction, attachment_modes=static_shapes)
-
-
-def _lift(T: Array, B_T: Array) -> Array:
-    """(n, m) modal forces on all modes from those on the m coordinates, exact for forces of the loads Bᵀ."""
-    return T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
 
 
 def modes_kept(body: Body) -> str:

@@ -279,10 +279,7 @@ class RobotMotion:
 
     @cached_property
     def motor_forces(self) -> MotorForces | None:
-        """Of `supplied`: see `mbs.model.motors`. None where nothing is prescribed.
-
-        Moments behind compliant gears are what motors must do there.
-        """
+        """Of `supplied`, behind compliant gears what motors must do there; None where nothing is prescribed."""
         return self._found_motor_forces()
 
     def _found_motor_forces(self) -> MotorForces | None:

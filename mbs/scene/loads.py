@@ -6,15 +6,7 @@ from pydantic import ValidationInfo, model_validator
 
 from ...common.errors import quoted
 from .._core import TimeFunction
-from ..fields.field_types import (
-    Expression,
-    Expressions,
-    PointReference,
-    Referring,
-    one_of,
-    only,
-    present,
-)
+from ..fields.field_types import Expression, Expressions, PointReference, Referring, one_of, only, present
 from ..fields.functions import StateForce
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 

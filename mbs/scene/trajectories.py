@@ -10,16 +10,7 @@ from ...common.arrays import Array, as_rows
 from ...common.errors import InputError, quoted
 from ...common.rotations import of_rpy, smallest_turn
 from .._core import TimeFunction
-from ..fields.field_types import (
-    Expression,
-    Name,
-    PointReference,
-    Quantity,
-    Vector3,
-    WaypointTable,
-    one_of,
-    present,
-)
+from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ..fields.piecewise import Piecewise
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here

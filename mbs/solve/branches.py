@@ -86,24 +86,19 @@ def chosen_start(model: Model) -> StartPosture | None:
     wanted = model.scene.initial.branch
     if not wanted:
         return None
-    found = start_postures(model)
+    found, tree = start_postures(model), model.tree
+    if cut := [joint for joint in wanted if joint not in tree.carried]:
+        raise InputError(
+            f'{model.scene.path}: initial.branch: expected joints of the tree, found "{cut[0]}", which is cut'
+        )
     for one in found:
-        if all(_is_so(model, one.q, joint, word) for joint, word in wanted.items()):
+        if all(is_so(model, one.q, tree.nodes[tree.carried[joint]], word) for joint, word in wanted.items()):
             return one
     asked = ", ".join(f'{joint} = "{word}"' for joint, word in wanted.items())
     raise InputError(
         f"{model.scene.path}: initial.branch: expected one of the {len(found)} postures that were found, found {asked},"
         " which none of them is: see ffrobot pose without this key"
     )
-
-
-def _is_so(model: Model, q: Array, joint: str, word: Word) -> bool:
-    """Whether the `joint` is "up", …, in the posture q (n_q,)."""
-    if joint not in model.tree.carried:
-        raise InputError(
-            f'{model.scene.path}: initial.branch: expected joints of the tree, found "{joint}", which is cut'
-        )
-    return is_so(model, q, model.tree.nodes[model.tree.carried[joint]], word)
 
 
 def _number(text: str | float) -> float:

@@ -26,8 +26,12 @@ def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Ch
     steps became too short, the integrator.
     """
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
+
+    def accelerations() -> Array:
+        return _core.tree_outputs(system.core, system.scene, [t], np.array(run.last)[None]).accelerations
+
     found = (
-        not_a_number(_targets(system), lambda: _accelerations(system, t, run.last), t)
+        not_a_number(_targets(system), accelerations, t)
         or too_far_bent(_links(system, at))
         or load_jump(_loads(system), t)
         or _friction(system, analysis, choice, at)
@@ -42,10 +46,6 @@ def _targets(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
     for row in system.model.rows:
         functions = row.law.functions if row.law is not None else () if row.target is None else (row.target,)
         yield from ((f'trajectory "{row.owner}"', function) for function in functions)
-
-
-def _accelerations(system: MultibodySystem, t: float, state: Array) -> Array:
-    return _core.tree_outputs(system.core, system.scene, [t], np.array(state)[None]).accelerations
 
 
 def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Callable[[], Array], t: float) -> str:

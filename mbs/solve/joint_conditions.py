@@ -7,7 +7,7 @@ With the coordinates of motors fixed, R δs = 0, the linear equations M δs̈ + 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -136,7 +136,12 @@ def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
 
 def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
     """What the condition lets joints and modes do."""
-    names = list(_coordinates(mechanism) if condition == LOCKED else _shafts(mechanism))
+    joints = [name for name in mechanism.inputs if name.startswith("joint/")]
+    if condition == LOCKED:  # motors behind compliant gears stand still, too
+        names = [*joints, *(name for name in mechanism.outputs if name.startswith("motor/"))]
+    else:
+        shafts = (name.replace("joint/", "motor/", 1) for name in joints)
+        names = [shaft if shaft in mechanism.outputs else name for name, shaft in zip(joints, shafts, strict=True)]
     back = np.linalg.inv(np.linalg.cholesky(mechanism.M)).T
     R = np.array([mechanism.outputs[name] for name in names]).reshape(len(names), len(back))
     N = back @ free_directions(np.asarray(R @ back, dtype=float))
@@ -149,20 +154,6 @@ def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> Complex
     J = J @ N
     X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
     return np.asarray(np.einsum("ki,fik->fk", J, X))
-
-
-def _coordinates(mechanism: LinearMechanism) -> Iterator[str]:
-    """Coordinates of joints with motors, and of motors behind compliant gears, which then stand still, too."""
-    yield from (name for name in mechanism.inputs if name.startswith("joint/"))
-    yield from (name for name in mechanism.outputs if name.startswith("motor/"))
-
-
-def _shafts(mechanism: LinearMechanism) -> Iterator[str]:
-    """Coordinates of motors: of their joints where no compliant gear is between."""
-    for name in mechanism.inputs:
-        if name.startswith("joint/"):
-            behind = name.replace("joint/", "motor/", 1)
-            yield behind if behind in mechanism.outputs else name
 
 
 def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:

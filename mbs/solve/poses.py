@@ -59,7 +59,8 @@ class PoseEvaluator:
         q, tree = self._all(q), self.model.tree
         before = self._place(q)
         straight, mechanism, bent = self._equilibrium(q)
-        found = {"place": before, "sag": self._place(bent) - before, "torque": self._torques(mechanism)}
+        torque = np.array([mechanism.force[mechanism.names.index(name)] for name in self.motors])
+        found = {"place": before, "sag": self._place(bent) - before, "torque": torque}
         found["manipulability"] = np.array(self._manipulability(straight))
         for condition, found_there in joint_conditions(mechanism).items():
             found |= {f"joints_{condition}/{name}": value for name, value in self._of_condition(found_there).items()}
@@ -111,9 +112,6 @@ class PoseEvaluator:
         if found is None:
             raise SolveError("loops cannot be closed")
         return found
-
-    def _torques(self, mechanism: LinearMechanism) -> Array:
-        return np.array([mechanism.force[mechanism.names.index(name)] for name in self.motors])
 
     def _manipulability(self, mechanism: LinearMechanism) -> float:
         """√det(J Jᵀ) of the point's velocity by the rates of joints with motors (Yoshikawa, 1985)."""

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, NDArray, as_floats, null_space
+from ...common.arrays import Array, Booleans, as_floats, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..model.known_motion import State
 from ..model.model import Model, row_values, target_rates, without_paths
-
-BoolArray = NDArray[np.bool_]
 
 TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
 SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
@@ -43,16 +41,13 @@ def row_sizes(model: Model) -> Array:
     return np.array([length if model.measures_way(row) else 1.0 for row in model.rows])
 
 
-def solve_posture(model: Model, t: float, q: Array, held: BoolArray | None = None) -> Array | None:
-    """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge.
-
-    Coordinates `held` (n_v,) stay.
-    """
+def solve_posture(model: Model, t: float, q: Array, held: Booleans | None = None) -> Array | None:
+    """Q (n_q,) moved onto C(q, t) = 0 by least steps of joints not `held` (n_v,); None where it does not converge."""
     found, is_met = solve_postures(model, np.array([t]), q[None], held)
     return found[0] if is_met[0] else None
 
 
-def solve_postures(model: Model, times: Array, q: Array, held: BoolArray | None = None) -> tuple[Array, BoolArray]:
+def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None = None) -> tuple[Array, Booleans]:
     """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,)."""
     q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
@@ -77,11 +72,8 @@ def solve_postures(model: Model, times: Array, q: Array, held: BoolArray | None 
     return q, left <= 1e3 * TOLERANCE
 
 
-def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: BoolArray | None = None) -> State:
-    """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept.
-
-    Those `held` (n_v,) stay.
-    """
+def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans | None = None) -> State:
+    """The state at q, rates of joints not `held` (n_v,) moved onto Ċ = 0 at time t by the least change, ṗ kept."""
     if not model.rows:
         return State(q, v)
     scales, now = joint_scales(model), np.array([t])
@@ -289,10 +281,7 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
 
 
 def misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """What the trapezoidal rule on the next derivative misses of each change between neighbouring times.
-
-    Of times (T, …) along the first axis; (T − 1, …).
-    """
+    """(T − 1, …) what the trapezoidal rule on the next derivative misses of each change between `times` (T, …)."""
     value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
     missed: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
     return np.nan_to_num(missed, nan=0.0, posinf=0.0)

@@ -120,10 +120,7 @@ class _Solver:
         self.status, self.iterations, self.unmet, self.worst = "", 0, 0.0, 0.0
 
     def solve(self, breaks: Array, guess: States, along: Callable[[States, Array], Derivatives]) -> None:
-        """On all breaks at once.
-
-        along(states, breaks) has the derivatives along a motion: taken where those of the last mesh do not lead on.
-        """
+        """On all breaks; `along`(states, breaks): derivatives, taken where those of the last mesh do not lead on."""
         is_near = True  # derivatives to the guess
         for refinement in range(MOST_REFINEMENTS):
             found = collocate(self.problem, breaks, guess)

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State
 from ..model.model import Model, row_values
-from .posture import MOST_ITERATIONS, BoolArray, joint_scales, solve_posture, with_rates
+from .posture import MOST_ITERATIONS, joint_scales, solve_posture, with_rates
 from .reach import check_reach, turned_guesses, working_guess
 
 AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
@@ -29,11 +29,13 @@ def undeformed_posture(model: Model) -> State:
     q = solve_posture(model, 0.0, guess) if q is None else q
     if q is None:
         check_reach(model, 0.0)
-        owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), "; ".join(_advice(model, guess))
+        owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), list(turned_guesses(model.scene))
+        if works := working_guess(model, guess):
+            advice.append(f"from [initial] {works}, for one, it goes")
         raise InputError(
             f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
             f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps"
-            f" ({advice or 'out of reach, or on another branch?'})"
+            f" ({'; '.join(advice) or 'out of reach, or on another branch?'})"
         )
     v, named = _guessed_rates(model), _named(model, "joint_rates")
     start = with_rates(model, q, v)
@@ -43,7 +45,7 @@ def undeformed_posture(model: Model) -> State:
     return relaxed_gears(model, start)
 
 
-def _named(model: Model, table: Literal["joints", "joint_rates"]) -> BoolArray:
+def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
     """(n_v,) of joints with values in [initial], where loops alone constrain and others can close them; else none."""
     named = np.zeros(model.tree.n_v, dtype=bool)
     if model.rows and model.loop_rows.all():
@@ -100,13 +102,6 @@ def relaxed_gears(model: Model, state: State) -> State:
             q[gear.motor.q.start] -= way
             v[gear.motor.v.start] -= rate
     return State(q, v)
-
-
-def _advice(model: Model, guess: Array) -> Iterator[str]:
-    """What keeps a guess (n_q,) from meeting the rows at t = 0: degrees, or another branch."""
-    yield from turned_guesses(model.scene)
-    if works := working_guess(model, guess):
-        yield f"from [initial] {works}, for one, it goes"
 
 
 def _numbers(model: Model, table: Mapping[str, object], key: str) -> dict[str, Array]:

@@ -83,10 +83,7 @@ def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
 
 
 def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
-    """Zeros (N, 2n) from motors to path, 1/s, of the equations frozen at each node.
-
-    The slowest first, those of equal size by their real part.
-    """
+    """Zeros (N, 2n) from motors to path, 1/s, frozen at each node: the slowest first, then by their real part."""
     s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
     with np.errstate(divide="ignore"):
         size = np.log(np.abs(s)).round(8)  # as far as rounding lets it be known: pairs ± s have one
