@@ -53,7 +53,7 @@ def _draw_motion(job: dict[str, Any]) -> None:
     everything = np.concatenate([shown.points for _, shown in grids])
     name = SHOWN[job["color"]][0]
     largest = max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids)
-    limit, bar = round_above(largest), BAR if largest > 0.0 else None
+    limit, bar = round_above(largest), BAR | {"title": f"{name}\n"} if largest > 0.0 else None
     for _, shown in grids:
         shown[name] = np.where(_is_bare(grids, name), np.nan, shown[name])
     size = float(np.ptp(everything, axis=0).max()) or 1.0
