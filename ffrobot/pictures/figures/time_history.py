@@ -30,7 +30,8 @@ def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> Non
     for k, curve in enumerate(figure.curves):
         if curve.file is not None:
             time, values = read_points(curve.file, curve.data)
-            axes.plot(time, figure.scale * values, "x", color="black", markersize=5, zorder=4, label=curve.label)
+            (points,) = axes.plot(time, figure.scale * values, "x", color="black", markersize=5, label=curve.label)
+            points.set(zorder=4, clip_on=figure.x_range is not None)
         else:
             _draw_columns(axes, curve, k, figure, results)
     axes.set_xlabel(figure.x_label)
@@ -115,7 +116,7 @@ def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
         axes.plot(centers, reach, color=color, label=f"{f:.4g} Hz")
     for k, (key, label) in enumerate((("best", "found"), ("even", "evenly spaced"))):
         places = [(x - length / 2, length) for x in results[f"{group}/{key}/centers"]]
-        axes.broken_barh(places, (-0.12 * (k + 1), 0.08), color=COLORS[k], label=label)
+        axes.broken_barh(places, (-0.12 * (k + 1), 0.08), facecolor=COLORS[k], edgecolor="white", label=label)
     axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
     axes.set_xlabel(f"distance along {body} (m)")
     axes.set_ylabel("controllability by one patch")
