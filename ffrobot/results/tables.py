@@ -32,7 +32,7 @@ def analysis_cells(results: Results, verdict: AnalysisVerdict) -> Cells:
         "outputs": f"{len(time)}",
         **of_steps,
         "tolerance": f"{about['tolerance']:.0e}" if integrated else "",
-        "constraint\nviolation": f"{violation.max(initial=0.0):.0e}",
+        "constraint\nviolation": f"{most:.0e}" if (most := violation.max(initial=0.0)) else "0",
         "wall (s)": f"{about['wall_seconds']:.3f}",
     }
 
@@ -45,10 +45,11 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
         required = np.array([results.peak(f"{group}/required_voltage[{k}]")[0] for k in patches])
         limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
         is_limited = np.isfinite(limits).any()
+        span = " to ".join(dict.fromkeys((f"{limits.min():g}", f"{limits.max():g}")))
         yield {
             "on": layout,
             "largest (V)": f"{required.max():.0f}" if required.max() >= 1e3 else f"{required.max():.3g}",
-            "limit (V)": f"{limits.min():g}" if is_limited else "none",
+            "limit (V)": span if is_limited else "none",
             "required /\nlimit": f"{np.max(required / limits):.3g}" if is_limited else "",
             "condition\nnumber": f"{about['condition_number']:.3g}",
         }

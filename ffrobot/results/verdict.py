@@ -25,7 +25,7 @@ def number(value: float) -> str:
 
 def millimeters(value: float, digits: int = 4) -> str:
     """A length `value` in m as text in mm."""
-    return f"{1e3 * value:.{digits}g} mm" if value >= ROUND_OFF else f"< {1e3 * ROUND_OFF:g} mm"
+    return f"{1e3 * value:.{digits}g} mm" if value >= ROUND_OFF else f"< {1e9 * ROUND_OFF:g} nm"
 
 
 AXES = "xyz"

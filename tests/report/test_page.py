@@ -12,7 +12,7 @@ from ffrobot.common.errors import InputError
 from ffrobot.pictures.motion import MovingBody
 from ffrobot.pictures.projection import COLORS
 from ffrobot.pictures.report import write_report
-from ffrobot.pictures.report.charts import history_charts
+from ffrobot.pictures.report.charts import Chart, history_charts
 from ffrobot.pictures.report.runs import runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.pictures.shapes import Shape, thickened
@@ -160,7 +160,7 @@ def test_charts_and_tables_of_the_arm(arm_3r):
     value, unit = rows["motor of joint waist"]
     assert unit == "N·m"
     assert float(value) == pytest.approx(largest, rel=1e-3)
-    assert rows["distance of fore.tip from its path"] == ["<", "1e-06", "mm"]
+    assert rows["distance of fore.tip from its path"] == ["<", "1", "nm"]
 
 
 def test_a_run_has_one_colour_on_the_page(two_link):
@@ -172,6 +172,24 @@ def test_a_run_has_one_colour_on_the_page(two_link):
         found = {trace["name"].removesuffix(", y"): trace["line"]["color"] for trace in charts[name].traces}
         assert {run: found[run] for run in expected} == expected
     assert charts["path_tip"].traces[0]["line"]["color"] not in COLORS  # the prescribed path
+
+
+def test_many_runs_have_a_chart_for_each_component(arm_3r):
+    with Results(arm_3r.folder / "scene.results.h5") as results:
+        charts = {chart.name: chart for chart in history_charts([results] * 3)}
+    assert "path_tool" not in charts
+    for axis in "xyz":
+        names = [trace["name"].partition(": ")[2] for trace in charts[f"path_tool_{axis}"].traces]
+        assert names == ["prescribed", "inverse"] * 3
+
+
+@pytest.mark.parametrize(("largest", "visible"), [(1.9, "legendonly"), (2.1, True)])
+def test_limits_far_beyond_curves_wait_for_a_click(largest, visible):
+    chart = Chart("moment_O", "motor of joint O", "torque (N·m)", limits=(-20.0, 20.0))
+    chart.add("run", np.array([0.0, 1.0]), np.array([0.0, -largest]))
+    chart.add("diverged", np.array([0.0, 1.0]), np.array([0.0, 1e6]), visible="legendonly")
+    assert [line["visible"] for line in chart.layout["shapes"]] == [visible] * 2
+    assert chart.layout["showlegend"]
 
 
 def test_bars_stand_for_lines():

@@ -14,8 +14,9 @@ from .figure_file import Curve, FigureRecord
 from .shared import bending_points, both_ways, curves_of, file_name, members
 
 SNAPSHOTS = 5
-ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn
-SEEN = 1e-3  # of the largest: smaller components of a deflection, differences of a voltage, cannot be seen
+ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn; of the largest modal coordinates and forces
+SEEN = 5e-3  # of the largest: smaller components of a deflection, differences of a voltage, cannot be seen
+TOGETHER = 2  # runs of which a figure has all components
 AXES = "xyz"
 ABOUT = {"mx": "about x", "my": "about y", "mz": "about z"}
 ENERGIES = ("kinetic", "strain", "gravitational")
@@ -29,20 +30,39 @@ def main_figures(results: Results) -> tuple[FigureRecord, ...]:
     return _drawn(results, MAIN)
 
 
-def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """The main figures, then angles, modes, forces, reactions, energies, other points and responses."""
-    main = main_figures(results)
-    return main + tuple(record for record in _drawn(results, OTHERS) if record not in main)
+def standard_figures(results: Results, runs: int | None = None) -> tuple[FigureRecord, ...]:
+    """The main figures, then angles, modes, forces, reactions, energies, other points and responses.
+
+    `runs`: that figures of several files have together.
+    """
+    main = _drawn(results, MAIN, runs)
+    return main + tuple(record for record in _drawn(results, OTHERS, runs) if record not in main)
 
 
-def _drawn(results: Results, of: Figures) -> tuple[FigureRecord, ...]:
+def _drawn(results: Results, of: Figures, runs: int | None = None) -> tuple[FigureRecord, ...]:
     """The figures of `of`, without histories of a single instant: static analyses have numbers, no curves."""
-    found = []
+    found: list[FigureRecord] = []
     for record in chain.from_iterable(figures(results) for figures in of):
         curves = tuple(curve for curve in record.curves if len(results.time(curve.data)) > 1)
         if curves or not record.curves:
-            found.append(record.model_copy(update={"curves": curves}))
+            found += _apart(record.model_copy(update={"curves": curves}), runs)
     return tuple(found)
+
+
+def _apart(record: FigureRecord, runs: int | None) -> list[FigureRecord]:
+    """A figure for each component, which ends the labels of its curves, where many runs have several."""
+    parts: dict[str, list[Curve]] = {}
+    for curve in record.curves:
+        run, comma, axis = curve.label.rpartition(", ")
+        parts.setdefault(axis if comma else "", []).append(curve.model_copy(update={"label": run}))
+    if len(parts) < 2 or (runs or max(map(len, parts.values()))) <= TOGETHER:
+        return [record]
+    return [
+        record.model_copy(update={
+            "name": file_name(record.name, axis), "title": f"{record.title}, {axis}", "curves": tuple(curves),
+        })
+        for axis, curves in parts.items()
+    ]  # fmt: skip
 
 
 def _histories(
@@ -143,7 +163,9 @@ def _modes(results: Results) -> Iterator[FigureRecord]:
                 data = f"{analysis}/bodies/{body}/{dataset}"
                 if of_motors and dataset == "modal_force":
                     continue  # round-off
-                if results.has(data) and results.data(data).any():
+                found = curves_of(results, f"bodies/{body}/{dataset}")
+                sizes = {each.data: np.abs(results.data(each.data)).max(initial=0.0) for each in found}
+                if sizes.get(data, 0.0) > ROUND_OFF * max(sizes.values(), default=0.0):
                     curve, of = Curve(data=data, label="mode"), f"{title} of {body}, {analysis}"
                     yield from _histories((dataset, analysis, body), of, [curve], y_label)
 
@@ -255,6 +277,8 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
     """
     limits = {layout.get("name", layout["body"]): layout.get("limit") for layout in results.scene.get("pzt", [])}
     for analysis in results.analyses:
+        if results.attributes(analysis)["kind"] == "motors-only":
+            continue  # round-off
         for body in results.names(f"{analysis}/pzt"):
             required, within = f"{analysis}/pzt/{body}/required_voltage", f"{analysis}/pzt/{body}/voltage"
             top = np.abs(results.data(required)).max()

@@ -24,6 +24,7 @@ from .runs import Run, runs, sources
 
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 
+FAR = 10  # times the largest value of a chart: limits beyond it would leave its curves flat
 DASHES = ("solid", "dash", "dashdot", "dot")
 # Violet to green (viridis, its dark end brighter: dark pages), for series with an order: patches along a link, modes.
 SHADES = np.array([[110, 80, 170], [65, 115, 175], [33, 145, 140], [94, 201, 98]], dtype=float)
@@ -37,7 +38,7 @@ class Chart:
         name: unique on the page; letters, digits, `_`.
         title, x_label, y_label: with units.
         traces: in Plotly's terms.
-        limits: horizontal lines.
+        limits: horizontal lines; where curves would be flat beside them, they wait for a click on their name.
         includes: values that the range of y has at least.
         equal_axes: one metre is as long on both.
     """
@@ -50,9 +51,12 @@ class Chart:
     limits: tuple[float, ...] = ()
     includes: tuple[float, ...] = ()
     equal_axes: bool = False
+    top: float = field(default=0.0, init=False)
 
     def add(self, label: str, x: Array, y: Array, **style: Any) -> None:  # noqa: ANN401 (a trace's own keys)
         """Add a curve y(x)."""
+        if "visible" not in style:
+            self.top = max(self.top, float(np.nanmax(np.abs(y), initial=0.0)))
         mode = "lines" if len(y) > 1 else "markers"
         self.traces.append({"type": "scatter", "mode": mode, "name": plain(label), **_coordinates(x, y), **style})
         if mode == "lines":  # else Plotly leaves out points that it takes for straight: corners on smooth curves
@@ -61,17 +65,18 @@ class Chart:
     @property
     def layout(self) -> dict[str, Any]:
         """Plotly's layout of this chart."""
+        texts = ", ".join(f"{limit:g}".replace("-", "−") for limit in self.limits)
         lines = [
             {
                 "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": limit, "y1": limit,
-                "line": limit_style(),
+                "line": limit_style(), "showlegend": limit == self.limits[0], "name": f"limits {texts}",
+                "legendgroup": "limits", "visible": True if abs(limit) < FAR * self.top else "legendonly",
             }
             for limit in self.limits
         ]  # fmt: skip
-        if lines:
-            text = "limits " + ", ".join(f"{limit:g}".replace("-", "−") for limit in self.limits)
-            lines[0]["label"] = {"text": text, "textposition": "start"}
-        found = axes_layout(self.title, self.x_label, self.y_label, legend=len(self.traces) > 1) | {"shapes": lines}
+        found = axes_layout(self.title, self.x_label, self.y_label, legend=len(self.traces) + len(lines) > 1) | {
+            "shapes": lines
+        }
         if self.includes:
             found["yaxis"] |= {"autorangeoptions": {"include": list(self.includes)}}
         if self.equal_axes:
@@ -145,11 +150,15 @@ def _coordinates(x: Array, y: Array) -> dict[str, Any]:
 
 
 def history_charts(files: Sequence[Results]) -> list[Chart]:
-    """Path errors, paths, angles, deflections, forces, moments, voltages and energies."""
+    """Path errors, paths, angles, deflections, forces, moments, voltages and energies.
+
+    Beside others, a run that diverged waits for a click on its name: they would be flat.
+    """
     charts = {chart.name: chart for chart in _path_errors(files)}
-    colors = {(run.source, run.analysis): k for k, run in enumerate(runs(files))}
+    looks = {(run.source, run.analysis): (k, _waiting(run)) for k, run in enumerate(runs(files))}
+    together = len(looks) if len(files) > 1 else None
     for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
-        records = {record.name: record for record in standard_figures(results)}
+        records = {record.name: record for record in standard_figures(results, together)}
         for record in records.values():
             if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories
                 continue
@@ -159,7 +168,7 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
             x_label = "x (m)" if is_path else record.x_label
             empty = Chart(record.name, record.title, record.y_label, x_label, limits=record.limits, equal_axes=is_path)
             chart = charts.setdefault(record.name, empty)
-            for curve, look in _looks(record, source, colors, len(chart.traces)):
+            for curve, look in _looks(record, source, looks, len(chart.traces)):
                 _add(chart, results, record, curve, source, look, DASHES[number % len(DASHES)])
             if record.joint is not None and len(limits := motor_limits(results, record)):
                 chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
@@ -189,24 +198,30 @@ PRESCRIBED = {"color": "#8b95a3", "width": 4}
 
 
 def _looks(
-    record: FigureRecord, source: str, colors: dict[tuple[str, str], int], before: int
+    record: FigureRecord, source: str, looks: dict[tuple[str, str], tuple[int, dict[str, str]]], before: int
 ) -> Iterator[tuple[Curve, dict[str, Any]]]:
     """Every curve with its style: a run has the same colour in all charts that compare runs, as in the mechanism.
 
-    `colors` are by (source, analysis); `before`: curves that the chart has already.
+    `looks` are colors and visibility by (source, analysis); `before`: curves that the chart has already.
     """
     names = [  # of analyses; a prescribed path, which all have, has none
         "" if curve.data.partition("[")[0].endswith("/target") else curve.data.partition("/")[0]
         for curve in record.curves
     ]
-    is_one = len(set(names)) == 1 and len(names) > 1  # components of one run
+    is_one = len(set(names)) == 1
     parts: Counter[str] = Counter()
     for k, (curve, name) in enumerate(zip(record.curves, names, strict=True), before):
         if not name:
             yield curve, {"line": PRESCRIBED | {"dash": DASHES[parts[name] % len(DASHES)]}}
         else:
-            yield curve, style(k) if is_one else style(k, colors[source, name], parts[name])
+            color, waiting = looks[source, name]
+            of_components = is_one and len(names) > 1
+            yield curve, style(k) if of_components else style(k, color, parts[name]) | ({} if is_one else waiting)
         parts[name] += 1
+
+
+def _waiting(run: Run) -> dict[str, str]:
+    return {"visible": "legendonly"} if run.results.attributes(run.analysis)["status"] == "diverged" else {}
 
 
 def _add(
@@ -237,7 +252,8 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
             empty = Chart(file_name("error", name), title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF))
             chart = charts.setdefault(name, empty)
             error = path_error(run, target)
-            chart.add(run.label, time[: len(error)], 1e3 * error, **style(len(chart.traces), k))
+            look = style(len(chart.traces), k) | (_waiting(run) if chart.traces else {})
+            chart.add(run.label, time[: len(error)], 1e3 * error, **look)
     return list(charts.values())
 
 

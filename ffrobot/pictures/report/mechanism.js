@@ -108,16 +108,23 @@ function scenery() {
 }
 
 const { right, up, viewer } = MECHANISM.view, FLAT = MECHANISM.is_plane;
-const SEEN = FLAT ? 2 : 1.74; // of the height, in Plotly's unit
-const LABELS = FLAT ? [150, 100] : [100, 95]; // pixels of the width and of the height that labels of the axes take
+const DISTANCE = 2.1, SEEN = FLAT ? 2 : 1.74; // of the camera from the middle, of the height there, in Plotly's unit
+const LABELS = FLAT ? { across: 150, up: 50, down: 50 } : { across: 100, up: 10, down: 50 }; // pixels that labels of the axes take
+const MIDDLE = FLAT ? 0.5 : 0.43; // of the box, from the top, of the height
 const PAPER = [690, 400]; // pixels
-const still = scenery();
 const first = []; // number of the first trace of each run
 
-// How long a metre is, in Plotly's unit: the box of the axes fills the picture, as the viewer sees it.
+// How long a metre is, in Plotly's unit: the box of the axes fills the picture, its near corners as the viewer sees them.
 function metre([width, height]) {
-  const seen = (along) => MECHANISM.range.reduce((sum, [a, b], c) => sum + (b - a) * Math.abs(along[c]), 0);
-  return (SEEN / height) * Math.min((width - LABELS[0]) / seen(right), (height - LABELS[1]) / seen(up));
+  const across = (SEEN * (width - LABELS.across)) / (2 * height);
+  const upwards = SEEN * (MIDDLE - LABELS.up / height), downwards = SEEN * (1 - MIDDLE - LABELS.down / height);
+  const corners = Array.from({ length: 8 }, (_, k) => MECHANISM.range.map(([a, b], c) => ((k >> c) % 2 - 0.5) * (b - a)));
+  const along = (corner, axis) => corner.reduce((sum, value, c) => sum + value * axis[c], 0);
+  const sizes = corners.map((corner) => {
+    const nearness = FLAT ? 0 : along(corner, viewer) / DISTANCE, height = along(corner, up);
+    return nearness + Math.max(Math.abs(along(corner, right)) / across, height / upwards, -height / downwards);
+  });
+  return 1 / Math.max(...sizes);
 }
 
 // Axes of the scene in the colours of the page; one metre is as long on each.
@@ -129,7 +136,7 @@ function sceneAxes(size = [stage.clientWidth, stage.clientHeight]) {
     found[`${name}axis`] = {
       ...axis3D(), range: [a, b], title: { text: `${name} (m)` }, visible: c < 2 || !FLAT, tickangle: FLAT ? 0 : "auto",
       showbackground: false, showspikes: false,
-      nticks: 2 + Math.round((6 * (b - a)) / longest),
+      nticks: tickCount([a, b], longest),
     };
     found.aspectratio[name] = unit * (b - a);
   });
@@ -137,7 +144,8 @@ function sceneAxes(size = [stage.clientWidth, stage.clientHeight]) {
 }
 
 function start() {
-  const all = [...still];
+  const all = scenery();
+  first.length = 0;
   for (const run of MECHANISM.runs) {
     first.push(all.length);
     traces(run, 0, state.s).forEach((at, i) => all.push({ ...styles(run)[i], ...at }));
@@ -146,7 +154,7 @@ function start() {
   if (NARROW && rows > 0) stage.style.height = `calc(22rem + ${20 * rows}px)`;
   const xyz = ([x, y, z]) => ({ x, y, z });
   const camera = {
-    eye: xyz(viewer.map((value) => 2.1 * value)), up: xyz(FLAT ? up : [0, 0, 1]), center: xyz(FLAT ? [0, -0.1, 0] : [0, 0, -0.14]),
+    eye: xyz(viewer.map((value) => DISTANCE * value)), up: xyz(FLAT ? up : [0, 0, 1]), center: xyz(FLAT ? [0, -0.1, 0] : [0, 0, -0.14]),
     projection: { type: FLAT ? "orthographic" : "perspective" },
   };
   if (FLAT) camera.eye.y += camera.center.y; // straight along z
@@ -155,7 +163,7 @@ function start() {
     legend: { orientation: "h", y: 0, font: { size: 11 } },
     scene: { ...sceneAxes(), camera, dragmode: FLAT ? "pan" : "turntable", uirevision: "keep" },
   };
-  return Plotly.newPlot(stage, all, layout, CONFIG);
+  return Plotly.react(stage, all, layout, CONFIG);
 }
 
 // Plotly goes back to the camera of its layout at every change of the data, and writes there what the user does only when
@@ -201,10 +209,6 @@ const fit = (size) => Plotly.relayout(stage, { "scene.aspectratio": sceneAxes(si
 window.addEventListener("beforeprint", () => fit(PAPER));
 window.addEventListener("afterprint", () => fit());
 
-SCREEN.addEventListener("change", () => {
-  const colors = sceneAxes();
-  Plotly.relayout(stage, Object.fromEntries(["x", "y", "z"].flatMap((name) =>
-    ["color", "gridcolor", "zerolinecolor"].map((key) => [`scene.${name}axis.${key}`, colors[`${name}axis`][key]]))));
-});
+SCREEN.addEventListener("change", () => start().then(show));
 
 begin(start);

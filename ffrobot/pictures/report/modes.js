@@ -32,9 +32,11 @@ function modeAxes(link) {
     return [Math.min(...values) - reach, Math.max(...values) + reach];
   });
   const longest = Math.max(...ranges.map(([a, b]) => b - a));
-  const axis = (c, name) => ({ ...axis3D(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false });
-  // The height of the picture is two units; beside the link there is the color bar. On phones the width decides.
-  const length = 2.6 * Math.min(1, (modeStage.clientWidth - 80) / (1.3 * modeStage.clientHeight));
+  const axis = (c, name) => ({
+    ...axis3D(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false, nticks: tickCount(ranges[c], longest),
+  });
+  // The height of the picture is two units; beside the link there are labels and the color bar. On phones the width decides.
+  const length = 2.6 * Math.min(1, (modeStage.clientWidth - 150) / (1.3 * modeStage.clientHeight));
   const ratio = (c) => (length * (ranges[c][1] - ranges[c][0])) / longest;
   return {
     xaxis: axis(0, "x"), yaxis: axis(1, "y"), zaxis: axis(2, "z"),

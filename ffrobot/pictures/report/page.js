@@ -10,14 +10,15 @@ const COMMON_LAYOUT = {
   margin: { l: 70, r: 15, t: 55, b: 50 },
   colorway: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A7A7A"],
   legend: {
-    orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: NARROW ? 10 : 11 },
-    ...(NARROW ? { xref: "container", x: 0, entrywidth: 0.5, entrywidthmode: "fraction" } : {}), // two columns
+    orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: NARROW ? 10 : 11 }, tracegroupgap: 0,
+    ...(NARROW ? { xref: "container", x: 0, entrywidthmode: "fraction" } : {}),
   },
   hovermode: "closest",
 };
 const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
 const axis = () => ({ gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line"), linecolor: pageColor("--axis"), ticks: "outside" });
 // In 3D; of the axes themselves, which keep their ranges.
+const tickCount = ([a, b], longest) => 2 + Math.round((6 * (b - a)) / longest);
 const axis3D = () => ({ color: pageColor("--ink"), gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line") });
 const CONFIG = {
   responsive: true,
@@ -29,10 +30,11 @@ const CONFIG = {
   toImageButtonOptions: { format: "svg" },
 };
 
-function chartLayout(layout) {
+function chartLayout({ data, layout }) {
   return {
     ...COMMON_LAYOUT,
     ...paint(),
+    legend: NARROW ? { ...COMMON_LAYOUT.legend, entrywidth: 1 / legendColumns(data) } : COMMON_LAYOUT.legend,
     ...layout,
     title: {
       ...layout.title, font: { size: NARROW ? 13 : 14 }, x: 0, xanchor: "left", xref: NARROW ? "container" : "paper", y: 1, yanchor: "top",
@@ -62,13 +64,17 @@ const every = (values, step, offset) => Array.from(values).filter((_, i) => i % 
 // Charts are drawn when they come near the window: a page of many opens at once.
 const CHARTS = JSON.parse(document.getElementById("chart-data").textContent);
 
+// Of a legend on phones and paper: how many names stand side by side, and how many there are.
+const legendColumns = (data) => (Math.max(...data.map(({ name }) => (name ?? "").length)) > 22 ? 1 : 2);
+const legendEntries = ({ data, layout }) => data.length + (layout.shapes ?? []).filter((shape) => shape.showlegend).length;
+
 function drawChart(element) {
   const chart = CHARTS[element.dataset.chart];
   if (chart && !element.dataset.drawn) {
     element.dataset.drawn = "yes";
-    const rows = Math.ceil(chart.data.length / 2) - 3; // of the legend, on a phone, beyond what the height is for
+    const rows = Math.ceil(legendEntries(chart) / legendColumns(chart.data)) - 3; // of the legend, on a phone, beyond what the height is for
     if (NARROW && rows > 0 && !element.style.height) element.style.height = `calc(19rem + ${19 * rows}px)`;
-    Plotly.newPlot(element, chart.data, chartLayout(chart.layout), CONFIG);
+    Plotly.newPlot(element, chart.data, chartLayout(chart), CONFIG);
   }
 }
 
@@ -89,14 +95,14 @@ const SIZES = {
     mechanism: { width: 690, height: 400, "legend.y": -0.2 },
     broad: { width: 690, height: 400, "title.font.size": 11 },
     long: { width: 690, "title.font.size": 11 },
-    chart: { width: 340, height: 265, "legend.font.size": 8, "title.font.size": 11, "title.xref": "container" },
+    chart: { width: 340, height: 265, "font.size": 10, "legend.font.size": 8, "title.font.size": 11, "title.xref": "container" },
   },
   screen: {
     mechanism: { width: null, height: null, "legend.y": -0.13 },
     broad: { width: null, height: null, "title.font.size": NARROW ? 13 : 14 },
     long: { width: null, "title.font.size": NARROW ? 13 : 14 },
     chart: {
-      width: null, height: null, "legend.font.size": NARROW ? 10 : 11, "title.font.size": NARROW ? 13 : 14,
+      width: null, height: null, "font.size": 12, "legend.font.size": NARROW ? 10 : 11, "title.font.size": NARROW ? 13 : 14,
       "title.xref": NARROW ? "container" : "paper",
     },
   },
@@ -105,9 +111,9 @@ function resize(place) {
   for (const chart of drawn()) {
     if (chart.id === "modes-3d") continue;
     const shape = ["broad", "long"].find((name) => chart.classList.contains(name)) ?? chart.id;
-    const columns = chart.dataset.chart && !["broad", "long"].includes(shape) ? 2 : 3; // of the legend
+    const columns = chart.dataset.chart && !["broad", "long"].includes(shape) ? legendColumns(chart.data) : 3; // of the legend
     const size = { ...(SIZES[place][shape] ?? SIZES[place].chart) };
-    if (size.height) size.height += ROW * Math.max(0, Math.ceil(chart.data.length / columns) - 2);
+    if (size.height) size.height += ROW * Math.max(0, Math.ceil(legendEntries(chart) / columns) - 2);
     Plotly.relayout(chart, size);
   }
 }

@@ -63,7 +63,7 @@ def bending_table(runs: Sequence[Run]) -> Table:
         for body in run.results.names(f"{run.analysis}/bodies"):
             about = run.results.attributes(f"{run.analysis}/bodies/{body}")
             if "largest_deflection" in about:
-                rows.append((run.label, body, *(f"{scale * about[key]:.2g}" for key, scale in scaled)))
+                rows.append((run.label, body, *(f"{float(f'{scale * about[key]:.2g}'):g}" for key, scale in scaled)))
     return Table(heading, rows)
 
 
@@ -167,7 +167,7 @@ def zeros_table(runs: Sequence[Run]) -> Table:
             phase = f"minimum phase{at_rest if is_unstable(zeros @ (1.0, 1.0j)).any() else ''}"
             kind = phase if about["minimum_phase"] else "not minimum phase: stable inversion"
             largest, least = zeros[..., 0].max(), abs(zeros[..., 0]).min()
-            rows.append((run.label, kind, f"{about['factor']:.3g}", f"{largest:.4g}", f"{least:.4g}"))
+            rows.append((run.label, kind, f"{about['factor']:.3g}", f"{largest:.4g}", number(least)))
     heading = ("motors only", "zeros along the path", "of the vibration in the output", "largest real part (1/s)",
                "nearest to the axis (1/s)")  # fmt: skip
     return Table(heading, rows)
