@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from body_equations import Accelerated, required_forces
+from closed_chains import closed_chain
 from moving_trees import SMALL, moving
 from prescribed_oracle import Motor, row_accelerations, unmet
 from random_mechanisms import TYPES
@@ -21,6 +22,7 @@ from ffrobot.mbs.model.rows import ConstraintRow
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.model.tree import Section
 from ffrobot.mbs.scene.loads import Load
+from ffrobot.mbs.solve.servo import Servo
 
 TIMES = np.array([0.0, 0.01, 0.01, 0.05])
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -298,3 +300,30 @@ def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops,
         for rows in (slice(0, n), slice(n, None)):
             largest = np.abs(by_differences[rows]).max()
             np.testing.assert_allclose(exact[rows], by_differences[rows], rtol=0, atol=1e-8 * largest)
+
+
+@pytest.mark.parametrize("cut", ["j2", "j4"])
+def test_motors_of_planar_joints_in_loops_go_with_the_redefined_output(cut):
+    """Their coordinates are those on the path with a share of the deflections; loops stay closed."""
+    rng, factor = np.random.default_rng(4), 0.6
+    chain = closed_chain(rng, ("planar", "universal", "cylindrical", "universal"), ("beam",), size=SMALL)
+    chain.tables["j1"]["motor"] = True
+    model = chain.model(cut)
+    q = chain.position(model)
+    model = following(rng, model, q)
+    near, tree, modal = np.tile(q, (len(TIMES), 1)), model.tree, modal_columns(model.tree)
+    modes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None] * rng.standard_normal((3, len(TIMES), len(modal)))
+    modes[0] += q[modal]
+    servo = Servo(model, 1.0, factor, TIMES, near, "", lambda: True)
+    found = servo.motion.motion(TIMES, *modes, near)
+    on_path = _core.SpatialPrescribedMotion(in_core(model, []), q).motion(TIMES.tolist(), *factor * modes, near)
+    node = tree.nodes[tree.carried["j1"]]
+    assert len(model.motors["j1"]) == 3
+    for name, columns in (("q", node.q), ("v", node.v), ("a", node.v)):
+        expected = getattr(on_path, name)[:, columns]
+        np.testing.assert_allclose(getattr(found, name)[:, columns], expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(found.q[:, modal], modes[0], atol=1e-14)
+    C, C_v = row_values(model, found.q, TIMES)
+    assert np.abs(C[:, model.loop_rows]).max() < 1e-10
+    assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, model.loop_rows]).max() < 1e-9
+    assert np.abs(found.q - on_path.q).max() > 1e-3
