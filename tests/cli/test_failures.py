@@ -79,6 +79,7 @@ def test_too_many_steps(two_link_copy, ffrobot):
     with h5py.File(folder / "scene.results.h5") as file:
         assert set(file) == {"inverse"}
         assert file["inverse"].attrs["status"] == "too many steps"
+        assert file["inverse"].attrs["cause"] in done.stderr
         assert 1 < len(file["inverse/time"]) < 21
 
 

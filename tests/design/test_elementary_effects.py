@@ -43,6 +43,18 @@ def test_ishigami():
     assert found.mu[0, 0] == pytest.approx(found.mu_star[0, 0], rel=1e-12)  # up from −π and down from π/3 alike
 
 
+def test_sobol_g():
+    """Π (|4u − 2| + a)/(1 + a): on four levels |4u − 2| is 2 or 2/3, so that μ* is 2/(1 + a) and the others' means."""
+    a = np.array([0.0, 1.0, 4.5, 99.0])
+    taken = draw_trajectories(4, 4000, seed=5)
+    f = np.prod((np.abs(4.0 * taken.points - 2.0) + a) / (1.0 + a), axis=2)
+    found = elementary_effects(taken, f[:, :, None])
+    means = (4.0 / 3.0 + a) / (1.0 + a)
+    expected = 2.0 / (1.0 + a) * np.prod(means) / means
+    assert np.all(np.abs(found.mu_star[0] - expected) < 4.0 * found.mu_star_error[0])
+    assert found.mu_star_error.max() < 0.02
+
+
 def test_a_failed_run_costs_the_effects_beside_it_alone():
     taken = draw_trajectories(3, 2, seed=0)
     f = (taken.points @ np.array([1.0, 2.0, 4.0]))[:, :, None]

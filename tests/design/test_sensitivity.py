@@ -160,6 +160,7 @@ def test_frequencies_of_a_cantilever(write):
         "links.arm.geometry.section.height": 1.0,
         "links.arm.geometry.section.width": 0.0,
         "links.arm.geometry.length": -2.0,
+        "links.arm.material.youngs_modulus": 0.5,
         "links.arm.material.density": -0.5,
     }
     found = ffrobot.sensitivity(write(scene), ["frequency 1 arm", "frequency 2 arm"], list(keys))

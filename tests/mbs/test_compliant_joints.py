@@ -10,7 +10,9 @@ from rods import rod
 
 from ffrobot.actuation.control.linear_model import robot_modes, state_space
 from ffrobot.common.errors import InputError
+from ffrobot.mbs.analysis.gears import unresolved_gears, with_motor_coordinates
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
+from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths
@@ -115,11 +117,32 @@ def test_patches_help_motors_behind_gears_that_give():
     assert left[1] < 1e-7
 
 
+def test_coarse_outputs_are_told_of():
+    model = rigid_arm(GEARED | {"stiffness": 30.0}, RIGID)
+    source = run(model, pcid(tolerance=1e-6, output_step=0.05))
+    (line,) = unresolved_gears(source.motion.gears)
+    assert "refine output_step" in line
+
+
 def test_dampers_that_hold_a_gear_for_good_are_refused():
     """Moments say nothing of a twist that takes 15 000 analyses to come; splines would have no solution to rounding."""
     model = rigid_arm(GEARED | {"damping": 4.5e7}, RIGID)
     with pytest.raises(InputError, match=r'joint "O": damping: expected .* within 1e\+04 s .*, found 1.5e\+04'):
         run(model, pcid(tolerance=1e-6)).motion.gears  # noqa: B018
+
+
+def test_equilibrium_winds_the_gears():
+    """About it, forces are needed along the motors alone: springs carry the links."""
+    held = [{"name": name, "joint": name, "value": value} for name, value in (("O", "0.4"), ("A", "0.9"))]
+    model = geared_arm(GEARED, trajectory=held)
+    about = run(model, Static(name="static", kind="static"))
+    q = with_motor_coordinates(about.outcome, with_compliance(without_paths(model.model))).q[0]
+    mechanism = linearised(model, q, *np.zeros((2, len(q))))
+    along = [mechanism.names.index(f"motor/{joint}") for joint in "OA"]
+    assert mechanism.force[along].min() > 1.0
+    expected = [about.motion.gears[joint].moment[0] for joint in "OA"]
+    np.testing.assert_allclose(mechanism.force[along], expected, rtol=1e-9)
+    assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
 
 
 @pytest.mark.parametrize(

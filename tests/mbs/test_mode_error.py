@@ -6,7 +6,7 @@ from beam_links import beam_link, rectangle, tube
 from steel_arms import two_links
 
 import ffrobot as library
-from ffrobot.mbs.quantities.attachment_error import Start, phase_error, start_jolt
+from ffrobot.mbs.quantities.attachment_error import ModesInMotion, Start, mode_error, phase_error, start_jolt
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 
@@ -29,6 +29,17 @@ def test_estimate_is_about_the_error_of_moments(payload, rise, state):
     errors = np.abs(moments[0] - moments[1]).max(axis=0) / np.abs(moments[1]).max(axis=0)
     assert 0.2 * errors.max() < coarse.mode_error < 5 * errors.max()
     assert (coarse.mode_error < 1e-5) == (state == "static")
+
+
+def test_modes_that_ring_count_by_what_they_do():
+    """Of a mode at ω, far above ω_k, p̈ = −ω² p says nothing of what modes between them leave out: p does."""
+    body = solved(two_links(2, True), "swing").motion.model.tree.nodes[-1].body
+    t = np.linspace(0.0, 1.0, 2001)
+    p = np.zeros((len(t), body.n_modes))
+    p[:, 0], p[:, -1] = 1.0, 1e-3 * np.cos(np.sqrt(body.stiffness[-1]) * t)
+    ringing = ModesInMotion(body, p, -body.stiffness * p)
+    share = 1e-3 * np.sqrt(body.stiffness[-1] / body.stiffness[0])
+    assert mode_error([ringing]) == pytest.approx(share / np.sqrt(1 + share**2), rel=1e-3)
 
 
 def swung(angle, modes=1, damping=0.0, attachment_modes=False):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mechanisms import make_model, pcid, revolute
+from mechanisms import forward, make_model, pcid, relative, revolute
 from oracle_runs import run
 from rods import rod
 from scipy.integrate import trapezoid
@@ -71,3 +71,12 @@ def test_two_inverted_rods():
     mass = np.array([[m * a**2 / 3 + n * a**2, n * a * b / 2], [n * a * b / 2, n * b**2 / 3]])
     slope = np.diag([m * G * a / 2 + n * G * a, n * G * b / 2])
     assert growth(robot) == pytest.approx(np.sqrt(eigh(slope, mass, eigvals_only=True)[-1]), rel=1e-9)
+
+
+def test_deviations_grow_so():
+    """A run from 1e-6 rad beside the upright posture: δ cosh λt."""
+    away, t = 1e-6, np.linspace(0.0, 1.0, 101)
+    free = pendulum([], initial=np.pi / 2 + away)
+    theta = run(free, forward(tolerance=1e-10)).q[:, 2] - np.pi / 2
+    rate = growth(pendulum(along("pi/2")))
+    assert relative(theta, away * np.cosh(rate * t)) < 1e-5

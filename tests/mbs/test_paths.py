@@ -123,6 +123,16 @@ def test_shapers_cancel_their_frequency(damping_ratio):
         assert residual(ei, 3.0, 0.0) == pytest.approx(RESIDUAL, rel=1e-12)
 
 
+def test_wrong_frequencies_matter_less_to_zvd_and_ei():
+    """Undamped: |cos(π f/2f₀)|, its square, and the width for 5 %: 0.06, 0.29, 0.40 (Singhose 1994, table 1)."""
+    f = np.linspace(0.5, 1.5, 2001)
+    zv, zvd, ei = (np.array([residual(impulses(kind, 1.0, 0.0), x, 0.0) for x in f]) for kind in ("zv", "zvd", "ei"))
+    np.testing.assert_allclose(zv, np.abs(np.cos(np.pi * f / 2)), atol=1e-12)
+    np.testing.assert_allclose(zvd, zv**2, atol=1e-12)
+    widths = [np.ptp(f[v <= RESIDUAL + 1e-9]) for v in (zv, zvd, ei)]
+    assert widths == pytest.approx([0.064, 0.286, 0.398], abs=0.002)
+
+
 def test_shaped_motion_leaves_an_oscillator_at_rest():
     """x'' + 2ζω x' + ω² x = ω² u: integrated with the unshaped and the shaped path."""
     from scipy.integrate import solve_ivp
