@@ -1,9 +1,8 @@
-"""Cases of actuation and control, each through `ffrobot solve`: identities, closed forms, and tables of READMEs."""
+"""Cases of actuation and control, each through `ffrobot solve`: identities and closed forms."""
 
 import numpy as np
 import pytest
-from checkpoints import check_table, peak, tip_error
-from reference_scenes import NIGHTLY
+from checkpoints import peak, tip_error
 
 
 @pytest.fixture(scope="module")
@@ -14,47 +13,6 @@ def slew(solved):
 @pytest.fixture(scope="module")
 def linear(solved):
     return solved("two_link_linear")
-
-
-PEAKS = {
-    ("two_link_fcid", "analysis"): [
-        *(f"joints/{joint}/moment" for joint in "OA"), *(f"pzt/link{k}/required_voltage" for k in (1, 2)),
-    ],
-    ("straight_slew", "run"): ["points/arm.tip/deflection"],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("case", "head"), PEAKS)
-def test_peaks_of_the_readme(solved, case, head):
-    """Of a dataset in each column, of an analysis in each row; of deflections the component across."""
-    file = solved(case).file
-
-    def of(name):
-        values = [file[f"{name.strip('`')}/{dataset}"][()] for dataset in PEAKS[case, head]]
-        return [peak(one[:, 1] if "deflection" in dataset else one)
-                for one, dataset in zip(values, PEAKS[case, head], strict=True)]  # fmt: skip
-
-    check_table(case, head, of)
-
-
-METRICS = {
-    "compliant_arm": ("tip_error_rms", "tip_error_max", "vibration"),
-    "two_link_closed_loop": (
-        "tip_error_rms", "tip_error_max", "vibration", "residual", "peak_moment", "peak_voltage",
-    ),
-    "two_link_rest_to_rest": (
-        "tip_error_rms", "tip_error_max", "vibration", "residual", "peak_moment", "peak_voltage",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "case", [pytest.param(case, marks=[pytest.mark.nightly] * (case in NIGHTLY)) for case in METRICS]
-)
-def test_closed_loops_of_the_readme(solved, case):
-    """Metrics of all that are stable, one in each row."""
-    file = solved(case).file
-    check_table(case, "run", lambda name: [file[f"{name.strip('`')}/control"].attrs[key] for key in METRICS[case]])
 
 
 @pytest.mark.parametrize("name", ["straight", "sagging"])

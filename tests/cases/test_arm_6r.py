@@ -12,8 +12,9 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 import pytest
-from checkpoints import CASES, reference
+from checkpoints import CASES, check_table, reference
 from rigid_robots import moments, numbers
+from scipy.spatial.distance import pdist
 
 from ffrobot.common.rotations import exponential, of_quaternion
 from ffrobot.fe_models.modal_body_file import read_modal_body
@@ -86,6 +87,12 @@ def deviation(group):
     return way, 1e3 * sine
 
 
+def deviations(group):
+    """At the start, at most and at the end, and the largest turn: as in the README."""
+    way, turn = deviation(group)
+    return way[0], way.max(), way[-1], turn.max()
+
+
 @pytest.mark.parametrize("analysis", ["straight", "inverse"])
 def test_the_tool_is_on_its_path(arm, analysis):
     way, turn = deviation(arm.file[analysis])
@@ -155,12 +162,26 @@ def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears
 
 
 @pytest.mark.nightly
-def test_distance_of_the_figure(arm, ffrobot):
-    """deviation.csv, which the figure shows, is what hold_joints.py makes: joints where those of the rigid arm are."""
+def test_numbers_behind_gears(behind_gears):
+    check_table("arm_6r", "gears", 0.01, lambda row: deviations(behind_gears["gears"]))
+
+    def of_scene(row):
+        group = behind_gears[row.removesuffix(".toml")]
+        moments = [np.abs(group[f"joints/{joint}/moment"]).max() for joint in ("waist", "shoulder")]
+        return [group["trajectories/waist"].attrs["end"], pdist(after_path(group)[1]).max(), *moments]
+
+    check_table("arm_6r", "behind gears", 0.02, of_scene, smallest=2e-3)
+
+
+@pytest.mark.nightly
+def test_joints_where_those_of_the_rigid_arm_are(arm, ffrobot):
+    """hold_joints.py makes deviation.csv, which the figure shows, and a line of the README."""
     subprocess.run([sys.executable, CASE / "hold_joints.py", arm.folder], check=True)
     ffrobot.ok("solve", arm.folder / "held.toml")
     table = reference("arm_6r/deviation.csv")
     with h5py.File(arm.folder / "held.results.h5") as file:
+        groups = {"joints locked on q_r(t)": file["held"], "torques of the rigid arm": arm.file["rigid_moments"]}
+        check_table("arm_6r", "run", 0.02, lambda row: deviations(groups[row]), smallest=1e-6)
         way, _ = deviation(file["held"])
         rows = np.abs(file["held/time"][()][:, None] - np.array(table["t"], dtype=float)).argmin(axis=0)
     np.testing.assert_allclose(way[rows], np.array(table["held"], dtype=float), atol=0.02 * way.max())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from checkpoints import check_column, reference
+from checkpoints import check_column, peak, readme_table, reference
 
 from ffrobot import Results
 
@@ -29,6 +29,19 @@ def test_arm_at_the_checkpoints(arm):
     times = np.array(table.pop("t"), dtype=float)
     for name, printed in table.items():
         check_column(case, "inverse", name, times, printed, RELATIVE)
+
+
+@pytest.mark.parametrize(
+    "arm", [*ARM_RUNS, pytest.param(("line", "undeformed"), marks=pytest.mark.nightly)], indirect=True, ids="-".join
+)
+def test_numbers_of_the_readme(arm):
+    path, start, case = arm
+    group = case.file["inverse"]
+    moments = [peak(group[f"joints/{joint}/moment"]) for joint in ("waist", "shoulder", "elbow")]
+    force = np.linalg.norm(group["trajectories/tool/force"], axis=1).max()
+    across = 1e3 * np.abs(group["points/fore.tip/deflection"][:, 1:]).max(axis=0)
+    printed = readme_table("arm_3r", "run")[f"{path}, {start}"]
+    np.testing.assert_allclose([*moments, force, *across], printed, rtol=1e-3)
 
 
 def test_arm_is_on_its_path_and_in_one_piece(arm):
