@@ -123,19 +123,6 @@ def test_radau_damps_away_what_rings_below_the_tolerance():
     assert relative(outcome.lambda_, exact.lambda_) < 1e-4
 
 
-def test_outputs_between_steps_are_as_good_as_outputs_at_steps(tight):
-    """At t = 0.5 s the dense output of a run to 1 s, against a run whose last step ends there."""
-    tolerance = 1e-6
-    half = inverse(arm(), end=0.5, output_step=0.5, tolerance=tolerance, integrator="dop853")
-    whole = inverse(arm(), tolerance=tolerance, integrator="dop853")
-    middle = np.flatnonzero(tight.time == 0.5)[0]
-    for name in ("q", "lambda_"):
-        peak = np.abs(getattr(tight, name)).max()
-        exact = getattr(tight, name)[middle]
-        assert relative(getattr(half, name)[-1], exact, peak) < tolerance
-        assert relative(getattr(whole, name)[middle], exact, peak) < tolerance
-
-
 @pytest.mark.parametrize("integrator", TOLERANCES)
 def test_constraints_hold_at_every_output(integrator):
     """Position, velocity and acceleration level, relative to 1 + coordinates, rates, accelerations; however coarse."""
