@@ -147,7 +147,9 @@ def _deflection(results: Results, point: str) -> Iterator[FigureRecord]:
     largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in found], axis=0)
     shown = [k for k in range(len(largest)) if largest[k] > SEEN * largest.max()]
     curves = (Curve(data=f"{c.data}[{k}]", label=f"{c.label}, {AXES[k]}") for c in found for k in shown)
-    title = f"deflection of {point}, axes of the body"
+    # A single curve has no legend that names its axis.
+    where = f" along {AXES[shown[0]]} of the body" if len(shown) == 1 else ", axes of the body"
+    title = f"deflection of {point}{where}"
     yield from _histories(("deflection", point), title, curves, "deflection (mm)", scale=1e3)
 
 

@@ -32,11 +32,14 @@ function modeAxes(link) {
     return [Math.min(...values) - reach, Math.max(...values) + reach];
   });
   const longest = Math.max(...ranges.map(([a, b]) => b - a));
+  // Of slender links the numbers of y and z would meet in their corner.
+  const ticks = ([a, b]) => (a < 0 && b > 0 && 3 * (b - a) < longest ? { tickvals: [0] } : { nticks: tickCount([a, b], longest) });
   const axis = (c, name) => ({
-    ...axis3D(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false, nticks: tickCount(ranges[c], longest),
+    ...axis3D(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false, ...ticks(ranges[c]),
   });
-  // The height of the picture is two units; beside the link there are labels and the color bar. On phones the width decides.
-  const length = 2.6 * Math.min(1, (modeStage.clientWidth - 150) / (1.3 * modeStage.clientHeight));
+  // The height of the picture is two units; beside the link there are labels and the color bar, which phones have above it.
+  const [width, height] = [modeStage.clientWidth - (NARROW ? 100 : 150), modeStage.clientHeight - (NARROW ? 85 : 0)];
+  const length = 2.6 * Math.min(1, width / (1.3 * height));
   const ratio = (c) => (length * (ranges[c][1] - ranges[c][0])) / longest;
   return {
     xaxis: axis(0, "x"), yaxis: axis(1, "y"), zaxis: axis(2, "z"),
@@ -61,7 +64,7 @@ function drawModes() {
     // Small triangles are no degenerate ones: their normals count.
     lighting: { ambient: 0.6, diffuse: 0.6, specular: 0.1, facenormalsepsilon: 0, vertexnormalsepsilon: 0 },
     hoverinfo: "x+y+z",
-    colorbar: { title: { text: "displacement", side: "right" }, thickness: 12, len: 0.7 },
+    colorbar: { title: { text: "displacement", side: NARROW ? "top" : "right" }, orientation: NARROW ? "h" : "v", thickness: 12, len: 0.7 },
   };
   const layout = { ...paint(), margin: { l: 0, r: 0, t: 10, b: 0 }, scene: modeAxes(link) };
   return Plotly.react(modeStage, [rest, shape], layout, CONFIG);

@@ -34,7 +34,7 @@ function chartLayout({ data, layout }) {
   return {
     ...COMMON_LAYOUT,
     ...paint(),
-    legend: NARROW ? { ...COMMON_LAYOUT.legend, entrywidth: 1 / legendColumns(data) } : COMMON_LAYOUT.legend,
+    legend: NARROW ? { ...COMMON_LAYOUT.legend, entrywidth: 1 / legendColumns({ data, layout }) } : COMMON_LAYOUT.legend,
     ...layout,
     title: {
       ...layout.title, font: { size: NARROW ? 13 : 14 }, x: 0, xanchor: "left", xref: NARROW ? "container" : "paper", y: 1, yanchor: "top",
@@ -64,15 +64,16 @@ const every = (values, step, offset) => Array.from(values).filter((_, i) => i % 
 // Charts are drawn when they come near the window: a page of many opens at once.
 const CHARTS = JSON.parse(document.getElementById("chart-data").textContent);
 
-// Of a legend on phones and paper: how many names stand side by side, and how many there are.
-const legendColumns = (data) => (Math.max(...data.map(({ name }) => (name ?? "").length)) > 22 ? 1 : 2);
-const legendEntries = ({ data, layout }) => data.length + (layout.shapes ?? []).filter((shape) => shape.showlegend).length;
+// Of a legend on phones and paper: its entries, and how many stand side by side; on phones Plotly puts groups below each other.
+const legendEntries = ({ data, layout }) => [...data, ...(layout.shapes ?? []).filter((shape) => shape.showlegend)];
+const legendColumns = (chart) =>
+  legendEntries(chart).some(({ name, legendgroup }) => (name ?? "").length > 22 || (NARROW && legendgroup)) ? 1 : 2;
 
 function drawChart(element) {
   const chart = CHARTS[element.dataset.chart];
   if (chart && !element.dataset.drawn) {
     element.dataset.drawn = "yes";
-    const rows = Math.ceil(legendEntries(chart) / legendColumns(chart.data)) - 3; // of the legend, on a phone, beyond what the height is for
+    const rows = Math.ceil(legendEntries(chart).length / legendColumns(chart)) - 3; // of the legend, on a phone, beyond what the height is for
     if (NARROW && rows > 0 && !element.style.height) element.style.height = `calc(19rem + ${19 * rows}px)`;
     Plotly.newPlot(element, chart.data, chartLayout(chart), CONFIG);
   }
@@ -111,9 +112,9 @@ function resize(place) {
   for (const chart of drawn()) {
     if (chart.id === "modes-3d") continue;
     const shape = ["broad", "long"].find((name) => chart.classList.contains(name)) ?? chart.id;
-    const columns = chart.dataset.chart && !["broad", "long"].includes(shape) ? legendColumns(chart.data) : 3; // of the legend
+    const columns = chart.dataset.chart && !["broad", "long"].includes(shape) ? legendColumns(chart) : 3; // of the legend
     const size = { ...(SIZES[place][shape] ?? SIZES[place].chart) };
-    if (size.height) size.height += ROW * Math.max(0, Math.ceil(legendEntries(chart) / columns) - 2);
+    if (size.height) size.height += ROW * Math.max(0, Math.ceil(legendEntries(chart).length / columns) - 2);
     Plotly.relayout(chart, size);
   }
 }
