@@ -18,7 +18,7 @@ const COMMON_LAYOUT = {
 const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
 const axis = () => ({ gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line"), linecolor: pageColor("--axis"), ticks: "outside" });
 // In 3D; of the axes themselves, which keep their ranges.
-const tickCount = ([a, b], longest) => 2 + Math.round((6 * (b - a)) / longest);
+const tickCount = ([a, b], longest) => 2 + Math.round(((NARROW ? 4 : 6) * (b - a)) / longest);
 const axis3D = () => ({ color: pageColor("--ink"), gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line") });
 const CONFIG = {
   responsive: true,
