@@ -51,7 +51,7 @@ def draw_bars(diagram: Bars) -> Figure:
     rows = max(1, len(labels)) * (1 if count == 1 else 0.8 * count)
     picture = Figure(figsize=(WIDTH, REST + BAR * (rows + (count > 1))), layout="constrained")
     axes = picture.subplots()
-    axes.set_title(diagram.title, loc="left")
+    axes.set_title(diagram.title, loc="right")  # which has room on the left, above and below the names
     height = 0.8 / count
     for k, series in enumerate(diagram.series):
         at = as_floats(np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height)
@@ -64,7 +64,7 @@ def draw_bars(diagram: Bars) -> Figure:
     axes.grid(visible=False, axis="y")
     axes.set_axisbelow(True)
     axes.axvline(0.0, color="black", linewidth=0.6)
-    axes.set_xlabel(diagram.x_label)
+    axes.set_xlabel(diagram.x_label, loc="right")
     legend(axes)
     return picture
 
