@@ -20,6 +20,7 @@ from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import write_atomically
 from ..common.hdf5 import blaming, numbers, open_checked
 
+NUMBER = re.compile(r"(\d+)")
 COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
 
 
@@ -115,8 +116,8 @@ class Datasets:
         return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
 
     def names(self, group: str) -> list[str]:
-        """Names inside a group such as `inverse/points`; none when the file does not have it."""
-        return list(self._file[group]) if group in self._file else []
+        """Names inside a group such as `inverse/points`, 2 before 10; none when the file does not have it."""
+        return sorted(self._file.get(group, ()), key=_natural)
 
     def group(self, name: str) -> h5py.Group:
         """An analysis as h5py has it, for what reads groups."""
@@ -173,3 +174,8 @@ class Datasets:
         known: list[str] = []
         self._file.visit(known.append)
         return did_you_mean(dataset, known)
+
+
+def _natural(name: str) -> list[str | int]:
+    """What sorts names as people do: text and whole numbers in turn."""
+    return [int(part) if part.isdecimal() else part for part in NUMBER.split(name)]
