@@ -265,12 +265,11 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
                 best, _ = _pass("slsqp", differentiation, best, tell, judged=judged, excess=True)
                 found = _stands(differentiation, best)
         message = KINK if found is not None and found.kinks else message
-    except SpentError:
-        message = f"ended after {evaluations.runs} runs, as many as were allowed"
+    except (SpentError, StuckError) as error:
+        spent = isinstance(error, SpentError)
+        message = f"ended after {evaluations.runs} runs, as many as were allowed" if spent else str(error)
         last = best_of(evaluations, [best, *evaluations.searched[begun:]])
-        return Local(first, last, found if last is best else None, message, spent=True)
-    except StuckError as error:
-        message = str(error)
+        return Local(first, last, found if last is best else None, message, spent=spent)
     except ConflictError as error:
         best = error.design
         return Local(
