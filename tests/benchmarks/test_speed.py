@@ -11,7 +11,7 @@ are two to three times what was measured, so that a slip in an algorithm is foun
 * pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s. An evaluation in the run, with what the
   integrator does to it, takes 2.3 times a bare one.
 * fcid: 1000 outputs of the two-link model with straight links, and with sagging ones; extra_info has the solver's
-  own time, without the check that the path is within reach. Aim: 10 ms. With the check 77 and 160 evaluations an output.
+  own time, without the check that the path is within reach (aim: 10 ms). With it, 77 and 160 evaluations an output.
 * allocation: voltages of 20 patches for 20 modes at 1000 times, most of which meet limits. Aim: 50 ms; SciPy's general
   least squares with bounds takes 3000 times as long.
 * link: stage 1 of a link in a process of its own, forms compiled before; as long as the import of its libraries.
