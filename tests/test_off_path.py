@@ -14,11 +14,10 @@ def test_replays_are_told_by_their_distance_from_the_path(two_link, replay):
     results = ffrobot.Results(two_link.folder / "scene.results.h5")
     tips = (results[f"{name}/points/link2.tip/position"] for name in (replay, "inverse"))
     off = 1e3 * np.linalg.norm(np.subtract(*tips), axis=1)
-    text = r"link2\.tip off its path by (?:< )?(\S+) mm at most, (?:< )?(\S+) mm RMS"
+    text = r"link2\.tip off its path by (?:< )?(\S+) (mm|nm) at most, (?:< )?(\S+) (mm|nm) RMS"
     said = re.fullmatch(text, results.verdict[replay].answer)
-    np.testing.assert_allclose(
-        [float(value) for value in said.groups()], [off.max(), np.sqrt(np.mean(off**2))], rtol=1e-3, atol=1e-6
-    )
+    told = [float(value) * {"mm": 1.0, "nm": 1e-6}[unit] for value, unit in (said.group(1, 2), said.group(3, 4))]
+    np.testing.assert_allclose(told, [off.max(), np.sqrt(np.mean(off**2))], rtol=1e-3, atol=1e-6)
     assert f"{replay}: {said.group()}" in re.sub(r"\s+", " ", two_link.stdout)
 
 
