@@ -156,6 +156,19 @@ def test_least_voltage(modes, pairs, T, intervals, expected, within):
     assert 200.0 * found.share == pytest.approx(expected, rel=within)
 
 
+def test_least_effort_of_the_paper():
+    """Checkpoint 4, at 140 intervals."""
+    servo, Phi_V = arm(2, 5, 0.7)
+    found = track(asked_of_arm(servo, Phi_V, "effort", 120.0, is_free=False), graded(0.0, 0.7, 140))
+    assert found.cost == pytest.approx(0.0241177, abs=1e-7)
+    times = np.array([0.1, 0.2, 0.6, 0.68])
+    tau = servo.forces(times, *(found.curve(times, k) for k in range(3)))[1]
+    expected = [[49.783816, 7.279802], [36.530793, 8.429446], [58.572953, -5.241064], [43.211319, 1.390667]]
+    assert np.abs(tau - expected).max() < 2e-6
+    expected = [-2.50895, -8.95866, -15.8538, -16.6934, -7.28926, -10.5947, -55.0307, -65.0616, -46.1778, -7.83145]
+    assert np.abs(found.voltage(0.68) - expected).max() < 3e-4
+
+
 def test_bounds_of_zeros():
     """Section 7: what the slowest zeros ask for at least; less than what is needed."""
     servo, Phi_V = strip(4, 0.5)
@@ -164,6 +177,10 @@ def test_bounds_of_zeros():
     assert found.voltages.max() == pytest.approx(200.90, abs=1e-2)
     assert found.zeros[found.voltages.argmax()].real == pytest.approx(-64.405, abs=1e-3)
     assert found.voltages.max() < 200.0 * track(problem, graded(0.0, 0.5, 64)).share
+    servo, Phi_V = arm(4, 10, 1.0)
+    problem = asked_of_arm(servo, Phi_V, "least-voltage", 200.0, is_free=True)
+    found = bounds_of_zeros(servo, problem, linearise(servo, 1.0), (0.0, 0.0), np.full(20, 200.0))
+    assert found.voltages.max() == pytest.approx(4.310, abs=1e-3)
 
 
 def test_prices_of_limits():
@@ -264,3 +281,21 @@ def test_without_voltage_motors_alone_carry():
     torques = [servo.forces(times, *(curve(times, k) for k in range(3)))[1] for curve in (found.curve, inverted.curve)]
     assert np.abs(torques[0] - torques[1]).max() < 1e-9  # other collocation points: falls with the mesh's tolerance
     assert np.abs(found.voltage(breaks)).max() < 1e-6
+
+
+def test_slopes_of_torques():
+    """Dual numbers against differences, in which r is linear in p̈ and quadratic in ṗ."""
+    servo, _ = strip(3, 0.8)
+    rng = np.random.default_rng(0)
+    times = np.array([0.1, 0.4, 0.7])
+    p, v, a = (size * rng.standard_normal((3, 3)) for size in (1e-3, 1e-2, 1.0))
+    h = 1e-6
+    for k, slope in zip((2, 1, 0), servo.slopes(times, p, v, a), strict=True):
+        for mode in range(3):
+            moved = []
+            for sign in (1, -1):
+                state = [p.copy(), v.copy(), a.copy()]
+                state[k][:, mode] += sign * h
+                moved.append(np.concatenate(servo.forces(times, *state), axis=1))
+            expected = (moved[0] - moved[1]) / (2 * h)
+            assert np.abs(slope[:, :, mode] - expected).max() < 1e-6 * max(1.0, np.abs(slope).max())
