@@ -146,7 +146,7 @@ ROUNDED_TO_VOLTS = (8, 4, 0.6, 64, 129.8), (6, 4, 0.6, 128, 131.6), (6, 6, 0.6, 
         (4, 4, 0.6, 64, 139.7, 5e-4),
         (3, 4, 0.6, 64, 144.0, 5e-3),  # with modes and patches, rounded to volts
         (6, 2, 0.6, 64, 244.0, 5e-3),
-        *(pytest.param(*of_one, 5e-3, marks=pytest.mark.nightly) for of_one in ROUNDED_TO_VOLTS),
+        *(pytest.param(*of_one, 0.5 / of_one[-1], marks=pytest.mark.nightly) for of_one in ROUNDED_TO_VOLTS),
     ],
 )  # fmt: skip
 def test_least_voltage(modes, pairs, T, intervals, expected, within):
