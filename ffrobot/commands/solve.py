@@ -98,9 +98,9 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarked))
         click.echo("\n".join(lines))
     _check_ended(solution, display, scene_file, again)
-    if warned := [(name, text) for name, result in solution.analyses.items() for text in result.warnings if strict]:
-        name, text = warned[0]
-        raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
 def _check_ended(solution: Solution, display: Display, scene_file: Path, again: str) -> None:
