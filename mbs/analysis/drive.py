@@ -88,8 +88,8 @@ def drive_robot(
     controls = integration_controls(analysis, integrator)
     is_followed, is_replay = any(row.is_trajectory for row in model.rows), drives.replayed is not None
     paths = model.scene.trajectory if is_followed or is_replay else ()
-    given = (*(load.components for load in model.scene.load), *(drive.components for drive in drives.at_points))
-    loads = (size for components in given for size in components.values())
+    at_points = (size for drive in drives.at_points for size in drive.components.values())
+    loads = (*model.scene.load_functions, *at_points)
     is_rigid = not any(node.body.n_modes for node in model.tree.nodes)
     ends = stops(times, paths, loads, is_driven=is_rigid and is_followed, is_replay=is_rigid and is_replay)
     controls.stops = as_list(ends)

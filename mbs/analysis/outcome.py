@@ -225,8 +225,8 @@ class Outcome:
         @cache
         def look_closer() -> Outcome:
             scene, shape = self.model.scene, (function for _, function, _ in self.analysis.prescribed())
-            loads = (size for load in scene.load for size in load.components.values())
-            return at(path_times(self.time, scene.trajectory, self.analysis.last_time, [*loads, *shape]))
+            others = (*scene.load_functions, *shape)
+            return at(path_times(self.time, scene.trajectory, self.analysis.last_time, others))
 
         return replace(self, look_closer=look_closer)
 

@@ -109,12 +109,17 @@ def stops(
     for load in loads:  # just before it jumps, too: a mean over time is by the values on both sides
         found.append(np.array(load.switches()) - SHORTEST * duration)
     if is_driven and duration > 0.0:
-        grid = np.union1d(np.linspace(times[0], times[-1], FEWEST + 1), np.concatenate(found))
+        grid = np.union1d(_even(ends), np.concatenate(found))
         found += [np.setdiff1d(_resolved(function, grid, SEEN), grid) for function in (*targets, *loads)]
     if is_replay and duration > 0.0:
-        found += [_bends(target, np.linspace(times[0], times[-1], FEWEST + 1)) for target in targets]
+        found += [_bends(target, _even(ends)) for target in targets]
     every = np.unique(np.concatenate(found))
     return every[(every > times[0]) & (every < times[-1])]
+
+
+def _even(ends: Array) -> Array:
+    """(n,) s: the fewest times from ends[0] to ends[1]."""
+    return np.linspace(ends[0], ends[1], FEWEST + 1)
 
 
 def _brief_parts(function: TimeFunction, ends: Array) -> Array:
@@ -151,7 +156,7 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
     """
     paths = list(paths)
     functions = [*(target for path in paths for target in targets_of(path)), *others]
-    found = _with_others(times, np.linspace(times[0], times[-1], FEWEST + 1))
+    found = _with_others(times, _even(times[[0, -1]]))
     of_paths = (path.path.breaks for path in paths if path.path is not None)
     of_pieces = (_brief_parts(function, times[[0, -1]]) for function in functions)
     breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *of_pieces]))

@@ -228,8 +228,10 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     asked = Transition(
         servo, Phi_V, limits, _weights(servo, analysis, limits), rest, "least-voltage", rate=_rate(linear)
     )
-    starts, loads = (start_breaks(first, end, last, analysis.intervals // k) for k in (1, 2)), [*servo.loads()]
-    meshes = (with_corners(breaks, loads) for breaks in starts)
+    meshes = (
+        with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
+        for k in (1, 2)
+    )
     return _Posed(servo, linear, around, asked, *meshes)
 
 

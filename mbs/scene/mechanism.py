@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr
 from ...common.deferred import Table
 from ...common.keys import Title
 from ...common.validation import Record
+from .._core import TimeFunction
 from ..fields.field_types import NotEmpty, Quantity, Reference, Referring, under
 from ..fields.spelling import IN_PLANE, Spelled, Vector, as_written
 from ..joints.joints import AnyJoint
@@ -106,6 +107,11 @@ class MechanismKeys(Record):
     def is_planar(self) -> bool:
         """Whether the mechanism is projected on the plane z = 0, by declaration."""
         return self.space == "planar"
+
+    @property
+    def load_functions(self) -> tuple[TimeFunction, ...]:
+        """The components of all loads over time."""
+        return tuple(size for load in self.load for size in load.components.values())
 
     @property
     def edges(self) -> list[Edge]:

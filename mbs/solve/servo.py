@@ -91,10 +91,6 @@ class Servo:
             for component, function in path.targets:
                 yield Target(path.name, component, function)
 
-    def loads(self) -> Iterator[TimeFunction]:
-        """What acts on the robot meanwhile."""
-        return (size for load in self.model.scene.load for size in load.components.values())
-
     def with_factor(self, factor: float) -> Servo:
         """The same with another factor."""
         return replace(self, factor=factor)

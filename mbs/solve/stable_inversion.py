@@ -88,7 +88,7 @@ def invert(
         schemes = [GAUSS, OF_SECOND_ORDER]
     is_marched = not len(finish.rows)
     breaks = np.unique([-pre, 0.0, end, end + post]) if is_marched else _breaks(pre, end, post)
-    breaks = with_corners(breaks, (*(target.function for target in servo.targets()), *servo.loads()))
+    breaks = with_corners(breaks, (*(target.function for target in servo.targets()), *servo.model.scene.load_functions))
     for scheme in schemes:
         problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, finish, scheme)
         solver = _Solver(problem, tolerance * force, progress)
