@@ -54,7 +54,10 @@ def _apart(record: FigureRecord, runs: int | None) -> list[FigureRecord]:
     parts: dict[str, list[Curve]] = {}
     for curve in record.curves:
         run, comma, axis = curve.label.rpartition(", ")
-        parts.setdefault(axis if comma else "", []).append(curve.model_copy(update={"label": run}))
+        if comma and curve.data.endswith("]"):  # of a column, whose axis the label has; names may have commas, too
+            parts.setdefault(axis, []).append(curve.model_copy(update={"label": run}))
+        else:
+            parts.setdefault("", []).append(curve)
     if len(parts) < 2 or (runs or max(map(len, parts.values()))) <= TOGETHER:
         return [record]
     return [
