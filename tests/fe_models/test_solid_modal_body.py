@@ -107,7 +107,10 @@ def test_a_search_for_modes_that_hardly_exist_ends(tmp_path):
 
 
 def test_nothing_of_a_solid_stays_in_memory(tmp_path):
-    """PETSc keeps objects that only Python let go: matrices and factors of 10 000 unknowns are 35 MB a body."""
+    """PETSc keeps objects that only Python let go: matrices and factors of 10 000 unknowns are 35 MB a body.
+
+    Each body would leave them. The heap of a process that ran other tests may grow once by more.
+    """
 
     def memory_after(number):
         body_of(
@@ -116,5 +119,5 @@ def test_nothing_of_a_solid_stays_in_memory(tmp_path):
         gc.collect()
         return memory()
 
-    first, *_, last = [memory_after(number) for number in range(4)]
-    assert last - first < 10.0  # found: 0
+    grown = np.diff([memory_after(number) for number in range(4)])
+    assert min(grown) < 10.0  # found: 0
