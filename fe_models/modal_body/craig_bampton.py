@@ -131,7 +131,7 @@ class CraigBampton:
     coordinates: list[str]  # names of the m coordinates: "root/x" … "root/rz", "tip/y" …, then "mode/1" …
     mass: Array  # (m, m)
     stiffness: Array  # (m, m); zero for rigid motions
-    recovery: Array  # (n, m) modal coordinates p of the floating frame on the root, whose motion is that of the root
+    recovery: Array  # (n, m) modal coordinates p of the floating frame, which moves with the root
 
 
 def craig_bampton(body: ModalBody) -> CraigBampton:
@@ -140,9 +140,12 @@ def craig_bampton(body: ModalBody) -> CraigBampton:
     static = body.mode_count - body.eigenmode_count
     found = interface_coordinates(omega2, body.family, static, body.interfaces)
     rigid = np.array([_rigid_row(body, name) for name in found.names]).reshape(-1, 6)
-    recovery = np.concatenate([-found.constraint @ rigid, found.constraint, found.fixed], axis=1)
+    # A root beside the origin: the frame turns about it.
+    of_root = np.eye(6)
+    of_root[:3, 3:] = np.einsum("kab,b->ka", LEVI_CIVITA, -body.interfaces[ROOT].position)
+    recovery = np.concatenate([-found.constraint @ rigid @ of_root, found.constraint, found.fixed], axis=1)
     frame = np.zeros((6, recovery.shape[1]))
-    frame[:, :6] = np.eye(6)
+    frame[:, :6] = of_root
     turn = np.einsum("akl,kln->an", LEVI_CIVITA, body.I_bar)  # ∫ρ x × Φ dV
     if body.h_spin is not None:
         turn[0] += body.h_spin  # of a line of mass, about itself

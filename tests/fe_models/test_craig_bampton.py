@@ -1,5 +1,6 @@
 """Craig–Bampton: closed forms of its matrices, identities, stresses, and what is refused."""
 
+import sys
 from pathlib import Path
 
 import h5py
@@ -15,6 +16,9 @@ from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton
 from ffrobot.fe_models.modal_body.unit_loads import work_on_modes
+
+sys.path.append(str(Path(__file__).parents[1] / "mesh"))
+import decks
 
 E, RHO, L, H, B = 2.0e11, 7800.0, 0.4, 0.06, 0.02
 EI, EA, MASS = E * B * H**3 / 12, E * B * H, RHO * B * H
@@ -78,6 +82,32 @@ def test_free_in_3d(kind):
     omega2 = eigh(found.stiffness[np.ix_(kept, kept)], found.mass[np.ix_(kept, kept)], eigvals_only=True)
     other = body_of(kind, "cantilever", count=12, interface=[GRIP])
     np.testing.assert_allclose(np.sqrt(omega2[3:5]), free_frequencies(other)[:2], rtol=5e-4)
+
+
+def test_a_root_beside_the_origin(tmp_path):
+    """Coordinates are those of the interfaces: rigid motions strain nothing and weigh what a box weighs."""
+    off = np.array([0.0, 0.03, -0.02])
+    points, cells = decks.bar()
+    (tmp_path / "bar.inp").write_text(decks.nodes(points) + decks.elements(cells))
+    geometry = {"kind": "solid", "length": decks.LENGTH, "file": str(tmp_path / "bar.inp"), "origin": list(off)}
+    body = ffrobot.make_link(bar("solid", count=4, modes={"family": "all"}) | {"geometry": geometry, "mesh": {}}).body
+    found, mass = craig_bampton(body), RHO * decks.VOLUME
+    rigid, center = np.zeros((len(found.coordinates), 6)), np.array([decks.LENGTH / 2, 0.0, 0.0]) - off
+    for k, name in enumerate(found.coordinates):
+        place, _, axis = name.partition("/")
+        if place in body.interfaces:
+            at = body.interfaces[place].position
+            rigid[k] = np.eye(6)[3 + "xyz".index(axis[1])] if axis[0] == "r" else of_point(at)["xyz".index(axis)]
+    assert np.abs(found.stiffness @ rigid).max() < 1e-10 * np.abs(found.stiffness).max()
+    squares = np.square([decks.LENGTH, decks.HEIGHT, decks.WIDTH])
+    about_center = np.block([[np.zeros((3, 6))], [np.zeros((3, 3)), np.diag(mass / 12 * (squares.sum() - squares))]])
+    expected = mass * of_point(center).T @ of_point(center) + about_center
+    np.testing.assert_allclose(rigid.T @ found.mass @ rigid, expected, atol=1e-9 * mass)
+
+
+def of_point(x):
+    """(3, 6) motion of a point x (3,) under unit translations, and rotations about the origin."""
+    return np.hstack([np.eye(3), np.cross(np.eye(3), x).T])
 
 
 def free_frequencies(body):
