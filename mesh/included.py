@@ -1,4 +1,4 @@
-"""Text files that include others, as Abaqus and Nastran decks do: their lines, and which files they consist of.
+"""Files of meshes that consist of several, as Abaqus and Nastran decks do: their lines, and which files these are.
 
 NumPy is not needed: input hashes are made of `files_of`.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
+from glob import escape
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +25,8 @@ _REFERENCES = {
     ".inp": _ABAQUS, ".bdf": _NASTRAN, ".nas": _NASTRAN, ".fem": _NASTRAN, ".dat": _NASTRAN, ".xdmf": _XDMF,
     ".xmf": _XDMF,
 }  # fmt: skip
+# What lies beside files of TetGen and of FEniCS, whose readers take it without a word in the file.
+_BESIDE = {".ele": "{}.node", ".node": "{}.ele", ".xml": "{}_*.xml"}
 DEEPEST = 20
 
 
@@ -35,7 +38,7 @@ class Line(NamedTuple):
 
 
 def files_of(path: Path) -> list[Path]:
-    """`path`, and the files that there are of those that it includes, in order."""
+    """`path`, and the files that there are of those that it includes or that belong to it, in order."""
     pattern = _REFERENCES.get(path.suffix.lower())
     found: dict[Path, None] = {}
 
@@ -49,6 +52,8 @@ def files_of(path: Path) -> list[Path]:
                 add(other)
 
     add(path)
+    if beside := _BESIDE.get(path.suffix.lower()):
+        found |= dict.fromkeys(sorted(path.parent.glob(beside.format(escape(path.stem)))))
     return list(found)
 
 

@@ -11,6 +11,7 @@ from solid_parts import VOLUME, bar, face_area, integrate, two_bars
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.gmsh_session import gmsh_session
+from ffrobot.mesh.kept_parts import geometry_content
 from ffrobot.mesh.mesh_files import read_foreign
 from ffrobot.mesh.records import PlaceRecord
 from ffrobot.mesh.structured import structured_box
@@ -276,3 +277,24 @@ def test_nodes_that_are_not_there_are_refused(solid, mesh_part, tmp_path, number
     path.write_text(text[:at] + text[at:].replace(f"\n{box.cells[0][0]}", f"\n{number}", 1))
     with pytest.raises(InputError, match=r"geometry.file: part.vtk: expected .*, found "):
         mesh_part(solid(file=path))
+
+
+@pytest.mark.parametrize("ending", ["ele", "node", "xml"])
+def test_files_beside_a_mesh_count(solid, tmp_path, ending):
+    """The other one of TetGen's two files, and groups of FEniCS: a mesh is another one where these are."""
+    box, path, known = structured_bar("tetrahedron"), tmp_path / f"bar.{ending}", set()
+    for size in (1, 2):
+        points, cells = (box.points * size, box.cells) if ending == "ele" else (box.points, box.cells[::size])
+        if ending == "xml":
+            meshio.write(path, meshio.Mesh(box.points, [("tetra", box.cells)]))
+            values = "".join(f'<entity index="{k}" value="{size}"/>' for k in range(len(box.cells)))
+            head = f'<mesh_function type="int" dim="3" size="{len(box.cells)}">'
+            (tmp_path / "bar_parts.xml").write_text(f"<dolfin>{head}{values}</mesh_function></dolfin>")
+            assert set(read_foreign(path, "").regions) == {str(size)}
+        else:
+            meshio.write(tmp_path / "bar.node", meshio.Mesh(points, [("tetra", cells)]))
+            found = read_foreign(path, "")
+            np.testing.assert_allclose(found.points, points)
+            np.testing.assert_array_equal(found.blocks[0][1], cells)
+        known.add(str(geometry_content(solid(file=path))))
+    assert len(known) == 2
