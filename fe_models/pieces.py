@@ -110,6 +110,7 @@ def _piece(
         "modes": {"count": bending, "family": families, "attachment_modes": True},
         "damping": {"rayleigh": [0.0, _stiffness_damping(link, path)]},
         "interface": _interfaces(link, k, start, places),
+        "stress": {"points": _stress_points(link, k, start, count)},
     }
 
 
@@ -139,3 +140,12 @@ def _interfaces(link: BeamLink, k: int, start: float, places: Mapping[str, tuple
         entry["mass"] += record.mass
         entry["inertia"] = [a + b for a, b in zip(entry["inertia"], record.inertia, strict=True)]
     return list(found.values())
+
+
+def _stress_points(link: BeamLink, k: int, start: float, count: int) -> dict[str, list[float]]:
+    """The stress points of the link that are in piece k; at a cut, like at a step, the section beyond it counts."""
+    length, found = link.geometry.length / count, {}
+    for name, (x, y, z) in link.stress.points.items():
+        if min(int(x / length + ON_A_CUT * count), count - 1) == k:
+            found[name] = [min(max(x - start, 0.0), length), y, z]
+    return found

@@ -281,10 +281,10 @@ def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actua
 
 def _histories(solution: Solution, run: Outcome, motion: MotionOfLinks, outputs: Indices) -> Histories:
     """What has peaks at the times of `run`."""
-    whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
     return Histories(
         run, motion, outputs, reactions(motion), _actuation(solution, run, motion),
-        find_stresses(motion, whole, solution.patches), _point_forces(solution, run),
+        find_stresses(motion, solution.parts or solution.bodies, solution.patches, solution.divided),
+        _point_forces(solution, run),
     )  # fmt: skip
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..mbs.model.body import Body
 from ..mbs.quantities.link_loads import LinkLoads, loads_on_links
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.stress import (
+    METHODS,
     BodyStress,
     SectionLoads,
     body_stress,
@@ -20,6 +22,7 @@ from ..mbs.quantities.stress import (
     mode_acceleration,
     mode_displacement,
 )
+from ..scene.pieces import BodyInPieces
 from .bodies import LoadedBody
 
 if TYPE_CHECKING:
@@ -28,16 +31,21 @@ if TYPE_CHECKING:
 
 
 def find_stresses(
-    motion: RobotMotion, bodies: Mapping[str, LoadedBody], patches: Mapping[str, LinkPatches]
+    motion: RobotMotion,
+    bodies: Mapping[str, LoadedBody],
+    patches: Mapping[str, LinkPatches],
+    divided: Mapping[str, BodyInPieces],
 ) -> dict[str, BodyStress]:
-    """By body; by mode acceleration where files and loads allow it.
+    """By body of the scene, those of links in pieces from their pieces, which are among `bodies`.
 
-    By mode displacement of links that patches stiffen otherwise than by bending in the plane, as static stresses of
-    their files are those of the bare link, and of those on which forces act elsewhere than at interfaces.
+    By mode acceleration where files and loads allow it. By mode displacement of links that patches stiffen otherwise
+    than by bending in the plane, and of pieces with such patches, as static stresses of their files are those of the
+    bare link; and of those on which forces act elsewhere than at interfaces.
     """
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None and has_stresses(body.modal)}
     stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}
     unknown = {name for name, of in stiff.items() if _in_plane(of) is None}
+    unknown |= {piece for name in stiff.keys() & divided.keys() for piece in divided[name].names}
     known = [name for name, link in links.items() if link.stress_loads and name not in unknown]
     loads = loads_on_links(motion, known) if known else {}
     found = {}
@@ -48,7 +56,17 @@ def find_stresses(
             sections = _sections(stiff[name], link, spatial, p, loads[name]) if name in stiff else None
             recovery = mode_acceleration(link, spatial.modal_transform, p, loads[name].sizes, sections)
         found[name] = body_stress(link, recovery)
+    for name, pieces in divided.items():
+        if of_pieces := [found.pop(piece) for piece in pieces.names if piece in found]:
+            found[name] = _of_pieces(of_pieces, motion.modal(name))
     return found
+
+
+def _of_pieces(stresses: Sequence[BodyStress], p: Array) -> BodyStress:
+    """Of a link, p (T, n) in the modes of its file, at points that its pieces have."""
+    points = {name: point for stress in stresses for name, point in stress.points.items()}
+    method = min((stress.recovery.method for stress in stresses), key=METHODS.index)
+    return BodyStress(points, None, replace(mode_displacement(p), method=method))
 
 
 def _in_plane(of_link: LinkPatches) -> PatchArray | None:

@@ -20,6 +20,7 @@ from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import work_on_modes
 
+METHODS = ("mode displacement", "mode acceleration")
 CHUNK_BYTES = 32e6  # of surface stresses at a time; more leaves the cache
 
 
@@ -85,7 +86,7 @@ class SectionLoads:
 class Recovery:
     """What stresses of a body are computed from, one row per output."""
 
-    method: str  # "mode acceleration" or "mode displacement"
+    method: str  # one of `METHODS`
     modal: Array  # (T, n) p − p_s, in the modes of the modal body file
     loads: tuple[str, ...]  # names of the unit loads beside it that are not zero; none in the mode displacement method
     sizes: Array  # (T, l) of these
@@ -107,7 +108,7 @@ class Recovery:
 
 def mode_displacement(p: Array) -> Recovery:
     """From modal coordinates p (T, n) of the file alone."""
-    return Recovery("mode displacement", p, (), np.zeros((len(p), 0)))
+    return Recovery(METHODS[0], p, (), np.zeros((len(p), 0)))
 
 
 def mode_acceleration(
@@ -128,7 +129,7 @@ def mode_acceleration(
     if sections is not None:
         forces = forces + sections.modal_force
     static = forces @ T @ np.linalg.solve(T.T @ body.stiffness @ T, T.T)
-    return Recovery("mode acceleration", p - static, names, sizes, sections)
+    return Recovery(METHODS[1], p - static, names, sizes, sections)
 
 
 def _spin_in_static_stresses(body: ModalBody) -> Array | None:

@@ -45,6 +45,27 @@ def elastica(k):
     return found.y[2:, -1], found.y[0, -1]
 
 
+@pytest.mark.parametrize("pieces", [4, 5], ids=["at a cut", "within a piece"])
+def test_stresses_are_those_of_the_bent_link(pieces):
+    """Of equilibrium: the moment at the root by the elastica, in the middle by the tip's arm, N/A − M_z y/I + M_y z/I.
+
+    The one link, whose loads act on it undeformed, is 19 % off at the root.
+    """
+    A, k, (y, z) = of_rpy(*RPY), 2.0, (SIDE / 2, SIDE / 3)
+    force = A @ [0.0, 0.6 * k * EI, 0.8 * k * EI]
+    load = [{"point": "beam.tip"} | dict(zip("xyz", map(repr, force.tolist()), strict=True))]
+    points = {"root": [0.0, y, z], "middle": [0.5, y, z]}
+    with solved(link(stress={"points": points}), pieces, load=load) as results:
+        found = {name: results[f"rest/stress/beam/points/{name}/stress"][0] for name in points}
+        arm = results["rest/points/beam.tip/position"][0] - results["rest/points/beam.mid/position"][0]
+        axes = of_quaternion(results["rest/points/beam.mid/quaternion"])[0]
+        assert results.attributes("rest/stress/beam")["method"] == "mode acceleration"
+    N, M = axes[:, 0] @ force, axes.T @ np.cross(arm, force)
+    middle = N / SIDE**2 + 12 * (M[1] * z - M[2] * y) / SIDE**4
+    root = -k * SOFT * elastica(k)[0][0] * (0.6 * y + 0.8 * z)
+    np.testing.assert_allclose([found["root"][0], found["middle"][0]], [root, middle], rtol=2e-3)
+
+
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
 @pytest.mark.parametrize(("stiffened", "order", "least"), [(False, 2, 1e-2), (None, 4, 5e-4)])
 def test_elastica_in_an_oblique_plane(condition, stiffened, order, least):
