@@ -32,7 +32,7 @@ from .body import Body
 from .cut import CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
 from .drives import Drive
 from .masses import welded_payloads
-from .rows import ConstraintRow, coordinate_row, value_and_gradient
+from .rows import ConstraintRow, coordinate_row, is_turned_over, value_and_gradient
 from .tree import KinematicTree, Motion, Node, Section
 
 T = TypeVar("T")
@@ -219,6 +219,22 @@ def row_values(model: Model, q: Array, times: Array, frames: Sequence[Motion] | 
         a, b = motion(row.a), motion(row.b)
         values[:, k], gradients[:, k] = value_and_gradient(row, a, b, q, times)
     return values, gradients
+
+
+def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
+    """By joint of a loop, and trajectory of a tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
+
+    Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
+    """
+    aligned: dict[str, list[ConstraintRow]] = {}
+    for row in (row for row in model.rows if row.kind == "dot"):
+        aligned.setdefault(row.owner, []).append(row)
+    aligned = {owner: rows for owner, rows in aligned.items() if len(rows) > 1}
+    if not aligned:
+        return {}
+    frames = model.tree.frames(q)
+    motion = by_section(lambda section: model.tree.motion(section, q, frames))
+    return {owner: is_turned_over(rows, motion(rows[0].a), motion(rows[0].b), times) for owner, rows in aligned.items()}
 
 
 def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:

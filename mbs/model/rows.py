@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans
 from ...common.rotations import logarithm
 from ...common.structs import struct
 from .._core import TimeFunction
@@ -85,6 +86,19 @@ def _measured(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) 
     if row.kind == "slide":
         gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
     return np.sum(f * d, axis=-1), gradient
+
+
+def is_turned_over(rows: Sequence[ConstraintRow], a: Motion, b: Motion, times: Array) -> Booleans:
+    """Whether z of b points against z of a (T,), or x against x, at `times` (T,) at which "dot" rows of both are 0.
+
+    `rows`: x and y of a with z of b and, of joints that do not turn, x of a with y of b.
+    """
+    first, second, *still = rows
+    z = b.F @ first.g if first.law is None else first.law.sample(times)[:, :, 2]
+    found: Booleans = np.sum(a.F @ np.cross(first.f, second.f) * z, axis=-1) < 0.0
+    for row in still:
+        found |= np.sum(a.F @ row.f * (b.F @ np.cross(row.g, first.g)), axis=-1) < 0.0
+    return found
 
 
 def turned_by(row: ConstraintRow, a: Motion, b: Motion) -> Array:

@@ -12,9 +12,10 @@ from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..model.known_motion import State
-from ..model.model import Model, row_values, target_rates, without_paths
+from ..model.model import Model, row_values, target_rates, turned_over, without_paths
 
 TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
+MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
 SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
@@ -48,7 +49,10 @@ def solve_posture(model: Model, t: float, q: Array, held: Booleans | None = None
 
 
 def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None = None) -> tuple[Array, Booleans]:
-    """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,)."""
+    """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,).
+
+    Where C = 0 with a joint or a tool turned over it did not.
+    """
     q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
         return q, np.ones(len(q), dtype=bool)
@@ -69,7 +73,10 @@ def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None =
         longest = np.abs(step).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, farthest / np.maximum(longest, 1e-300))
         q[going] = model.tree.integrate(q[going], step * scales)
-    return q, left <= 1e3 * TOLERANCE
+    is_met = left <= MET
+    for is_turned_over in turned_over(model, q, times).values():
+        is_met &= ~is_turned_over
+    return q, is_met
 
 
 def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans | None = None) -> State:

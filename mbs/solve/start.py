@@ -10,8 +10,8 @@ import numpy as np
 from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State
-from ..model.model import Model, row_values
-from .posture import MOST_ITERATIONS, joint_scales, solve_posture, with_rates
+from ..model.model import Model, row_values, turned_over
+from .posture import MET, MOST_ITERATIONS, joint_scales, row_sizes, solve_posture, solve_postures, with_rates
 from .reach import check_reach, turned_guesses, working_guess
 
 AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
@@ -30,6 +30,7 @@ def undeformed_posture(model: Model) -> State:
     if q is None:
         check_reach(model, 0.0)
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), list(turned_guesses(model.scene))
+        advice += _turned_over(model, guess)
         if works := working_guess(model, guess):
             advice.append(f"from [initial] {works}, for one, it goes")
         raise InputError(
@@ -43,6 +44,16 @@ def undeformed_posture(model: Model) -> State:
         kept = with_rates(model, q, with_rates(model, q, v, held=named).v)
         start = kept if np.allclose(kept.v[named], v[named]) else start
     return relaxed_gears(model, start)
+
+
+def _turned_over(model: Model, guess: Array) -> Iterator[str]:
+    """What is turned by π in the posture next to the guess that would meet all rows but for that."""
+    times = np.zeros(1)
+    q = solve_postures(model, times, guess[None])[0]
+    if np.abs(row_values(model, q, times)[0] / row_sizes(model)).max() <= MET:
+        for owner, is_so in turned_over(model, q, times).items():
+            if is_so[0]:
+                yield f'next to it "{owner}" is turned over: axes that it aligns point against each other'
 
 
 def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:

@@ -1,7 +1,12 @@
-"""Forward runs of a four-bar from the angle and the rate of its crank, or of its rocker: the other joints follow."""
+"""Forward runs of a four-bar from the angle and the rate of its crank, or of its rocker: the other joints follow.
 
+Starts in which a joint of a loop, or a tool, would be turned over are none.
+"""
+
+import numpy as np
 import pytest
 from four_bar import SIDES, closed, in_3d, planar
+from tables_3d import X, Y, Z, revolute, rigid, scene
 
 import ffrobot
 
@@ -43,3 +48,30 @@ def test_named_joints_keep_their_values(space, start):
 def test_values_that_no_loop_meets_are_told(initial):
     with pytest.warns(ffrobot.FfrobotWarning, match='joints "A".* start away from the values'):
         started("spatial", {"joints": {"A": A}} | initial)
+
+
+@pytest.mark.parametrize("last", "CD")
+def test_loops_that_close_with_a_joint_turned_over_are_refused(last):
+    """Axes A and D hold coupler and rocker upright; C asks for one of them upside down, wherever the loop is cut."""
+    names = [*(name for name in SIDES if name != last), last]
+    tables = in_3d({name: {"rpy": [np.pi, 0.0, 0.0]} if name == "C" else {} for name in names}, [RUN], trajectory=[])
+    with pytest.raises(ffrobot.InputError, match=f'"{last}" is turned over'):
+        ffrobot.solve(ffrobot.make_scene(**tables))
+
+
+@pytest.mark.parametrize(("pitch", "is_near"), [(0.3, True), (0.3 + np.pi, False)])
+def test_tools_point_along_their_direction(pitch, is_near):
+    """Not against it, though an axis against it is parallel to it as well."""
+    bodies = [rigid(f"b{k}", 1.0, [0.01] * 3, tip=X) for k in range(2)]
+    joints = [revolute("yaw", "ground", "b0.root", Z), revolute("pitch", "b0.tip", "b1.root", Y)]
+    path = {"name": "tool", "point": "b1.tip", "tool_axis": X, "direction": ["1", "0.5", "-0.3 - t"]}
+    run = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.1}
+    tables = scene(bodies, joints, run, trajectory=[path], initial={"joints": {"yaw": 0.4, "pitch": pitch}})
+    if is_near:
+        with ffrobot.solve(ffrobot.make_scene(**tables)) as found:
+            yaw, pitch = (found[f"inverse/joints/{name}/coordinate"] for name in ("yaw", "pitch"))
+            np.testing.assert_allclose(yaw, np.arctan2(0.5, 1.0), atol=1e-9)
+            np.testing.assert_allclose(pitch, np.arctan2([0.3, 0.4], np.hypot(1.0, 0.5)), atol=1e-9)
+    else:
+        with pytest.raises(ffrobot.InputError, match=r'"tool" is turned over.*from .initial. joints'):
+            ffrobot.solve(ffrobot.make_scene(**tables))
