@@ -10,5 +10,8 @@ DEFAULT_COUNT: Mapping[Family, int] = {"in-plane-bending": 6, "out-of-plane-bend
 
 FAMILIES: tuple[Family, ...] = tuple(DEFAULT_COUNT)
 
+LOCAL = "local"
+"""What a solid's mode is called in which its cross sections hardly move."""
+
 HOLDING_ROOT = ("cantilever", "craig-bampton")
 """Reference conditions under which the root's section stays where it is in the frame."""

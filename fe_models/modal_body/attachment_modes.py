@@ -136,7 +136,7 @@ def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
     size = np.sqrt(np.diag(K))
     if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):
         squares, turn = np.linalg.eigh(K)
-        shares = np.array([np.sum(turn[of == k] ** 2, axis=0) for k in range(len(FAMILIES))])
+        shares = np.array([np.sum(turn[of == k] ** 2, axis=0) for k in range(of.max() + 1)])
         of = shares.argmax(axis=0)
     else:
         squares, turn = np.zeros(of.size), np.zeros(K.shape)

@@ -19,7 +19,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.structs import struct
-from ..link_records.families import FAMILIES
+from ..link_records.families import FAMILIES, LOCAL
 from .attachment_modes import COMPONENTS, Modes, ascending, uncoupled
 from .body import ModalBody
 from .parts import LEVI_CIVITA, Interface
@@ -31,20 +31,23 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Modes:
     """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of it.
 
-    Those that stand for eigenmodes, then as many of each family as loads brought. K (n, n) is XᵀKX; `families` and
-    `is_static` are of the columns of X.
+    Those that stand for eigenmodes, then as many of each family as loads brought, if the link couples them no more than
+    that. K (n, n) is XᵀKX; `families` and `is_static` are of the columns of X.
     """
-    names: list[str] = list(FAMILIES)
+    names: list[str] = [*FAMILIES, LOCAL]
     of = np.array([names.index(family) for family in families])
     squares, turn, of_modes = uncoupled(K, of)
     residual = np.zeros(of.size, dtype=np.int64)
     for family in set(of.tolist()):
         static = int(np.count_nonzero(of[np.array(is_static)] == family))
         own = np.flatnonzero(of_modes == family)
-        residual[own[np.argsort(squares[own], kind="stable")][own.size - static :]] = 1
+        residual[own[np.argsort(squares[own], kind="stable")[::-1]][:static]] = 1
+    others = np.flatnonzero(residual == 0)
+    lacking = sum(is_static) - int(residual.sum())
+    residual[others[np.argsort(squares[others], kind="stable")[::-1]][:lacking]] = 1
     order = ascending(squares, of_modes)
     order = order[np.argsort(residual[order], kind="stable")]
-    return Modes(squares[order], tuple(FAMILIES[of_modes[k]] for k in order), turn[:, order])
+    return Modes(squares[order], tuple(names[of_modes[k]] for k in order), turn[:, order])
 
 
 @struct

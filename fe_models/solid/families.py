@@ -15,10 +15,9 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
-from ..link_records.families import FAMILIES
+from ..link_records.families import FAMILIES, LOCAL
 from .functionals import Averages
 
-LOCAL = "local"
 # Relative distance up to which neighbouring ω² are one repeated value.
 REPEATED = 1e-9
 # Where one family is wanted, modes this near are taken apart into it and the others.

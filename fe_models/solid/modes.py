@@ -10,12 +10,12 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
-from ..link_records.families import DEFAULT_COUNT, FAMILIES
+from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL
 from ..link_records.link import SolidLink
 from ..modal_body.attachment_modes import Modes, ascending
 from ..modal_body.lanczos import BlockLanczos
 from .elasticity import Mass
-from .families import LOCAL, NEARLY, SectionMotion, aligned, names
+from .families import NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 
 if TYPE_CHECKING:

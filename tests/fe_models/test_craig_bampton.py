@@ -133,6 +133,20 @@ def test_flexibility_at_interfaces_is_that_of_the_finite_element_model(kind):
     assert one.mode_count == 1 + 6  # x, y and the rotation at grip and tip
 
 
+def test_modes_of_no_family():
+    """Of a stout solid, at whose sections modes warp: the flexibility is that under a cantilever's condition, too."""
+    keys = {"count": 12, "family": "all"}, {"geometry": bar("solid")["geometry"] | {"length": 0.06}}
+    one, many = (body_of("solid", condition, modes=keys[0], **keys[1]) for condition in ("craig-bampton", "cantilever"))
+    assert "local" in one.family
+    assert (one.eigenmode_count, one.mode_count) == (12, 18)
+    rows = [
+        np.concatenate([body.interfaces["tip"].translation, body.interfaces["tip"].rotation]) for body in (one, many)
+    ]
+    found, expected = (row / np.diag(body.stiffness) @ row.T for row, body in zip(rows, (one, many), strict=True))
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size), atol=1e-6)
+
+
 @pytest.mark.parametrize("kind", ["beam", "solid"])
 def test_stresses_of_its_modes(kind):
     """K⁻¹b = Φ K_ff⁻¹ Φᵀb holds of stresses of interface loads; beams have both from equilibrium alone."""
