@@ -60,6 +60,15 @@ class LoadedBody:
         """Motions that a link cannot follow, since its file has no modes of them; none of a rigid body."""
         return () if self.modal is None else tuple(one for one in self.motions if one not in self.modal.family)
 
+    @property
+    def without_coordinate(self) -> tuple[Family, ...]:
+        """Motions of which a link's file has modes, and the equations keep none of them, nor a static shape."""
+        if self.modal is None or self.spatial.reduction is None:
+            return ()
+        moving = self.spatial.modal_transform.any(axis=1)
+        kept = {family for family, moves in zip(self.modal.family, moving, strict=True) if moves}
+        return tuple(one for one in self.motions if one in self.modal.family and one not in kept)
+
 
 IN_PLANE: tuple[Family, ...] = ("in-plane-bending",)
 """Of planar scenes; stretch: see `omissions`."""

@@ -280,7 +280,12 @@ class Solution:
             for name, body in self.bodies.items()
             if body.rigid_in
         )
-        return (*rigid, *(f"{name}: {text}" for name, modal in self.links.items() for text in modal.remarks))
+        unkept = (
+            f"{name}: rigid in {', '.join(body.without_coordinate)}, of which its equations keep none of the modes"
+            for name, body in self.bodies.items()
+            if body.without_coordinate
+        )
+        return (*rigid, *unkept, *(f"{name}: {text}" for name, modal in self.links.items() for text in modal.remarks))
 
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 import scenes_in_3d
+from beam_links import beam_link, rectangle
 from checkpoints import CASES
+from tables_3d import joint, scene
 
+import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.truncation import with_fewer_modes
 from ffrobot.run.bodies import load_bodies
@@ -110,3 +113,18 @@ def test_wrong_numbers_of_modes_in_3d(modes, tmp_path):
     tables["body"][1]["modes"] = modes
     with pytest.raises(InputError, match=r'body "upper": modes: expected "auto" or a .*number'):
         load_scene(scenes_in_3d.write(tables, tmp_path / "wrong.toml"))
+
+
+@pytest.mark.parametrize(
+    ("modes", "rigid", "sag"), [(1, "out-of-plane-bending, axial, torsion", 0.0), (2, "axial, torsion", 1.0)]
+)
+def test_motions_of_which_no_mode_is_kept_are_told(modes, rigid, sag):
+    """A cantilever twice as wide as high under its weight across the wide side: its second mode is the first to sag."""
+    link = beam_link(1.0, rectangle(0.01, 0.02), 10, name="link")
+    body = {"name": "beam", "link": link, "modes": modes}
+    tables = scene([body], [joint("wall", "weld", "ground", "beam.root")], {"name": "rest", "kind": "static"})
+    solution = solve_scene(ffrobot.make_scene(**tables | {"gravity": [0.0, 0.0, -9.81]}))
+    assert f"beam: rigid in {rigid}, of which its equations keep none of the modes" in solution.notes
+    found = solution.analyses["rest"].motion.deflection("beam.tip")[0, 2]
+    closed_form = -12 * 2700.0 * 9.81 / (8 * 70e9 * 0.02**2)
+    assert found == pytest.approx(sag * closed_form, rel=0.015, abs=1e-12)
