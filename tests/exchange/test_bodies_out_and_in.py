@@ -18,8 +18,9 @@ from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
 
 LINK = beam_link(0.6, tube(0.02, 0.016), 8, name="arm", modes={"count": 6}, damping={"ratio": 0.01})
 """A line of mass: torsion has inertia of its own."""
-LOADED = LINK | {"interface": [{"name": "middle", "position": 0.3, "mass": 0.2, "inertia": [1e-4, 2e-4, 3e-4]}]}
-"""With a mass on it that turns about all axes."""
+MIDDLE = {"name": "middle", "position": 0.3, "mass": 0.2, "inertia": [1e-4, 2e-4, 3e-4]}
+LOADED = LINK | {"interface": [MIDDLE, {"name": "wrist", "position": 0.6}]}
+"""With a mass on it that turns about all axes, and two interfaces at one place."""
 HELD = LINK | {"reference": {"condition": "craig-bampton"}}
 
 EXACT = 1e-12  # what a file carries that this program wrote: the rounding of 17 digits

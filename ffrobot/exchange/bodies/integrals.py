@@ -235,14 +235,11 @@ def _is_same(first: Interface, second: Interface) -> bool:
 
 def interfaces_of(nodes: list[Node], numbers: Mapping[str, int]) -> dict[str, Interface]:
     """By name: those of `numbers`, `root` (nearest to the origin), `tip` (farthest from it), else "node_NUMBER"."""
-    names = {number: name for name, number in numbers.items()}
     by_distance = sorted(nodes, key=lambda node: float(np.linalg.norm(node.at.position)))
-    for name, node in (("root", by_distance[0]), ("tip", by_distance[-1])):
-        if name not in numbers and node.number not in names:
-            names[node.number] = name
-    named = {names.get(node.number, f"node_{node.number}"): node.at for node in nodes}
-    return (
-        named
-        if not numbers
-        else {name: named[name] for name in (*numbers, *(k for k in ("root", "tip") if k not in numbers))}
-    )
+    ends = {"root": by_distance[0], "tip": by_distance[-1]}
+    if numbers:
+        at = {node.number: node.at for node in nodes}
+        named = {name: at[number] for name, number in numbers.items()}
+        return named | {name: node.at for name, node in ends.items() if name not in named}
+    names = {node.number: name for name, node in reversed(ends.items())}
+    return {names.get(node.number, f"node_{node.number}"): node.at for node in nodes}
