@@ -102,7 +102,10 @@ def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSecti
 
 
 def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """(k, n) modal forces of unit membrane force (N/m): pressing the upper face, pulling the lower, halved on both."""
+    """(k, n) modal forces of unit membrane force (N/m): pressing the upper face, pulling the lower, halved on both.
+
+    On the layout's face; all that are outlined where it names none. Raises `InputError` where they are not outlined.
+    """
     patches = body.surface_patches
     if patches is None:
         raise InputError(
@@ -117,7 +120,15 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
             f" {_places(patches.edges)} m and {patches.width:g} m wide, found {len(edges)}, from {_places(edges)} m and"
             f" {layout.width:g} m wide"
         )
-    faces = [sign * face for sign, face in ((-1.0, patches.top), (1.0, patches.bottom)) if face is not None]
+    outlined_on = {"+y": patches.top, "-y": patches.bottom}
+    wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else []
+    if missing := [face for face in wanted if outlined_on[face] is None]:
+        raise InputError(
+            f"{key}: face: expected patches on faces that the link file outlines ([surface_patch] faces), found"
+            f' "{layout.face}", of which {missing[0]} has none outlined'
+        )
+    signs = {"+y": -1.0, "-y": 1.0}
+    faces = [signs[name] * of for name, of in outlined_on.items() if of is not None and (not wanted or name in wanted)]
     return np.asarray(sum(faces) / len(faces))
 
 
