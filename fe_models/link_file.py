@@ -38,6 +38,7 @@ def read_link(source: LinkSource) -> Link:
         _check_solid_interfaces(solid, path)
     else:
         _reject(path, "geometry.kind", '"beam" or "solid"', repr(kind))
+    _check_places(link, path)
     _check_modes(link, path)
     _check_measured(link, path)
     if isinstance(link, BeamLink):
@@ -114,6 +115,20 @@ def _check_beam_interfaces(link: BeamLink, path: Path) -> None:
             _reject(path, key.format("position"), "one number, m from the root", interface.position)
         elif interface.position > link.geometry.length:
             _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
+
+
+def _check_places(link: Link, path: Path) -> None:
+    """Interfaces at one place cannot move by themselves, as those of Craig–Bampton modes do."""
+    if link.reference.condition != "craig-bampton":
+        return
+    taken: dict[object, str] = {}
+    by_record = {record.name: record.group or record.position for record in link.interface}
+    for name, place in (link.places if isinstance(link, BeamLink) else by_record).items():
+        near = round(place / link.geometry.length, 9) if isinstance(place, float) else place
+        if near is not None and near in taken:
+            expected = f'a place apart from {taken[near]} with condition = "craig-bampton"'
+            _reject(path, f"interface.position of {name}", expected, place)
+        taken[near] = name
 
 
 def _check_modes(link: Link, path: Path) -> None:

@@ -184,6 +184,10 @@ def test_without_attachment_modes_is_refused():
 def test_interfaces_at_one_place_are_refused():
     with pytest.raises(InputError, match="expected interfaces that can move freely"):
         body_of(interface=[{"name": "grip", "position": 0.39999999}])
+    for kind, first, second in (("beam", 0.1, 0.1), ("beam", 0.1, 0.0), ("beam", 0.1, L), ("solid", 0.1, 0.1)):
+        places = [{"name": "grip", "position": first}, {"name": "hook", "position": second}]
+        with pytest.raises(InputError, match=r"hook: expected a place apart from (grip|root|tip) with condition"):
+            body_of(kind, interface=places)
 
 
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
