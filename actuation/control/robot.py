@@ -17,7 +17,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
 from ...mbs.model.gears import resistance
 from ...mbs.model.model import Model, build_model, row_values
-from ...mbs.model.rows import coordinate_row
+from ...mbs.model.rows import rows_of_joint
 from ...mbs.model.system import ZERO, MultibodySystem
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
 from ..patches.link_patches import LinkPatches
@@ -52,12 +52,15 @@ class RigidArm:
         scene = model.scene.model_copy(update={"load": (), "trajectory": ()})
         free = build_model(scene, [_rigid(node.body) for node in model.tree.nodes])
         motors = [
-            coordinate_row(joint, free.tree.nodes[free.tree.carried[joint]], ZERO, column, free.sign(joint))
+            row
             for joint, columns in free.motors.items()
-            for column in columns.tolist()
+            for row in rows_of_joint(
+                joint, free.tree.nodes[free.tree.carried[joint]], columns, [ZERO] * len(columns), free.sign(joint)
+            )
         ]
         self._model = replace(free, rows=(*free.rows, *motors))
         self._motors = np.arange(len(free.rows), len(free.rows) + len(motors))
+        self._turns = [k for k, row in enumerate(self._model.rows) if row.kind == "turn"]  # values within ±π
         self._system = MultibodySystem(self._model)
         self._q: Array = np.zeros(free.tree.n_q)
         for own, node in zip(free.tree.nodes, model.tree.nodes, strict=True):
@@ -74,6 +77,7 @@ class RigidArm:
             values, gradients = row_values(self._model, q[None], np.zeros(1))
             C, C_v = values[0], gradients[0]
             C[self._motors] -= gamma
+            C[self._turns] -= 2 * np.pi * np.round(C[self._turns] / (2 * np.pi))
             if np.abs(C).max() < TOLERANCE:
                 break
             q = self._model.tree.integrate(q, -np.linalg.pinv(C_v) @ C)

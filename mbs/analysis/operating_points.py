@@ -18,7 +18,7 @@ from .._core import TimeFunction
 from ..fields.field_types import NotNegative, PointReference
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
-from ..model.rows import ConstraintRow, coordinate_row
+from ..model.rows import ConstraintRow, rows_of_joint
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.joint_conditions import JointCondition, joint_conditions, robot_modes
 from ..solve.linearisation import LinearEquations, LinearMechanism
@@ -198,12 +198,11 @@ def _equilibrium(context: Context, analysis: Analysis) -> Outcome:
 
 def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
     """Rows that keep the coordinates of motors where they are at q (n_q,)."""
-    rows = []
+    rows: list[ConstraintRow] = []
     for joint, columns in model.motors.items():
         node = model.tree.nodes[model.tree.carried[joint]]
-        for k in columns.tolist():
-            now = float(q[node.q.start + k - node.v.start])
-            rows.append(coordinate_row(joint, node, TimeFunction.constant(now), k))
+        now = q[node.q.start + columns - node.v.start]
+        rows += rows_of_joint(joint, node, columns, [TimeFunction.constant(float(value)) for value in now])
     return rows
 
 

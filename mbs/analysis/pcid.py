@@ -6,11 +6,11 @@ from typing import Literal
 
 from ..model.gears import with_prescribed_motors
 from ..scene.analysis import Check, IntegratedAnalysis
-from ..solve.posture import check_path
+from ..solve.posture import check_path, mobility
 from ..solve.reach import check_reach
 from ..solve.redundancy import resolved
 from ..solve.start import undeformed_posture
-from ..solve.statics import initial_state
+from ..solve.statics import hanging_joints, initial_state
 from .context import Context
 from .drive import drive_robot
 from .outcome import Outcome
@@ -38,9 +38,13 @@ class Pcid(IntegratedAnalysis):
         """
         rigid = resolved(context.model, self.last_time)
         check_reach(rigid, self.last_time)
-        warnings = tuple(check_path(rigid, undeformed_posture(rigid).q, self.last_time))
+        posture = undeformed_posture(rigid).q
+        warnings, way = tuple(check_path(rigid, posture, self.last_time)), mobility(rigid, posture)
         model = with_prescribed_motors(rigid)
+        start = initial_state(model)
+        if way.followed < way.freedom:
+            warnings += tuple(hanging_joints(model, start))
         return drive_robot(
-            model, self, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
+            model, self, start, context.progress, warnings=warnings, earlier=context.earlier,
             is_recorded=context.is_replayed,
         )  # fmt: skip

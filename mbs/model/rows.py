@@ -52,6 +52,24 @@ def coordinate_row(
     )  # fmt: skip
 
 
+def rows_of_joint(
+    owner: str, node: Node, columns: Array, targets: Sequence[TimeFunction | None], sign: float = 1.0
+) -> list[ConstraintRow]:
+    """By which v[`columns`] of the joint of a node follow `targets`, `sign` times.
+
+    Of planar joints between its sections, `sign` 1: the core prescribes no coordinates whose axes turn.
+    """
+    if node.joint.type != "planar":
+        at = zip(columns.tolist(), targets, strict=True)
+        return [coordinate_row(owner, node, target, k, sign) for k, target in at]
+    x, y, z = np.eye(3)
+    measures: tuple[tuple[ConstraintKind, Array, Array], ...] = (("slide", x, x), ("slide", y, y), ("turn", z, x))
+    return [
+        ConstraintRow(owner, kind, node.inner, node.outer, f, g, target=target)
+        for (kind, f, g), target in zip(measures, targets, strict=True)
+    ]
+
+
 def value_and_gradient(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
     """C (T,) at q (T, n_q) and `times` (T,), and its derivative C_v (T, n_v), from the motions of its sections."""
     value, gradient = _measured(row, a, b, q, times)

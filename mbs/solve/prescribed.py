@@ -11,7 +11,7 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.model import Model
-from ..model.rows import ConstraintRow, coordinate_row
+from ..model.rows import rows_of_joint
 
 
 class Prescribed(NamedTuple):
@@ -25,16 +25,11 @@ class Prescribed(NamedTuple):
 
 
 def following_motors(model: Model) -> Model:
-    """The robot with the coordinates of its motors in place of its paths; of planar joints between its sections."""
+    """The robot with the coordinates of its motors in place of its paths."""
     rows = [row for row in model.rows if not row.is_trajectory]
     for joint, coordinates in model.motors.items():
         node = model.driven(joint)
-        if node.joint.type == "planar":  # the core prescribes no coordinates whose axes turn
-            x, y, z = np.eye(3)
-            rows += [ConstraintRow(joint, "slide", node.inner, node.outer, f, f) for f in (x, y)]
-            rows.append(ConstraintRow(joint, "turn", node.inner, node.outer, z, x))
-            continue
-        rows += [coordinate_row(joint, node, column=k) for k in coordinates.tolist()]
+        rows += rows_of_joint(joint, node, coordinates, (None,) * len(coordinates))
     return replace(model, rows=tuple(rows))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import SolveError, quoted
 from ..model.known_motion import KnownStates, State, required_forces
 from ..model.model import Model, row_values
@@ -18,6 +18,7 @@ TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, pos
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
 DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
 SLACK = 1e-3  # of the largest force over its natural size: less stiffness is none
+DEPENDENT = 1e-12  # of the largest singular value of rows: below it they depend on others
 UNSTABLE = -1e-5  # of the stiffness of single coordinates: closer to none is rounding of differences
 
 
@@ -37,7 +38,10 @@ def initial_state(model: Model) -> State:
 
 
 def hanging_joints(model: Model, start: State) -> Iterator[str]:
-    """A warning where the equilibrium `start` has joints elsewhere than [initial], as nothing keeps them there."""
+    """Warnings where the equilibrium `start` has joints elsewhere than [initial], as nothing keeps them there.
+
+    And where it is unstable.
+    """
     if model.scene.initial.state != "static":
         return
     away, length = np.abs(start.q - undeformed_posture(model).q), robot_size(model)
@@ -55,6 +59,7 @@ def hanging_joints(model: Model, start: State) -> Iterator[str]:
             f"starts in the equilibrium in which joints {quoted(moved)} hang, away from [initial]: nothing holds them"
             ' there; state = "undeformed" starts from [initial]'
         )
+    yield from unstable_ways(model, start.q, holding_multipliers(model, start.q))
 
 
 def holding_multipliers(model: Model, q: Array) -> Array:
@@ -96,13 +101,11 @@ def unstable_ways(model: Model, q: Array, multipliers: Array) -> Iterator[str]:
 
     There the derivative of the forces that lead back has a negative eigenvalue on what the rows leave free.
     """
-    from scipy.linalg import null_space  # loaded here: others do not pay for it
-
     tree, n, row_scales = model.tree, model.tree.n_v, row_sizes(model)
     jacobian = _jacobian(model, q, 0.0, multipliers, natural_sizes(model), row_scales)
     K, size = -jacobian[:n, :n], _residual(model, q[None], 0.0, multipliers, row_scales)[1]
     scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, 1e-300)))
-    free = null_space(jacobian[n:, :n] * scale) if len(model.rows) else np.eye(n)
+    free = null_space(jacobian[n:, :n] * scale, DEPENDENT) if len(model.rows) else np.eye(n)
     found, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
     if not len(found) or found.real.min() > UNSTABLE:
         return

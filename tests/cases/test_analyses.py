@@ -117,7 +117,7 @@ def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
     assert np.abs(results["rest/bodies/b1/modal_velocity"][0]).max() < 1e-9 * modal
 
 
-@pytest.mark.parametrize("kind", ["static", "linear"])
+@pytest.mark.parametrize("kind", ["static", "linear", "forward"])
 @pytest.mark.parametrize(
     ("upper", "lower", "is_stable"), [(1.4, 0.1, True), (-1.4, 3.0, False), (-1.4, 0.1, False), (1.4, 3.0, False)]
 )
@@ -125,8 +125,9 @@ def test_a_double_pendulum_has_one_stable_equilibrium(kind, upper, lower, is_sta
     """Both bars down, of four; joints about y carry x to -z."""
     bodies = [rigid(name, center=[0.25, 0.0, 0.0], tip=[0.5, 0.0, 0.0]) for name in "ab"]
     joints = [revolute("A", "ground", "a.root", Y, motor=False), revolute("B", "a.tip", "b.root", Y, motor=False)]
-    start = {"joints": {"A": upper, "B": lower}}
-    made = ffrobot.make_scene(**scene(bodies, joints, {"name": "rest", "kind": kind}, initial=start))
+    start = {"state": "static", "joints": {"A": upper, "B": lower}}
+    times = {"end": 0.01, "output_step": 0.01} if kind == "forward" else {}
+    made = ffrobot.make_scene(**scene(bodies, joints, {"name": "rest", "kind": kind} | times, initial=start))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
         results = ffrobot.solve(made)
@@ -134,3 +135,27 @@ def test_a_double_pendulum_has_one_stable_equilibrium(kind, upper, lower, is_sta
     assert len(told) == (not is_stable)
     angles = [results[f"rest/joints/{name}/coordinate"][0] for name in "AB"]
     np.testing.assert_allclose(angles, [np.copysign(np.pi / 2, upper), np.pi * (lower > 1)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("guess", "angle", "told"),
+    [
+        (1.15, np.pi / 2 - 0.4, None),
+        (0.3, np.pi / 2 - 0.4, '"B" hang, away from [initial]'),
+        (-1.95, -np.pi / 2 - 0.4, "equilibrium is unstable"),
+    ],
+    ids=["hangs", "elsewhere", "upright"],
+)
+def test_joints_beside_a_path_start_in_an_equilibrium_that_is_told(guess, angle, told):
+    """The second bar is upright or hangs where the first stands still at 0.4 rad."""
+    bodies = [rigid(name, center=[0.25, 0.0, 0.0], tip=[0.5, 0.0, 0.0]) for name in "ab"]
+    joints = [revolute("A", "ground", "a.root", Y), revolute("B", "a.tip", "b.root", Y, motor=False)]
+    path = {"name": "path", "joint": "A", "value": "0.4"}
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.01, "output_step": 0.01}
+    start = {"state": "static", "joints": {"B": guess}}
+    made = ffrobot.make_scene(**scene(bodies, joints, inverse, initial=start, trajectory=[path]))
+    with pytest.warns(ffrobot.FfrobotWarning, match="not prescribed"):
+        results = ffrobot.solve(made)
+    np.testing.assert_allclose(results["inverse/joints/B/coordinate"][0], angle, atol=1e-9)
+    found = [text for text in results.warnings["inverse"] if "hang, away" in text or "unstable" in text]
+    assert [told in text for text in found] == ([True] if told else [])

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 import scenes_in_3d
+import tables_3d
+from beam_links import beam_link, rectangle
+from tables_3d import X, Y, Z
 
 import ffrobot
 
@@ -68,3 +71,64 @@ def test_sensors_and_motors_have_the_signs_of_the_joint(tmp_path, kind, turned):
         assert moved > 0.02
         assert found["loop/tip_error"].max() < 1e-5 * moved
         assert found["torque/tip_error"].max() < 2e-3 * moved
+
+
+SLIDES = {"x": X, "y": Y, "turn": Z}
+
+
+def on_a_plane(of_slides, body, *analyses, gains=False, **tables):
+    """A body on a planar joint with motors, or on two slides and a turning joint between bodies next to massless."""
+    friction = {"viscous_friction": 0.3}
+    if not of_slides:
+        bodies = [body]
+        joints = [tables_3d.joint("plane", "planar", "ground", "b.root", axis=Z, motor=True, **friction)]
+    else:
+        between = ["ground", "u.root", "w.root", "b.root"]
+        bodies = [tables_3d.rigid("u", 1e-9, [1e-12] * 3), tables_3d.rigid("w", 1e-9, [1e-12] * 3), body]
+        joints = [
+            tables_3d.joint(
+                name, "revolute" if name == "turn" else "prismatic", *between[k : k + 2], axis=axis, **friction
+            )
+            for k, (name, axis) in enumerate(SLIDES.items())
+        ]
+    if gains:
+        P, D = ({joint["name"]: gain for joint in joints} for gain in (60.0, 2.0))
+        analyses[-1]["controller"] = [{"kind": "joint-pid", "proportional": P, "derivative": D}]
+    return ffrobot.solve(
+        ffrobot.make_scene(**tables_3d.scene(bodies, joints, *analyses, gravity=[1.0, 2.0, -9.0], **tables))
+    )
+
+
+def test_planar_joints_under_control_are_two_slides_and_a_turn():
+    """Also beyond half a turn."""
+    paths = [
+        {"name": "turn", "angle": "b", "axis": Z, "value": "2*(1 - cos(4*t))"},
+        {"name": "place", "point": "b.root", "x": "0.2*sin(5*t)", "y": "0.1*(1 - cos(4*t))"},
+    ]
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.8, "output_step": 0.02, "tolerance": 1e-9}
+    loop = {"kind": "closed-loop", "actuation": "inverse", "sample_time": 0.005, "tolerance": 1e-9}
+    push = {"disturbance": [{"point": "b.tip", "x": 1.0, "y": -0.5}]}
+    torque = loop | push | {"name": "torque", "controller": [{"kind": "computed-torque", "bandwidth": 20.0}]}
+    found = []
+    for of_slides in (False, True):
+        pd = loop | push | {"name": "pd"}
+        body = {"name": "b", "rigid": BODY}
+        with on_a_plane(of_slides, body, inverse, torque, pd, gains=True, trajectory=paths) as run:
+            joints = SLIDES if of_slides else ["plane"]
+            found.append([np.column_stack([run[f"{name}/joints/{j}/{key}"] for j in joints])
+                          for name in ("torque", "pd") for key in ("moment", "coordinate")])  # fmt: skip
+    assert found[0][1][-1, 2] > np.pi
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-7 * np.abs(other).max())
+
+
+def test_motors_of_planar_joints_hold_a_link_that_vibrates():
+    """Frequencies of the robot with its motors locked are those of two slides and a turn, locked."""
+    link = beam_link(0.5, rectangle(0.01, 0.015), 6, modes={"count": 4})
+    linear = {"name": "linear", "kind": "linear"}
+    found = []
+    for of_slides in (False, True):
+        with on_a_plane(of_slides, {"name": "b", "link": link}, linear, initial={}) as run:
+            found.append(run["linear/joints_locked/frequency"])
+    assert found[0].size >= 4
+    np.testing.assert_allclose(*found, rtol=1e-6)
