@@ -27,6 +27,7 @@ from ..common.keys import MOST_RUNS
 from ..common.tables import shown
 from ..mbs.fields.field_types import Quantity
 from ..mbs.scene.space import SPACES
+from ..mbs.solve.linearisation import labelled
 from ..mbs.solve.poses import PoseEvaluator
 from ..mbs.solve.workspace import GridAxis, Postures, grid_postures
 from ..run.inputs import changed, fingerprints, read_tables
@@ -326,8 +327,9 @@ def _assembled(
             if name != "stands":
                 whole = values.setdefault(name, np.full((len(status), *value.shape[1:]), np.nan))
                 whole[part] = value
-    joints = {joint.name: joint for joint in solution.scene.joint}
-    names = tuple(name.split("/")[1] for name in evaluator.motors)
-    limits = [getattr(joints[name.split(" ")[0]], "moment_limit", None) for name in names]
-    return PoseMap(plan, names, np.array([np.nan if one is None else np.max(one) for one in limits]), status, values,
-                   postures.q)  # fmt: skip
+    names, limits = tuple(name.split("/")[1] for name in evaluator.motors), dict[str, float]()
+    for joint in solution.scene.motor_joints:
+        labels = (name.removeprefix("joint/") for name, _ in labelled(solution.model, joint.name))
+        limits |= {label: limit.moment for label, limit in zip(labels, joint.motor_limits, strict=True)}
+    moments = np.array([limits[name] for name in names])
+    return PoseMap(plan, names, np.where(np.isfinite(moments), moments, np.nan), status, values, postures.q)

@@ -72,7 +72,7 @@ def left_ranges(model: Model, found: Sequence[Seen] | None, times: Array, q: Arr
     """
     of_core = zip(watched(model.tree), found, strict=True) if found is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
-    for joint, number, values in _sampled(model, times, q, v, every=found is None):
+    for joint, number, values in limited_coordinates(model, times, q, v, every=found is None):
         (lowest, highest), rounding = joint.position_limits[number], ROUNDING * np.abs(values).max()
         outside = times[(values < lowest - rounding) | (values > highest + rounding)]
         seen.append((joint, number, (values.min(), values.max(), outside[0] if outside.size else None)))
@@ -94,7 +94,7 @@ def _is_sampled(node: Node) -> bool:
     return node.backwards and node.joint.type == "planar"
 
 
-def _sampled(
+def limited_coordinates(
     model: Model, times: Array, q: Array, v: Array, *, every: bool
 ) -> Iterator[tuple[JointRecord, int, Array]]:
     """Coordinates (T,) that the core does not watch, of joints with limits: in the tree, and where loops are cut.

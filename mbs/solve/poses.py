@@ -20,7 +20,7 @@ from .joint_conditions import (
     joint_conditions,
     translational_stiffness,
 )  # fmt: skip
-from .linearisation import LinearEquations, LinearMechanism
+from .linearisation import LinearEquations, LinearMechanism, labelled
 from .posture import solve_posture
 from .start import relaxed_gears
 
@@ -42,9 +42,8 @@ class PoseEvaluator:
         self.space, self.point, self._count, self._omega = SPACES[model.scene.space], point, count, omega
         self._linear = LinearEquations(self.model, self._all(q), {point: point})
         shafts = [name for name in self._linear.names if name.startswith("motor/")]
-        direct = [
-            name for name in self._linear.names if name.startswith("joint/") and _joint(name) in self.model.motors
-        ]
+        driven = {name for joint in self.model.motors for name, _ in labelled(self.model, joint)}
+        direct = [name for name in self._linear.names if name in driven]
         geared = [name.replace("motor/", "joint/") for name in shafts]
         self.motors = (*(name for name in direct if name not in geared), *shafts)
         self.segments = tuple(_segments(self.model, point))
@@ -128,11 +127,6 @@ class PoseEvaluator:
             "frequency": frequency, "compliance": C, "stiffness": along, "least_stiffness": np.array(least),
             "direction": direction,
         }  # fmt: skip
-
-
-def _joint(name: str) -> str:
-    """Of "joint/NAME" and "joint/NAME 2"."""
-    return name.removeprefix("joint/").split(" ")[0]
 
 
 def _segments(model: Model, point: str) -> list[tuple[Section, Section]]:

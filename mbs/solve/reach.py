@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Booleans, Indices, as_floats
 from ...common.errors import InputError
 from ..fields.field_types import split_point
 from ..model.model import Model, row_values
@@ -131,12 +131,17 @@ def _angles(node: Node) -> list[int]:
 def regular_postures(model: Model, q: Array) -> Array:
     """Of postures next to q (T, n_q) those (…, n_q) that meet all rows at t = 0 and are regular."""
     found, is_met = solve_postures(model, np.zeros(len(q)), q)
+    found = found[is_met]
+    return found[are_regular(model, found, np.zeros(len(found)))]
+
+
+def are_regular(model: Model, q: Array, times: Array) -> Booleans:
+    """(T,) whether joints follow all rows at `times` (T,) in the postures q (T, n_q)."""
     joints = model.tree.joint_columns
     scales = joint_scales(model)[joints]
-    found = found[is_met]
-    J = row_values(model, found, np.zeros(len(found)))[1][:, :, joints] * scales / row_sizes(model)[:, None]
+    J = row_values(model, q, times)[1][:, :, joints] * scales / row_sizes(model)[:, None]
     values = np.linalg.svd(J, compute_uv=False)
-    return found[values[:, -1] > REGULAR * values[:, 0]]
+    return np.asarray(values[:, -1] > REGULAR * values[:, 0])
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -18,10 +18,14 @@ from ..fields.orientations import OrientationLaw
 from ..fields.waypoints import spline
 from ..model.model import Model, row_of_joint, row_values, without_paths
 from ..model.rows import ConstraintRow
+from .limits import limited_coordinates
 from .posture import solve_postures
+from .reach import are_regular, random_angles, turning_joints
 from .start import undeformed_posture
 
 TOGETHER = 500  # postures that are solved at once
+PLACES, TRIES = 32, 16  # that are tried where no neighbor leads, and guesses for each
+BEYOND = 1e3  # rad: postures beyond limits of joints come after all others
 
 
 @struct
@@ -67,19 +71,59 @@ def grid_postures(model: Model, axes: Sequence[GridAxis], point: str, *, keeps_o
 
 
 def _flooded(model: Model, start: Array, shape: tuple[int, ...], seed: int) -> tuple[Array, Booleans]:
-    """From neighbor to neighbor, round by round; a posture that fails is tried again from the next neighbor."""
+    """From neighbor to neighbor, round by round; a posture that fails is tried again from the next neighbor.
+
+    So are those beyond limits of joints, from which others are sought where none within leads.
+    """
     count = int(np.prod(shape))
-    q, reached = np.tile(start, (count, 1)), np.zeros(count, dtype=bool)
-    trial, guess = np.array([seed]), start[None]
+    q, reached, within = np.tile(start, (count, 1)), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    trial, guess, waiting = np.array([seed]), start[None], np.zeros(0, dtype=np.intp)
     while len(trial):
         found, is_met = _solved(model, trial, guess)
-        new = trial[is_met]
-        q[new], reached[new] = found[is_met], True
-        ahead, origin = _neighbors(new, shape)
-        open_ones = ~reached[ahead]
-        trial, first = np.unique(ahead[open_ones], return_index=True)
-        guess = q[origin[open_ones][first]]
+        keeps = is_met & within_limits(model, found)
+        new = keeps | (is_met & ~reached[trial])
+        q[trial[new]], reached[trial[new]], within[trial[keeps]] = found[new], True, True
+        waiting = np.append(waiting, trial[new & ~keeps])
+        trial, guess = _around(trial[keeps], shape, q, ~within)
+        if not len(trial):
+            trial, guess = _around(waiting, shape, q, ~reached)
+            waiting = waiting[:0]
+        if not len(trial):
+            trial, guess = _elsewhere(model, start, shape, q, reached)
     return q, reached
+
+
+def _around(numbers: Indices, shape: tuple[int, ...], q: Array, is_open: Booleans) -> tuple[Indices, Array]:
+    """Open neighbors of these postures, each once, and a posture to begin with."""
+    ahead, origin = _neighbors(numbers, shape)
+    trial, first = np.unique(ahead[is_open[ahead]], return_index=True)
+    return trial, q[origin[is_open[ahead]][first]]
+
+
+def _elsewhere(
+    model: Model, start: Array, shape: tuple[int, ...], q: Array, reached: Booleans
+) -> tuple[Indices, Array]:
+    """A place that is open with a posture (1, n_q) there, next to the start; nothing where there is none.
+
+    Of places without a regular neighbor: these lead no arm out of a straight posture or across a hole in its reach.
+    """
+    known, (_, columns) = np.flatnonzero(reached), turning_joints(model)
+    regular = known[are_regular(model, q[known], known.astype(float))]
+    left = np.setdiff1d(np.flatnonzero(~reached), _neighbors(regular, shape)[0])
+    none = left[:0], q[:0]
+    if not len(left) or not len(columns):
+        return none
+    some = np.random.default_rng(0).permutation(left)[:PLACES]
+    trial = np.repeat(some, TRIES)
+    found, is_met = _solved(model, trial, np.tile(random_angles(start, columns, TRIES), (len(some), 1)))
+    trial, found = trial[is_met], found[is_met]
+    if not len(trial):
+        return none
+    turns = np.angle(np.exp(1j * (found[:, columns] - start[columns])))
+    found[:, columns] = start[columns] + turns
+    away = np.abs(turns).sum(axis=1) + np.where(within_limits(model, found), 0.0, BEYOND)
+    best = [int(away.argmin())]
+    return trial[best], found[best]
 
 
 def _solved(model: Model, numbers: Indices, guess: Array) -> tuple[Array, Booleans]:
@@ -132,12 +176,12 @@ def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
 
 
 def within_limits(model: Model, q: Array) -> Booleans:
-    """(P,) whether postures q (P, n_q) keep the limits of the joints of the tree with one coordinate each."""
-    within = np.ones(len(q), dtype=bool)
-    for joint in model.scene.joint:
-        if joint.name in model.tree.carried and len(joint.units) == 1:
-            node = model.tree.nodes[model.tree.carried[joint.name]]
-            lowest, highest = joint.position_limits[0]
-            value = node.sign * q[:, node.q.start]
-            within &= (value >= lowest) & (value <= highest)
+    """(P,) whether postures q (P, n_q) keep the limits of all joints."""
+    cut = any(np.isfinite(joint.position_limits).any() for joint in model.tree.cut_joints)
+    if cut and len(q) > 1:  # angles there are by the motion up to them
+        return np.array([within_limits(model, one[None])[0] for one in q])
+    within, v = np.ones(len(q), dtype=bool), np.zeros((len(q), model.tree.n_v))
+    for joint, number, values in limited_coordinates(model, np.zeros(len(q)), q, v, every=True):
+        lowest, highest = joint.position_limits[number]
+        within &= (values >= lowest) & (values <= highest)
     return within

@@ -13,9 +13,9 @@ import tomli_w
 from beam_links import beam_link, rectangle
 
 from ffrobot import solve
-from ffrobot.common.errors import InputError
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.map import pose_map
-from ffrobot.map.map_file import quantities, write_map
+from ffrobot.map.map_file import quantities, torque_share, write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.pictures.studies.pose_map import draw_map
 from ffrobot.run.watcher import Watcher
@@ -229,3 +229,74 @@ def test_poses_that_no_motor_keeps_are_refused(arm, tmp_path):
     )
     with pytest.raises(InputError, match="expected motors that keep the poses of a map, found none"):
         mapped(limp, tmp_path / "map", "shoulder=0.3")
+
+
+STRAIGHT = """name = "straight"
+gravity = [0.0, -9.81]
+body = [
+ { name = "a", rigid = { mass = 2.0, inertia = 0.05, center = [0.3, 0], points = { o = [0, 0], e = [0.6, 0] } } },
+ { name = "b", rigid = { mass = 1.0, inertia = 0.02, center = [0.2, 0], points = { o = [0, 0], e = [0.4, 0] } } },
+]
+joint = [{ name = "s", type = "revolute", between = ["ground", "a.o"] },
+ { name = "e", type = "revolute", between = ["a.e", "b.o"], position_limit = [-3.2, 0.1] }]
+analysis = [{ name = "rest", kind = "static" }]
+"""
+
+
+@pytest.mark.parametrize(
+    "over", [("x=-1.23:1.23:13", "y=-1.23:1.23:13"), ("x=-0.95:0.95:9", "y=0"), ("x=0.3:1:8", "y=0")]
+)
+def test_a_straight_arm_reaches_what_its_links_reach(tmp_path, over):
+    """Places from 0.2 to 1 m, from a start that is straight, or that no neighbor leads from across the hole."""
+    (tmp_path / "scene.toml").write_text(STRAIGHT)
+    found = mapped(tmp_path / "scene.toml", tmp_path / "map", *over)
+    x, y = np.meshgrid(*(axis.values for axis in found.plan.axes), indexing="ij")
+    distance = np.hypot(x, y).ravel()
+    assert (found.status == np.where((distance > 0.2 - 1e-9) & (distance < 1.0 + 1e-9), 0, 1)).all()
+    np.testing.assert_allclose(np.linalg.norm(found.values["place"], axis=1)[found.status == 0],
+                               distance[found.status == 0], atol=1e-9)  # fmt: skip
+
+
+def test_names_with_blanks_and_limits_of_each_coordinate(tmp_path):
+    """Weights times levers about y, none about z, against the limit of each; a range of each coordinate."""
+    scene = """name = "arm"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+initial = { joints = { s = [0.0, 0.5] } }
+analysis = [{ name = "rest", kind = "static" }]
+[[body]]
+name = "a"
+rigid = { mass = 2.0, center = [0.3, 0, 0], inertia = [0.01, 0.05, 0.05], points = { o = [0, 0, 0], e = [0.6, 0, 0] } }
+[[body]]
+name = "b"
+rigid = { mass = 1.0, center = [0.2, 0, 0], inertia = [0.01, 0.02, 0.02], points = { o = [0, 0, 0], e = [0.4, 0, 0] } }
+[[joint]]
+name = "s"
+type = "universal"
+between = ["ground", "a.o"]
+axis = [0, 0, 1]
+second_axis = [0, 1, 0]
+motor = true
+moment_limit = [100.0, 5.0]
+position_limit = [[-1.0, 1.0], LIMIT]
+[[joint]]
+name = "elbow 1"
+type = "revolute"
+between = ["a.e", "b.o"]
+axis = [0, 1, 0]
+moment_limit = 3.0
+"""
+    for limit, status in (("[-1.0, 1.0]", 0), ("[-1.0, 0.4]", 2)):
+        path = tmp_path / str(status) / "scene.toml"
+        path.parent.mkdir()
+        path.write_text(scene.replace("LIMIT", limit))
+        if status:
+            with pytest.raises(SolveError, match="within reach and the limits of the joints"):
+                mapped(path, path.parent / "map", "elbow 1=0:1:3")
+            continue
+        found = mapped(path, path.parent / "map", "elbow 1=0:1:3")
+        assert found.motors == ("s 1", "s 2", "elbow 1")
+        elbow = 9.81 * 0.2 * np.cos(0.5 + np.linspace(0, 1, 3))
+        second = 9.81 * (2.0 * 0.3 + 0.6) * np.cos(0.5) + elbow
+        np.testing.assert_allclose(found.values["torque"].T, [0 * elbow, -second, -elbow], atol=1e-9)
+        np.testing.assert_allclose(torque_share(found).T, [0 * elbow, second / 5.0, elbow / 3.0], atol=1e-9)
