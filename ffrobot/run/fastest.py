@@ -159,8 +159,11 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
 def _shaped(scene: Scene, model: Model) -> tuple[Scene, Notes]:
     """The scene with shapers for frequencies of the robot where they ask for these; notes on them and on tables."""
     asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
-    tables = (one.waypoints for one in scene.trajectory if one.waypoints is not None)
-    of_tables: Notes = tuple(dict.fromkeys(remark for table in tables for remark in table.remarks))
+    tables = [(one, one.waypoints) for one in scene.trajectory if one.waypoints is not None]
+    of_tables: Notes = tuple(dict.fromkeys(remark for _, table in tables for remark in table.remarks))
+    splines = {one.name: table for one, table in tables if one.profile in (None, "spline")}
+    holds = ((name, table.abrupt_hold) for name, table in splines.items())
+    of_tables = (*of_tables, *(f'trajectory "{name}": {remark}' for name, remark in holds if remark))
     if not asking:
         return scene, of_tables
     begin, end = _span(scene)

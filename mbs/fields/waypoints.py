@@ -28,6 +28,7 @@ OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "position", "pos
 """Names of the column of a joint, {0} being the joint's, the first that is there."""
 MANY, GAP = 20, 20.0  # intervals of a table with a usual step; how many times this a gap is
 ABRUPT = 3.0  # times the accelerations of a record: what its spline needs next to an end, where it rests
+STOPPING, DENSE = 2.0, 9  # likewise next to a hold; times in an interval at which that is looked at
 SAMPLES, LOST = 6, 2.5  # the same where at least three of four steps are equal, as those of records are
 
 
@@ -57,15 +58,46 @@ class Waypoints:
         Rows that follow each other with the same values are a hold: the spline comes to rest there, and begins anew
         after it. Velocity and acceleration are zero at holds and at both ends.
         """
-        moves = np.any(np.diff(self.values, axis=0), axis=1)
-        if not moves.any():
+        begins, ends = self._ways
+        if not len(begins):
             return Piecewise(self.times[[0, -1]], self.values[None, :1])
-        begins = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
-        ends = np.flatnonzero(moves & ~np.append(moves[1:], False)) + 1
         parts = [interpolated(self.times[a : b + 1], self.values[a : b + 1]) for a, b in zip(begins, ends, strict=True)]
         rest = Piecewise(parts[0].breaks[:2], self.values[None, :1])
         ways = [Piecewise(part.breaks, _from_zero(part, self.values[a])) for part, a in zip(parts, begins, strict=True)]
         return superposed([rest, *ways])
+
+    @property
+    def _ways(self) -> tuple[Indices, Indices]:
+        """First and last row of each part that moves."""
+        moves = np.any(np.diff(self.values, axis=0), axis=1)
+        begins = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
+        return begins, np.flatnonzero(moves & ~np.append(moves[1:], False)) + 1
+
+    @property
+    def abrupt_hold(self) -> str:
+        """A remark on the hold of a record that its rows do not come to: they turn there, or have few digits.
+
+        By accelerations of the spline in the two intervals before and after it, next to those of the rows.
+        """
+        begins, ends = self._ways
+        if len(self.times) < MANY or len(begins) < 2 or (ends - begins).max() < SAMPLES:
+            return ""
+        of_rows, curve = _accelerations(self.times, self.values).max(axis=0), self.spline()
+        of_rows = np.where(of_rows > 0.0, of_rows, np.inf)
+        found = []
+        for last, first in zip(ends[:-1], begins[1:], strict=True):
+            rows = self.times[max(last - 2, 0) : first + 3]
+            times = (rows[:-1, None] + np.linspace(0.0, 1.0, DENSE) * np.diff(rows)[:, None]).ravel()
+            found.append(float((np.abs(curve.sample(times, 2)).max(axis=0) / of_rows).max()))
+        k = int(np.argmax(found))
+        if found[k] < STOPPING:
+            return ""
+        more = f", one of {len(found)} holds" if len(found) > 1 else ""
+        return (
+            f"rows from t = {self.times[ends[k]]:g} to {self.times[begins[k + 1]]:g} s are alike{more}: the path rests"
+            f" there, by accelerations {found[k]:.2g} times those of the rows. Where it does not, leave one of them"
+            " out, or smooth the record"
+        )
 
 
 def load_waypoints(path: Path) -> Waypoints:
@@ -130,8 +162,7 @@ def _moving_ends(times: Array, values: Array) -> Iterator[str]:
     """Remarks on a record that moves at an end, by a cubic through four rows there: its spline rests there."""
     if len(times) < MANY:
         return
-    steps = np.diff(times)[:, None]
-    accelerations = np.abs(np.diff(np.diff(values, axis=0) / steps, axis=0) / (0.5 * (steps[1:] + steps[:-1])))
+    steps, accelerations = np.diff(times)[:, None], _accelerations(times, values)
     for at, ends, step in ((times[0], slice(0, 4), steps[0, 0]), (times[-1], slice(-4, None), steps[-1, 0])):
         rates = np.abs(np.polyfit((times[ends] - at) / step, values[ends], 3)[-2]) / step
         abrupt = rates / step > ABRUPT * accelerations.max(axis=0)
@@ -141,6 +172,12 @@ def _moving_ends(times: Array, values: Array) -> Iterator[str]:
                 f"rows move at t = {at:g} s by {rate:.3g} per s: the path is at rest there, and changes to that speed"
                 f" within {step:.3g} s"
             )
+
+
+def _accelerations(times: Array, values: Array) -> Array:
+    """(T − 2, columns) sizes by second differences of rows (T, columns)."""
+    steps = np.diff(times)[:, None]
+    return np.abs(np.diff(np.diff(values, axis=0) / steps, axis=0) / (0.5 * (steps[1:] + steps[:-1])))
 
 
 def _from_zero(part: Piecewise, first: Array) -> Array:

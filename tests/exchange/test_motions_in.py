@@ -107,6 +107,26 @@ def test_records_that_move_at_their_ends(path, rates, tmp_path):
     assert all(text in remark for text, remark in zip(says, table.remarks, strict=True))
 
 
+def test_records_that_turn_between_two_rows(tmp_path):
+    """Rows are alike beside the top of 64 u³ (1 − u)³, u = t/2 s, where its rate is zero and its acceleration −6."""
+    time = np.linspace(0.0, 2.0, 80)
+    rows = [(t, round(8.0 * (t * (1.0 - t / 2.0)) ** 3, 6)) for t in time]
+    told = load_waypoints(write(tmp_path / "path.csv", "t,value", rows))
+    assert "rows from t = 0.987342 to 1.01266 s are alike: the path rests there" in told.abrupt_hold
+    assert told.spline().sample(np.array([1.0]), 2)[0, 0] == 0.0
+    fine = load_waypoints(write(tmp_path / "path.csv", "t,value", [*rows[:39], *rows[40:]]))
+    assert fine.abrupt_hold == ""
+    assert fine.spline().sample(np.array([1.0]), 2)[0, 0] == pytest.approx(-6.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("digits", [4, 9])
+def test_holds_that_records_come_to_are_not_told(digits, tmp_path):
+    time = np.arange(0.0, 2.5, 0.01)
+    u = np.minimum(time, 1.0) - np.clip(time - 1.5, 0.0, 1.0)
+    rows = zip(time, (u**3 * (10.0 - 15.0 * u + 6.0 * u**2)).round(digits), strict=True)
+    assert load_waypoints(write(tmp_path / "path.csv", "t,value", list(rows))).abrupt_hold == ""
+
+
 @pytest.mark.parametrize("epoch", [0, EPOCH])
 def test_whole_seconds_and_nanoseconds(epoch, tmp_path):
     """As ROS writes them, from 0.5 s on."""

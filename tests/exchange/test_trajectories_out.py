@@ -12,7 +12,7 @@ from rigid_robots import ROBOTS, with_motion
 
 from ffrobot import Results
 from ffrobot.exchange.export import export_file
-from ffrobot.exchange.motion.read_motion import JointMotion, csv_text, robot_motion
+from ffrobot.exchange.motion.read_motion import JointMotion, csv_text, joint_trajectory, robot_motion
 
 # Fields in the order of the message definitions of ROS 2 (common_interfaces: trajectory_msgs/msg).
 TRAJECTORY = ["header", "joint_names", "points"]
@@ -83,6 +83,14 @@ def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
         np.testing.assert_allclose(seconds, group["time"], atol=0.6e-9)
         assert all(0 <= stamp["nanosec"] < 1_000_000_000 for stamp in stamps)
     assert ("no joint has a motor: effort is left empty" in done.stdout) == (not driven)
+
+
+def test_what_motors_do_before_the_path_comes_first(ur5):
+    """The message begins at 0, where motions before the path are at t < 0."""
+    motion = robot_motion(ur5, None)
+    early, remarks = joint_trajectory(replace(motion, time=motion.time - 0.25))
+    assert (early, ()) == joint_trajectory(motion)
+    assert remarks == ("time_from_start 0 is t = -0.25 s, when motors begin: the path does 0.25 s later",)
 
 
 def test_a_rosbag2_has_the_message(ur5, ffrobot, tmp_path):

@@ -266,6 +266,9 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
         remarks.append(f"joints without motor left out: {', '.join(left)}")
     if not driven:
         remarks.append("no joint has a motor: effort is left empty")
+    begin = min(float(motion.time[0]), 0.0)
+    if begin < 0.0:
+        remarks.append(f"time_from_start 0 is t = {begin:g} s, when motors begin: the path does {-begin:g} s later")
     positions, velocities = (
         np.stack([getattr(joint, key) for joint in joints], axis=1) for key in ("coordinate", "rate")
     )
@@ -276,7 +279,7 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
             "velocities": velocity,
             "accelerations": [],
             "effort": effort,
-            "time_from_start": _duration(time),
+            "time_from_start": _duration(time - begin),
         }
         for position, velocity, effort, time in zip(
             as_rows(positions), as_rows(velocities), as_rows(efforts), as_list(motion.time), strict=True
