@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array, Indices
@@ -100,18 +98,15 @@ def find_actuation(
     Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
     `known`: voltages (T, k) by body, V.
     """
-    from ..actuation.judgement import judge_actuators, links_in_motion
+    from ..actuation.judgement import find_unmet, judge_actuators, links_in_motion
 
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
     voltages: dict[str, Voltages] = {}
-    unmet = {}
     for name, of_link in patches.items():
         F_p = links[name].F_p
-        found = of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
-        within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
-        unmet[name] = of_link.unmet(links[name].F_p, within)
-        voltages |= found
+        voltages |= of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
+    unmet = find_unmet({name: links[name] for name in patches}, patches, voltages, limited=True)
     others = {of.body for of in scene.actuation_points}
     if any(getattr(one, "apply", None) in FORCES_AT_POINTS for one in scene.analysis if one.source == analysis.name):
         others |= links.keys()
