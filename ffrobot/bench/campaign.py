@@ -14,7 +14,6 @@ from typing import Any
 
 from matplotlib.figure import Figure
 from rich.console import Console
-from rich.table import Table
 
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
@@ -23,6 +22,7 @@ from ..mbs import _core
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ..pictures.figures.plot import write_figure
 from ..pictures.figures.style import legend, line_style, new_axes, style
+from ..present.lines import print_table
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
@@ -186,12 +186,8 @@ class Campaign:
         record = {"machine": self.machine, "load": load(), "settings": settings, "inputs_hash": inputs, "title": title}
         self.drawn(write_record(folder, part, rows, record | dict(about)))
         columns, lines = as_text(rows, part)
-        table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0), pad_edge=False)
-        for column in columns:
-            table.add_column(column, overflow="fold")
-        for line in lines:
-            table.add_row(*line)
-        self.console.print(table)
+        self.console.print(title, soft_wrap=True)
+        print_table(self.console, columns, lines)
 
     def drawn(self, paths: Sequence[Path]) -> None:
         """Print the files written."""

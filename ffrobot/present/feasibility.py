@@ -15,7 +15,7 @@ from ..actuation.catalog import Choice, JointTask, choices, read_catalog
 from ..actuation.motors import MotorFeasibility
 from ..common.errors import InputError, quoted
 from ..results.file import Results
-from .lines import print_table
+from .lines import plain_table, print_table
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
@@ -59,7 +59,7 @@ def _tables(results: Results, name: str) -> Iterator[Table | str]:
 
 def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) -> Table:
     """At the joint, a line for each quantity; the RMS over the run is what heats a motor."""
-    table = _table(
+    table = plain_table(
         "motor of", "at the joint", "peak", "limit", "peak / limit", "RMS", "share above", "first at (s)", "within?"
     )
     for name, motor in motors.items():
@@ -82,9 +82,10 @@ def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) ->
 
 def _at_motors(motors: Mapping[str, MotorFeasibility], scene: Mapping[str, Any]) -> Table:
     """In front of gears, without their losses; the load's inertia is the largest, with other joints locked."""
-    table = _table(
-        "motor of", "ratio", "peak (N·m)", "RMS (N·m)", "speed (rad/s)", "(1/min)", "power (W)", "load / rotor inertia"
-    )
+    table = plain_table(
+        "motor of", "ratio", "peak (N·m)", "RMS (N·m)", "speed (rad/s)", "(1/min)", "power (W)", "load / rotor inertia",
+        names=1,
+    )  # fmt: skip
     for joint in scene["joint"]:
         motor, N, J = motors.get(joint["name"]), joint.get("gear_ratio", 1.0), joint.get("rotor_inertia", 0.0)
         if motor is not None and N != 1.0:
@@ -98,9 +99,9 @@ def _at_motors(motors: Mapping[str, MotorFeasibility], scene: Mapping[str, Any])
 
 
 def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
-    table = _table(
+    table = plain_table(
         body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling",
-        "strain (µ)", "within?",
+        "strain (µ)", "within?", names=1,
     )  # fmt: skip
     required, available = judged["required_moment"][()], judged["available_moment"][()]
     c, depoling = np.abs(pzt["moment_per_volt"][()]), judged.attrs["depoling_field"]
@@ -119,7 +120,7 @@ def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
 
 
 def _modes(body: str, judged: h5py.Group) -> Table:
-    table = _table(body, "needs (N/√kg)", "all patches have (N/√kg)", "factor")
+    table = plain_table(body, "needs (N/√kg)", "all patches have (N/√kg)", "factor", names=1)
     for k, (needed, had, factor) in enumerate(
         zip(judged["mode_required"][()], judged["mode_available"][()], judged["mode_factor"][()], strict=True), 1
     ):
@@ -149,14 +150,6 @@ def _number(value: float) -> str:
     if np.isinf(value):
         return "none"
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
-
-
-def _table(*headers: str) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for k, header in enumerate(headers):
-        is_text = k == 0 or header == "at the joint"
-        table.add_column(header, justify="left" if is_text else "right", no_wrap=True)
-    return table
 
 
 SHOWN = 3  # motors of each joint

@@ -43,13 +43,13 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
     return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
 
 
-def plain_table(*headers: str) -> Table:
-    """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
+def plain_table(*headers: str, names: int = 2) -> Table:
+    """Columns without lines: the first ones are `names`, which are left and fold where they must, numbers are right."""
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for k, header in enumerate(headers):
-        if k < 2 or header == "integrator":
+        if k < names or header == "integrator":
             table.add_column(header, overflow="fold")
         else:
             table.add_column(header, justify="right", no_wrap=True)
