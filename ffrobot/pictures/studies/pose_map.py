@@ -21,6 +21,7 @@ from ..figures.style import ORDERED, SIZE, style
 WORST, BEST = "#c22f2f", "#1f5fa8"
 WIDE = (2 * SIZE[0], 1.3 * SIZE[1])  # inches
 LABELS = ("worst", "best")
+ALPHA = {2: 1.0, 3: 0.5}  # of places, by the number of their coordinates
 ZOOM = 0.8  # leaves room for the labels of 3D axes
 
 
@@ -49,10 +50,8 @@ def _draw(found: PoseMap, quantity: Quantity) -> Figure:
     elif len(long) == 1:
         _curve(figure.add_subplot(1, 2, 1), found, quantity, long[0])
     position = (1, 2, 2) if len(long) < 3 else (1, 1, 1)
-    if found.values["place"].shape[1] == 2:
-        _workspace(figure.add_subplot(*position), found, quantity)
-    else:
-        _workspace_3d(figure.add_subplot(*position, projection="3d"), found, quantity)
+    projection = "3d" if found.values["place"].shape[1] == 3 else None
+    _workspace(figure.add_subplot(*position, projection=projection), found, quantity, has_bar=len(long) > 2)
     return figure
 
 
@@ -80,35 +79,22 @@ def _curve(axes: Axes, found: PoseMap, quantity: Quantity, axis: GridAxis) -> No
     axes.set_xlabel(_label(axis))
 
 
-def _workspace(axes: Axes, found: PoseMap, quantity: Quantity) -> None:
-    """Places of the point in color, and the robot, in the plane."""
-    place = found.values["place"]
-    axes.scatter(place[:, 0], place[:, 1], c=quantity.values, cmap=ORDERED, s=6, linewidths=0)
+def _workspace(axes: Any, found: PoseMap, quantity: Quantity, *, has_bar: bool) -> None:  # noqa: ANN401 (2D or 3D)
+    """Places of the point in color, and the robot before them."""
+    place, size = found.values["place"], found.values["place"].shape[1]
+    cloud = axes.scatter(*place.T, c=quantity.values, cmap=ORDERED, s=6, alpha=ALPHA[size], linewidths=0)
     for (number, color, marker), label in zip(_marks(quantity), LABELS, strict=True):
         for line in found.values["robot"][number]:
-            axes.plot(*line[:, :2].T, color=color, linewidth=2.0, solid_capstyle="round")
-        axes.plot(*place[number], marker, color=color, markersize=6, label=label)
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+            axes.plot(*line[:, :size].T, color=color, linewidth=2.0, solid_capstyle="round", zorder=5)
+        axes.plot(*place[number][:, None], marker, color=color, markersize=6, label=label, zorder=5)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(loc="best")
-
-
-def _workspace_3d(axes: Any, found: PoseMap, quantity: Quantity) -> None:  # noqa: ANN401 (of matplotlib's 3D axes)
-    """Likewise in 3D."""
-    place = found.values["place"]
-    axes.computed_zorder = False  # the robot in front of the cloud of places
-    cloud = axes.scatter(*place.T, c=quantity.values, cmap=ORDERED, s=5, alpha=0.5, linewidths=0)
-    for (number, color, marker), label in zip(_marks(quantity), LABELS, strict=True):
-        for line in found.values["robot"][number]:
-            axes.plot(*line.T, color=color, linewidth=2.0, zorder=5)
-        axes.plot(*place[number][:, None], marker, color=color, label=label)
-    axes.set_aspect("equal")
-    axes.set_box_aspect(None, zoom=ZOOM)
-    for name in "xyz":
+    if size == 3:
+        axes.computed_zorder = False
+        axes.set_box_aspect(None, zoom=ZOOM)
+    for name in "xyz"[:size]:
         getattr(axes, f"set_{name}label")(f"{name} (m)")
-    axes.legend(loc="upper right")
-    if len([axis for axis in found.plan.axes if len(axis.values) > 1]) > 2:
+    axes.legend(loc="best")
+    if has_bar:
         axes.figure.colorbar(cloud, ax=axes, shrink=0.6)
 
 
