@@ -172,27 +172,17 @@ def sampled(A: Array, B: Array, T: float, delay: float) -> SampledModel:
     """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3)."""
     n, m = B.shape
     late, fraction = divmod(delay, T)
-    waiting = int(late) + (fraction > 1e-9 * T)
+    is_whole = fraction <= 1e-9 * T
+    waiting = int(late) + (not is_whole)
     Phi, Gamma = _zero_order_hold(A, B, T)
-    _, early = _zero_order_hold(A, B, T - fraction) if fraction > 1e-9 * T else (Phi, Gamma)
-    whole = np.zeros((n + waiting * m, n + waiting * m))
-    inputs = np.zeros((n + waiting * m, m))
-    whole[:n, :n] = Phi
-    if waiting == 0:
-        inputs[:n] = Gamma
-        return SampledModel(whole, inputs)
-    whole[n : n + (waiting - 1) * m, n + m :] = np.eye((waiting - 1) * m)
-    inputs[n + (waiting - 1) * m :] = np.eye(m)
-    if fraction <= 1e-9 * T:
-        whole[:n, n : n + m] = Gamma
-    else:  # the oldest command acts for the first part of the interval, the next one for the rest
-        rest = Gamma - early
-        whole[:n, n : n + m] = rest
-        if waiting == 1:
-            inputs[:n] = early
-        else:
-            whole[:n, n + m : n + 2 * m] = early
-    return SampledModel(whole, inputs)
+    early = Gamma if is_whole else _zero_order_hold(A, B, T - fraction)[1]
+    columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
+    columns[:n, :n] = Phi
+    columns[n:, n + m :] = np.eye(waiting * m)
+    columns[:n, n : n + m] = Gamma - early  # the oldest command acts for the first part of the interval
+    next_one = n if is_whole else n + m
+    columns[:n, next_one : next_one + m] = early
+    return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :])
 
 
 def _zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
