@@ -86,7 +86,6 @@ def _highest(offsets: Array) -> Array:
     return as_floats(1.0 / np.prod(apart, axis=1))
 
 
-SIZES = (1.0, 0.5, 0.25)  # of the first steps
 AIM = 1e-5  # estimated error, of the largest percent per percent of a goal, or of 1, that needs no other steps
 RESOLVING = 8.0  # times nearer are values between outputs, at least, than with every second output
 ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
@@ -143,66 +142,32 @@ class Entry:
     unresolved: float = 0.0
 
 
-def values_of(goals: Sequence[Followed]) -> Array:
-    """(g,) of them; NaN where there are none."""
-    return np.array([goal.value for goal in goals]) if goals else np.array(np.nan)
-
-
-@dataclass
-class Known:
-    """What there is so far: `samples` beside the base, and of `pairs` what their check has `left`.
-
-    Attributes:
-        pairs: h_k by number of the key: with ±h_k there are samples.
-        left: (g,) how far the sum of central differences is off a difference along the sum of their steps.
-    """
-
-    samples: list[Sample] = field(default_factory=list)
-    pairs: Mapping[int, float] = field(default_factory=dict)
-    left: Array = field(default_factory=lambda: np.zeros(0))
-
-    def of_key(self, k: int) -> list[Sample]:
-        """Those with key number k changed."""
-        return [one for one in self.samples if one.k == k]
-
-    def central(self, k: int) -> Array:
-        """(g,) half of the difference that the pair of key number k makes."""
-        values, h = {one.offset: values_of(one.goals) for one in self.of_key(k)}, self.pairs[k]
-        return as_floats(0.5 * (values[h] - values[-h]))
-
-
-def entries(base: Base, known: Known) -> tuple[tuple[Entry, ...], ...]:
+def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], ...]:
     """[goal][key]."""
-    return tuple(tuple(_entry(base, g, k, known) for k in range(len(base.keys))) for g in range(len(base.goals)))
+    return tuple(tuple(_entry(base, g, k, samples) for k in range(len(base.keys))) for g in range(len(base.goals)))
 
 
-def rough_keys(base: Base, known: Known, *, smaller: bool) -> list[int]:
+def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
     """Keys by number with an entry whose error is above `AIM`, and least with the smallest steps, or the largest."""
-    rough, rows = set(), entries(base, known)
+    rough, rows = set(), entries(base, samples)
     for g, row in enumerate(rows):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
         for k, one in enumerate(row):
-            sizes = sorted({abs(sample.offset) for sample in known.of_key(k) if sample.goals}, reverse=True)
+            sizes = sorted({abs(each.offset) for each in samples if each.k == k and each.goals}, reverse=True)
             is_good = _relative(one.error - one.unresolved, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
             if sizes and not is_good and np.isclose(abs(one.step), sizes[-LEVELS:][0] if smaller else sizes[0]):
                 rough.add(k)
     return sorted(rough)
 
 
-def _entry(base: Base, g: int, k: int, known: Known) -> Entry:
-    samples = known.of_key(k)
+def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
+    samples = [one for one in all_samples if one.k == k]
     whole = [one for one in samples if one.goals and np.isfinite(one.goals[g].value)]
     offsets = np.array([0.0, *(one.offset for one in whole)])
     nominal, beside = base.readings[g], [one.goals[g] for one in whole]
     found = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
     by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
     unresolved = abs(by_coarse - found.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
-    if k in known.pairs and not known.left[g] / known.pairs[k] >= found.error:
-        h = known.pairs[k]
-        above, below = (
-            one.goals[g].value for one in sorted(samples, key=lambda one: -one.offset) if abs(one.offset) == h
-        )
-        found = Derivative((above - below) / (2.0 * h), float(known.left[g]) / h, h)
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
     size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
     found = found._replace(error=found.error + unresolved + base.repeats * max(abs(found.value), size))

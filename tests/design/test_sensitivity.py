@@ -107,7 +107,7 @@ def test_against_differences_by_hand(write, scene, keys):
             assert found.error[g, k] <= 1e-6 * abs(scale), (key, g)
     assert {entry.method for row in found.entries for entry in row} == {"repeated steps"}
     assert found.failures == ()
-    assert found.runs == 1 + 4 + 2 * len(keys)  # two for each key, and four for all
+    assert found.runs == 1 + 3 * len(keys)
 
 
 @pytest.mark.parametrize("step", [0.25, 0.05, 0.01])
@@ -175,7 +175,7 @@ def test_moment_of_a_rigid_arm(write):
     keys = ["payload.0.mass", "body.arm.rigid.center.0", "body.arm.rigid.inertia"]
     found = ffrobot.sensitivity(write(ARM), ["peak joints.shoulder.moment", "mass"], keys)
     expected = [2 * 0.36 + 0.6 * 9.81, 2 * 2.0 * 2 * 0.3 + 2.0 * 9.81, 2.0]
-    rounding = 1e-10 * found.value[0] / np.array([0.5, 0.3, 0.05])  # of differences with a key 1e-4 of it larger
+    rounding = 1e-10 * found.value[0] / np.array([0.5, 0.3, 0.05])  # of differences with a key 1e-5 of it larger
     assert np.all(np.abs(found.derivative[0] - expected) < rounding)
     np.testing.assert_array_equal(found.derivative[1], 0.0)
     assert found.readings[0].time == 0.0
@@ -212,7 +212,7 @@ def test_a_design_that_fails_is_kept_and_told(write, tmp_path):
     assert entry.method == "one-sided"
     assert entry.derivative == pytest.approx(0.5, rel=1e-9)  # the rate, 2 t
     assert len(found.failures) == 1
-    assert "expected a number of at least 0, found -0.0001" in found.failures[0]
+    assert "expected a number of at least 0, found -1e-05" in found.failures[0]
     assert any("viscous_friction = -" in note for note in entry.notes)
     with (folder / "table.csv").open(encoding="utf-8") as file:
         assert sorted(row["status"] for row in csv.DictReader(file)) == ["completed"] * 3 + ["wrong input"]
