@@ -45,6 +45,7 @@ from .sections import (
     link_sections,
     own_row,
     potentials,
+    side,
     straight_loads,
 )
 
@@ -179,10 +180,10 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 
 
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
-    """Extent along the patches' normal (m) and β at a station."""
+    """Extent along the patches' normal (m), as `LinkSections.extent` has it of their face, and β at a station."""
     shears = layout.lamina.C[0, 1] or layout.lamina.per_volt[1] or layout.lamina.C[1, 1]
     lever = sections.shear_lever(station, layout.normal, layout.width) if shears else 0.0
-    return float(sections.extent(layout.normal)[station]), lever
+    return float(sections.extent(layout.normal, side(layout))[station]), lever
 
 
 def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> LayerLoads:
@@ -256,7 +257,7 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[Placed]) -> Bo
     T, sections = spatial.modal_transform, link_sections(body)
     points, masses, spins = [], [], []
     for layout, edges in placed:
-        extent = sections.extent(layout.normal)
+        extent = sections.extent(layout.normal, side(layout))
         for place in gauss_points(body, edges) if layout.adds_mass else ():
             at = body.interpolate(place.x)
             points.append(BodyPoint(at.position, at.translation @ T, at.rotation @ T))

@@ -12,7 +12,7 @@ from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from .composite import Placed, composite, place_of
 from .records import PztLayout
-from .sections import LinkSections, link_sections, load_per_volt, own_row, potentials, straight_loads
+from .sections import LinkSections, link_sections, load_per_volt, own_row, potentials, side, straight_loads
 
 STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
@@ -20,7 +20,7 @@ STEP = 0.1  # of the extent, from one station to the next; less is a taper
 class Effects(NamedTuple):
     """Of k patches on the n modes of a modal body."""
 
-    extent: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m
+    extent: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m: see `LinkSections.extent`
     per_volt: Array  # (k,) c, the load that each is there for, N·m/V
     lever: Array  # (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals
     turn: Array  # (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad
@@ -77,7 +77,7 @@ def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSecti
     covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
     if not covered.any(axis=1).all():  # rounding: it begins where it ends
         raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
-    extents = sections.extent(layout.normal)[:-1]
+    extents = sections.extent(layout.normal, side(layout))[:-1]
     jump = np.abs(np.diff(extents)) / np.maximum(extents[1:], extents[:-1])
     jumps = np.where(covered[:, 1:] & covered[:, :-1], jump, 0.0)
     if jumps.max(initial=0.0) > STEP:

@@ -42,15 +42,17 @@ class LinkSections:
     width: Array
     is_round: Array  # (k,) whether a circle bounds the section
     rigidity: Array  # (k, 4) of the strains e: EI in plane, EA, GJ, EI out of plane, N·m² and N
+    middle: Array  # (k, 2) between the faces along y and z, from the axis, m
 
-    def extent(self, normal: Literal["y", "z"]) -> Array:
-        """(k,) between the faces with that normal, m."""
-        return self.height if normal == "y" else self.width
+    def extent(self, normal: Literal["y", "z"], side: float = 0.0) -> Array:
+        """(k,) between the faces with that normal, m; of one at `side` ±1 twice its distance from the axis."""
+        between, axis = (self.height, 0) if normal == "y" else (self.width, 1)
+        return between + 2 * side * self.middle[:, axis]
 
     @cached_property
     def alike(self) -> Indices:
         """(k,) of each station the first one with the same section."""
-        of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity])
+        of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity, self.middle])
         _, first, same = np.unique(of_station, axis=0, return_index=True, return_inverse=True)
         return first[same.ravel()]
 
@@ -86,6 +88,7 @@ def link_sections(body: ModalBody) -> LinkSections:
         width if stations.width is None else stations.width,
         is_round,
         np.stack([in_plane[:, 1], in_plane[:, 0], GJ, EI_z], axis=1),
+        np.zeros((k, 2)) if stations.middle is None else stations.middle,
     )
 
 

@@ -30,7 +30,7 @@ OF_SURFACE = {"surface_stress": "p6n", "surface_static": "p6l"}
 OF_PART: dict[type, dict[str, str]] = {
     Stations: {
         "position": "k3", "translation": "k3n", "rotation": "k3n", "height": "k", "outline": "k?2", "rigidity": "k2",
-        "width": "k", "out_of_plane_rigidity": "k", "torsional_rigidity": "k",
+        "width": "k", "out_of_plane_rigidity": "k", "torsional_rigidity": "k", "middle": "k2",
     },
     PictureMesh: {"points": "p3", "mode_shapes": "p3n", "edges": "?2"},
     Interface: {"position": "3", "translation": "3n", "rotation": "3n"},

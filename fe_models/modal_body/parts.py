@@ -95,6 +95,8 @@ class Stations(Frozen):
     width: Array | None = None  # (k,) extent along z in m, likewise
     out_of_plane_rigidity: Array | None = None  # (k,) EI in N·m² of bending along z, likewise
     torsional_rigidity: Array | None = None  # (k,) GJ in N·m², likewise
+    # (k, 2) middle of the extents along y and z, from the axis, in m, likewise; None where it is on the axis
+    middle: Array | None = None
 
 
 @struct

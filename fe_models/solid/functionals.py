@@ -34,6 +34,7 @@ class Averages:
     inertia: Array  # (k, 3, 3) J about the centroid in m⁴
     height: Array  # (k,) extent along y in m
     width: Array  # (k,) extent along z in m
+    middle: Array  # (k, 2) middle of these extents, along y and z from the centroid, in m
     density: Array  # (k,) mean density in kg/m³
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
@@ -62,8 +63,8 @@ def face_averages(model: SolidModel, facet_tags: object, tags: Sequence[int]) ->
     """Mean motion of the faces with the given `tags`; collective."""
     parts = [_face_weights(model, facet_tags, tag) for tag in tags]
     weights = sp.csr_matrix(np.concatenate([w for w, _ in parts]))
-    nothing = np.full(len(tags), np.nan)
-    return _averages(model, weights, np.array([m for _, m in parts]), np.array([nothing, nothing]), nothing)
+    nothing = np.full((len(tags), 2), np.nan)
+    return _averages(model, weights, np.array([m for _, m in parts]), nothing, nothing, nothing[:, 0])
 
 
 def section_averages(model: SolidModel, x: Array) -> Averages:
@@ -87,18 +88,22 @@ def section_averages(model: SolidModel, x: Array) -> Averages:
         density = model.materials.density[model.materials.of_cell[section.cells]]
         masses.append(w @ density)
     every = np.array(model.comm.allgather(np.array(ranges)))  # (processes, k, along y and z, from and to)
-    extents = (every[..., 1].max(axis=0) - every[..., 0].min(axis=0)).T
-    return _averages(model, sp.vstack(rows, format="csr"), np.array(moments), extents, np.array(masses))
+    low, high = every[..., 0].min(axis=0), every[..., 1].max(axis=0)
+    return _averages(model, sp.vstack(rows, format="csr"), np.array(moments), low, high, np.array(masses))
 
 
-def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Array, extents: Array, mass: Array) -> Averages:
-    """`moments` (k, 4, 4): this rank's part of ∫ (1, x)ᵀ(1, x) ds; `mass` (k,) of ∫ρ ds; `extents` (2, k)."""
+def _averages(
+    model: SolidModel, weights: sp.csr_matrix, moments: Array, low: Array, high: Array, mass: Array
+) -> Averages:
+    """`moments` (k, 4, 4): this rank's part of ∫ (1, x)ᵀ(1, x) ds; `mass` (k,) of ∫ρ ds; y and z from, to (k, 2)."""
     moments = model.total(moments)
     area = moments[:, 0, 0]
     centroid = moments[:, 0, 1:] / area[:, None]
     second = moments[:, 1:, 1:] - area[:, None, None] * centroid[:, :, None] * centroid[:, None, :]
     inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
-    return Averages(weights, area, centroid, inertia, extents[0], extents[1], model.total(mass) / area)
+    height, width = (high - low).T
+    middle = 0.5 * (low + high) - centroid[:, 1:]
+    return Averages(weights, area, centroid, inertia, height, width, middle, model.total(mass) / area)
 
 
 def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Array, Array]:

@@ -225,12 +225,15 @@ def _stations(link: SolidLink, sections: Averages, x: Array, element: Integers, 
     modulus = np.ravel(link.material.youngs_modulus)[0]  # of an orthotropic one E_x
     rigidity = None if link.region else modulus * np.stack([area, I_yy], axis=1)
     lateral = None if link.region else modulus * I_zz
-    return Stations(centroid, u, turn, height, element, rigidity=rigidity, width=width, out_of_plane_rigidity=lateral)
+    return Stations(
+        centroid, u, turn, height, element, rigidity=rigidity, width=width, out_of_plane_rigidity=lateral,
+        middle=_onward(sections.middle),
+    )  # fmt: skip
 
 
 def _onward(values: Array) -> Array:
     """Of each station and the next, the mean; of the last its own."""
-    return np.append(0.5 * (values[:-1] + values[1:]), values[-1])
+    return np.append(0.5 * (values[:-1] + values[1:]), values[-1:], axis=0)
 
 
 def _picture(solid: SolidMesh, model: SolidModel, modes: Array) -> PictureMesh:

@@ -162,6 +162,7 @@ stations/rigidity | N, N m² | EA and EI of in-plane bending
 stations/width | m | of the section, along z
 stations/out_of_plane_rigidity | N m² | EI of bending along z
 stations/torsional_rigidity | N m² | GJ
+stations/middle | m | of height and width, from the axis
 mesh/points | m | for pictures
 mesh/cells | | points of each cell
 mesh/edges | | points of edges

@@ -285,11 +285,28 @@ class Solution:
             for name, body in self.bodies.items()
             if body.without_coordinate
         )
-        return (*rigid, *unkept, *(f"{name}: {text}" for name, modal in self.links.items() for text in modal.remarks))
+        remarks = (f"{name}: {text}" for name, modal in self.links.items() for text in modal.remarks)
+        return (*rigid, *unkept, *remarks, *self._off_axis())
+
+    def _off_axis(self) -> Iterator[str]:
+        """Patches without a face on links whose faces are not at equal distances from the axis."""
+        for array in (array for of_link in self.patches.values() for array in of_link.arrays.values()):
+            layout, stations = array.layout, self.links[array.body].stations
+            if layout.face is not None or stations.middle is None:
+                continue
+            between, axis = (stations.height, 0) if layout.normal == "y" else (stations.width, 1)
+            assert between is not None
+            off = np.abs(stations.middle[:, axis])
+            if (off > OFF_AXIS * between).any():
+                yield (
+                    f'pzt "{layout.label}": the axis of "{array.body}" is up to {1e3 * off.max():.2g} mm off the middle'
+                    " between its faces, where patches without face have the same arm on both: name the face"
+                )
 
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 
+OFF_AXIS = 0.01  # of the extent: less is that of a mesh
 RIGID = 1e-9  # of the motion across: less along the axis is rounding
 
 _TERMS = {

@@ -1,11 +1,14 @@
 """The two couplings of patches to a solid, section rotations and surface strain, against each other and a beam."""
 
+import meshio
 import numpy as np
 import pytest
-from beam_links import modal_body, paper_link
-from patches_on_links import on_link
+from beam_links import link_keys, modal_body, paper_link
+from patches_on_links import CERAMIC, on_link
 
+import ffrobot
 from ffrobot.common.errors import InputError
+from ffrobot.run.solve import prepare_scene
 
 
 def link(faces=None, count=6, family="in-plane-bending"):
@@ -64,3 +67,55 @@ def test_one_named_face_stretches_the_link_by_either_coupling(face):
 def test_patches_on_faces_without_outlines_are_refused(faces, face):
     with pytest.raises(InputError, match="face: expected patches on faces that the link file outlines"):
         on_link(link(faces), coupling="surface", face=face)
+
+
+LENGTH, E = 0.6, 7e10
+WIDTHS, LEVELS = (0.01, 0.01, 0.01, 0.03), (0.0, 0.01, 0.02, 0.03, 0.035)
+"""Of a T: a web of 0.01 × 0.03 m below a flange of 0.03 × 0.005 m."""
+
+
+@pytest.fixture(scope="module")
+def tee(tmp_path_factory):
+    """Its link, x along the axis through the centers of area, its area, EI and the levels of its faces from there."""
+    z = np.array([-0.015, -0.005, 0.005, 0.015])
+    points = np.stack(np.meshgrid(np.linspace(0, LENGTH, 13), LEVELS, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    n = np.arange(len(points)).reshape(13, len(LEVELS), 4)
+    around = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+    cells = [
+        [n[i + a, j + b, k + c] for a, b, c in around]
+        for i in range(12) for j in range(4) for k in ((0, 1, 2) if j == 3 else (1,))
+    ]  # fmt: skip
+    path = tmp_path_factory.mktemp("tee") / "tee.vtk"
+    meshio.write(path, meshio.Mesh(points, [("hexahedron", np.array(cells))]))
+    heights, middles = np.diff(LEVELS), np.add(LEVELS[1:], LEVELS[:-1]) / 2
+    areas = WIDTHS * heights
+    center = areas @ middles / areas.sum()
+    moment = areas @ (heights**2 / 12 + (middles - center) ** 2)
+    keys = link_keys("solid", LENGTH, None, {"order": 2}, E=E, nu=0.0, name="tee")
+    keys["geometry"] = {"kind": "solid", "length": LENGTH, "file": str(path), "origin": [0.0, center, 0.0]}
+    keys["modes"] = {"count": 4, "family": ["in-plane-bending", "axial"]}
+    return keys, areas.sum(), E * moment, (LEVELS[-1] - center, center)
+
+
+@pytest.mark.parametrize(("face", "sign"), [("+y", -1.0), ("-y", 1.0)])
+def test_faces_at_unequal_distances_from_the_axis(tee, face, sign):
+    """Rotation and way of the tip by one patch: M L_p/EI with the arm of its own layer, and N L_p/EA."""
+    keys, area, EI, distances = tee
+    body = modal_body(keys)
+    phi = on_link(body, face=face, centers=(0.3,), length=0.3).Phi_V[:, 0] / np.diag(body.stiffness)
+    tip, N = body.interfaces["tip"], CERAMIC["modulus"] * CERAMIC["d31"] * CERAMIC["width"]
+    arm = distances[0 if face == "+y" else 1] + CERAMIC["thickness"] / 2
+    np.testing.assert_allclose(tip.rotation[2] @ phi, N * arm * 0.3 / EI, rtol=1e-6)
+    np.testing.assert_allclose(tip.translation[0] @ phi, sign * N * 0.3 / (E * area), rtol=1e-6)
+
+
+@pytest.mark.parametrize("face", [None, "+y"])
+def test_patches_off_the_axis_without_face_are_told(tee, face):
+    patches = (
+        CERAMIC | {"body": "tee", "count": 5, "allocation": "least-squares"} | ({} if face is None else {"face": face})
+    )
+    wall = {"name": "wall", "type": "weld", "between": ["ground", "tee.root"]}
+    keys = {"body": [{"name": "tee", "link": tee[0]}], "joint": [wall], "pzt": [patches], "gravity": [0.0, 0.0]}
+    solution = prepare_scene(ffrobot.make_scene(name="tee", analysis=[{"name": "rest", "kind": "static"}], **keys))
+    told = 'axis of "tee" is up to 3.3 mm off the middle between its faces'
+    assert any(told in note for note in solution.notes) == (face is None)
