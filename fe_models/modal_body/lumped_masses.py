@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.errors import InputError
 from ...common.structs import struct
+from .body import IDENTITY_TOLERANCE
 from .parts import LEVI_CIVITA, Interface, Invariants
 from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
 
@@ -59,11 +61,20 @@ def lumps(records: Iterable[InterfaceRecord], interfaces: Mapping[str, Interface
 
 
 def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invariants:
-    """The integrals (meaning and shapes as in `ModalBody`) of the link together with what is attached to it."""
+    """The integrals (meaning and shapes as in `ModalBody`) of the link together with what is attached to it.
+
+    Raises `InputError` for moments of inertia that no body has, where they outweigh those of the link.
+    """
     for lump in attached:
         at = lump.at
         added = attached_integrals(lump.mass, at.position, lump.spread, at.translation, at.rotation)
         integrals = with_added(integrals, added)
+        across = integrals.S_bar_kl[2, 2] - integrals.S_spin
+        if np.linalg.eigvalsh(across).min(initial=0.0) < -IDENTITY_TOLERANCE * np.abs(across).max(initial=0.0):
+            raise InputError(
+                f"interface.inertia of {lump.name}: expected moments of inertia of which none is larger than the sum of"
+                f" the others, found {lump.inertia.tolist()}"
+            )
     return integrals
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import Interface
 from ffrobot.fe_models.modal_body.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
@@ -163,3 +164,15 @@ def test_hub_on_the_root_of_a_cantilever_only_adds_mass(body):
     assert loaded.second_moment[0, 0] + loaded.second_moment[1, 1] == pytest.approx(
         bare.second_moment[0, 0] + bare.second_moment[1, 1] + 0.1
     )
+
+
+@pytest.mark.parametrize(
+    ("family", "inertia"), [("out-of-plane-bending", [3.0, 1.0, 1.0]), ("torsion", [1.0, 3.0, 1.0])]
+)
+def test_moments_of_inertia_that_no_body_has_are_refused(body, family, inertia):
+    """∫ρη², half of what two exceed the third by, would be negative."""
+    more = f'[[interface]]\nname = "tip"\nmass = 0.1\ninertia = {inertia}\n'
+    with pytest.raises(
+        InputError, match=r"interface.inertia of tip: expected moments of inertia of which none is larg"
+    ):
+        body(family=family, condition="cantilever", count=3, more=more)
