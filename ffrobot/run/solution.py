@@ -296,7 +296,9 @@ class Solution:
                 continue
             between, axis = (stations.height, 0) if layout.normal == "y" else (stations.width, 1)
             assert between is not None
-            off = np.abs(stations.middle[:, axis])
+            x = stations.position[:, 0]
+            under = (x < array.edges[:, 1:]) & (np.append(x[1:], x[-1]) > array.edges[:, :1])
+            off = np.where(under.any(axis=0), np.abs(stations.middle[:, axis]), 0.0)
             if (off > OFF_AXIS * between).any():
                 yield (
                     f'pzt "{layout.label}": the axis of "{array.body}" is up to {1e3 * off.max():.2g} mm off the middle'
