@@ -16,7 +16,7 @@ from ..common.arrays import Array
 from ..mbs.analysis.operating_points import RobotAtRest
 from ..mbs.analysis.outcome import Details
 from ..mbs.solve.joint_conditions import translational_stiffness
-from ..results.tables import Cells, loop_cells
+from ..results.tables import Cells, loop_cells, volts
 from .lines import named_tables
 
 FREQUENCIES = 5  # that are listed, and damping ratios
@@ -87,7 +87,7 @@ def _placement(name: str, placed: Placed) -> Rows:
     """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
     over_path = placed.wanted.criterion == "voltage"
     pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
-    best, even = (f"{value:.4g}" + (" V" if over_path else "") for value in pair)
+    best, even = (f"{volts(value)} V" if over_path else f"{value:.4g}" for value in pair)
     cells = {
         "on": placed.wanted.body,
         "by": "voltage" if over_path else f"{placed.wanted.measure} reach",

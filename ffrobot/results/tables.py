@@ -48,25 +48,30 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
         span = " to ".join(dict.fromkeys((f"{limits.min():g}", f"{limits.max():g}")))
         yield {
             "on": layout,
-            "largest (V)": f"{required.max():.0f}" if required.max() >= 1e3 else f"{required.max():.3g}",
+            "largest (V)": volts(required.max()),
             "limit (V)": span if is_limited else "none",
             "required /\nlimit": f"{np.max(required / limits):.3g}" if is_limited else "",
             "condition\nnumber": f"{about['condition_number']:.3g}",
         }
 
 
+def volts(value: float) -> str:
+    """Three digits, from 1 kV on all."""
+    return f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
+
+
 def loop_cells(metrics: Metrics) -> Cells:
     """How well a closed loop follows its reference, and what that takes."""
     return {
         "verdict": metrics.verdict,
-        "rms (m)": f"{metrics.tip_error_rms:.3g}",
-        "max (m)": f"{metrics.tip_error_max:.3g}",
+        "rms (mm)": f"{1e3 * metrics.tip_error_rms:.3g}",
+        "max (mm)": f"{1e3 * metrics.tip_error_max:.3g}",
         "settling\n(s)": "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}",
-        "overshoot\n(m)": f"{metrics.overshoot:.3g}",
-        "vibration\n(m)": f"{metrics.vibration:.3g}",
-        "final (m)": f"{metrics.residual:.3g}",
+        "overshoot\n(mm)": f"{1e3 * metrics.overshoot:.3g}",
+        "vibration\n(mm)": f"{1e3 * metrics.vibration:.3g}",
+        "final (mm)": f"{1e3 * metrics.residual:.3g}",
         "work (J)": f"{metrics.motor_work:.3g}",
         "torque\n(N·m)": f"{metrics.peak_moment:.3g}",
-        "voltage\n(V)": f"{metrics.peak_voltage:.3g}",
+        "voltage\n(V)": volts(metrics.peak_voltage),
         "at\nlimits": f"{100 * metrics.saturated:.2g} %",
     }

@@ -24,8 +24,13 @@ def peaks(*names):
 
 
 def metrics(*keys):
-    """Of closed loops that are stable, one in each row."""
-    return lambda case, row: [case.file[f"{row}/control"].attrs[key] for key in keys]
+    """Of closed loops that are stable, one in each row; distances in mm."""
+
+    def of_row(case, row):
+        about = case.file[f"{row}/control"].attrs
+        return [about[key] * (1.0 if key.startswith("peak_") else 1e3) for key in keys]
+
+    return of_row
 
 
 def bars_with_patches(case, row):
