@@ -28,7 +28,8 @@ def _rows(found: PoseMap) -> Iterator[tuple[str, ...]]:
 
 
 def _place(found: PoseMap, number: int) -> str:
-    """The values of the axes that have more than one."""
+    """The values of the axes that have more than one, angles in degrees."""
     place = np.unravel_index(number, found.plan.shape)
     pairs = zip(found.plan.axes, place, strict=True)
-    return ", ".join(f"{axis.values[k]:.3g}" for axis, k in pairs if len(axis.values) > 1)
+    numbers = ((axis, axis.values[k]) for axis, k in pairs if len(axis.values) > 1)
+    return ", ".join(f"{one:.3g} m" if axis.unit == "m" else f"{np.degrees(one):.3g}°" for axis, one in numbers)

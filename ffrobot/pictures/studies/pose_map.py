@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,16 +12,17 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array
 from ...common.files import write_atomically
+from ...common.rotations import in_3d
 from ...map.map_file import Quantity, quantities
 from ...map.pose_map import PoseMap
 from ...mbs.solve.workspace import GridAxis
-from ..figures.style import ORDERED, SIZE, style
+from ..figures.style import ORDERED, SIZE, SceneAxes, legend, projected, style
+from ..projection import FRONT, PLANE, SIDE, SPACE
 
 WORST, BEST = "#c22f2f", "#1f5fa8"
 WIDE = (2 * SIZE[0], 1.3 * SIZE[1])  # inches
 LABELS = ("worst", "best")
-ALPHA = {2: 1.0, 3: 0.5}  # of places, by the number of their coordinates
-ZOOM = 0.8  # leaves room for the labels of 3D axes
+FLAT = 1e-9  # of the largest extent: no extent
 
 
 def draw_map(found: PoseMap) -> list[Path]:
@@ -49,9 +49,8 @@ def _draw(found: PoseMap, quantity: Quantity) -> Figure:
         _heat_map(figure.add_subplot(1, 2, 1), found, quantity, long)
     elif len(long) == 1:
         _curve(figure.add_subplot(1, 2, 1), found, quantity, long[0])
-    position = (1, 2, 2) if len(long) < 3 else (1, 1, 1)
-    projection = "3d" if found.values["place"].shape[1] == 3 else None
-    _workspace(figure.add_subplot(*position, projection=projection), found, quantity, has_bar=len(long) > 2)
+    axes = figure.add_subplot(1, 2, 2) if len(long) < 3 else figure.subplots()
+    _workspace(axes, found, quantity, has_bar=len(long) > 2)
     return figure
 
 
@@ -79,23 +78,24 @@ def _curve(axes: Axes, found: PoseMap, quantity: Quantity, axis: GridAxis) -> No
     axes.set_xlabel(_label(axis))
 
 
-def _workspace(axes: Any, found: PoseMap, quantity: Quantity, *, has_bar: bool) -> None:  # noqa: ANN401 (2D or 3D)
-    """Places of the point in color, and the robot before them."""
-    place, size = found.values["place"], found.values["place"].shape[1]
-    cloud = axes.scatter(*place.T, c=quantity.values, cmap=ORDERED, s=6, alpha=ALPHA[size], linewidths=0)
+def _workspace(axes: Axes, found: PoseMap, quantity: Quantity, *, has_bar: bool) -> None:
+    """Places of the point in color, and the robot; a robot that stays in a plane is seen against it."""
+    place, robots = in_3d(found.values["place"]), found.values["robot"]
+    known = np.isfinite(place).all(axis=1)
+    seen = np.vstack([place[known], *(robots[number].reshape(-1, 3) for number, *_ in _marks(quantity))])
+    extent = np.ptp(seen, axis=0)
+    flat = [view for view, size in zip((SIDE, FRONT, PLANE), extent, strict=True) if size <= FLAT * extent.max()]
+    scene = SceneAxes(axes, [*flat, SPACE][0])
+    scene.drawn.append(cloud := projected(place[known], scene.view))
+    colors = axes.scatter(cloud[:, 0], cloud[:, 1], c=quantity.values[known], cmap=ORDERED, s=6, linewidths=0)
     for (number, color, marker), label in zip(_marks(quantity), LABELS, strict=True):
-        for line in found.values["robot"][number]:
-            axes.plot(*line[:, :size].T, color=color, linewidth=2.0, solid_capstyle="round", zorder=5)
-        axes.plot(*place[number][:, None], marker, color=color, markersize=6, label=label, zorder=5)
-    axes.set_aspect("equal", adjustable="datalim")
-    if size == 3:
-        axes.computed_zorder = False
-        axes.set_box_aspect(None, zoom=ZOOM)
-    for name in "xyz"[:size]:
-        getattr(axes, f"set_{name}label")(f"{name} (m)")
-    axes.legend(loc="best")
+        for line in robots[number]:
+            scene.plot(line, color=color, linewidth=2.0, solid_capstyle="round")
+        scene.plot(place[number][None], marker, color=color, markersize=6, label=label)
+    scene.finish()
+    legend(axes)
     if has_bar:
-        axes.figure.colorbar(cloud, ax=axes, shrink=0.6)
+        axes.figure.colorbar(colors, ax=axes, shrink=0.6)
 
 
 def _marks(quantity: Quantity) -> Iterator[tuple[int, str, str]]:
