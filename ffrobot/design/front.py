@@ -61,7 +61,7 @@ class Front(Finding):
     """
 
     name = "front"
-    title = "Two goals"
+    title = "Pareto front"
 
     scene: Path
     goals: tuple[str, str]

@@ -81,8 +81,8 @@ class OfHistory(Goal):
     def read(self, results: Results) -> Reading:
         """Of the history's only column."""
         history = self._history(results)
-        joined = " ".join(part for part in (history.unit, self.times) if part) if history.unit else ""
-        unit, value = {"W s": "J"}.get(joined, joined), self.reduce(history)
+        joined = "·".join(part for part in (history.unit, self.times) if part) if history.unit else ""
+        unit, value = {"W·s": "J"}.get(joined, joined), self.reduce(history)
         if self.reduce is _rms and history.is_missed:
             return Reading(history.rms[1], unit, missed_by=value)
         return Reading(value, unit, doubt=UNCERTAIN if self.reduce in (_mean, _integral) and history.is_missed else "")

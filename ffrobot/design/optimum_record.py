@@ -118,7 +118,7 @@ class Optimum(Finding):
     """
 
     name = "optimum"
-    title = "The best design"
+    title = "Optimum"
 
     scene: Path
     problem: Problem
@@ -214,7 +214,9 @@ class Optimum(Finding):
         word = "least" if self.problem.sense > 0 else "largest"
         text = f"{word} {self.problem.objective.text}: {self.best.readings[0].in_words()}"
         if self.start.completed and (own := self.start.values[0]):
-            text += f", {100 * (self.value - own) / abs(own):+.4g} % of the start's {own:.6g}"
+            change = 100 * (self.value - own) / abs(own)
+            more = "less" if change < 0 else "more"
+            text += f", {abs(change):.4g} % {more} than at the start, {self.start.readings[0].in_words()}"
         return text if self.feasible else f"no design found that keeps all limits; nearest is one with {text}"
 
     def remarks(self) -> Iterator[str]:
@@ -294,7 +296,7 @@ class Optimum(Finding):
     def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         """Of each limit its text, the goal at first and in the best design, whether it is reached, its price."""
         for k, (limit, price) in enumerate(zip(self.problem.limits, self.prices, strict=True)):
-            cost = f"{price:.4g}" if np.isfinite(price) else ""
+            cost = f"{price:.4g}" if self.feasible and np.isfinite(price) else ""
             yield limit.text, _at(self.start, k + 1), _at(self.best, k + 1), self._state(k), cost
 
     def _state(self, k: int) -> str:

@@ -187,7 +187,8 @@ def read_history(results: Results, name: str, option: str) -> History:
     elif is_vector(results, found, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
     rms = _rms(results, found.replace(f"/{POWER}", "/moment") if is_power else found, match and int(match["column"]))
-    return History(name, _unit(results, found), results.time(found), as_floats(values), float(peaks.max()), rms)
+    unit = _unit(results, found).replace(" ", "·")
+    return History(name, unit, results.time(found), as_floats(values), float(peaks.max()), rms)
 
 
 def _rms(results: Results, name: str, column: int | None) -> tuple[float, float]:

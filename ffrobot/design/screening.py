@@ -45,7 +45,7 @@ class Screening(Finding):
     """
 
     name = "screening"
-    title = "Which keys matter"
+    title = "Screening"
 
     scene: Path
     spreads: tuple[Spread, ...]

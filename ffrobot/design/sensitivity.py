@@ -56,7 +56,7 @@ class Sensitivity(Finding):
     """
 
     name = "sensitivity"
-    title = "What matters"
+    title = "Sensitivities"
 
     scene: Path
     goals: tuple[str, ...]
@@ -139,7 +139,7 @@ class Sensitivity(Finding):
         return Bars(
             name=f"tornado_{file_name(self.goals[g])}",
             title=f"{self.goals[g]}: {self.readings[g].in_words(5)}",
-            x_label="change of the response (%) with +1 % of the parameter",
+            x_label="% per % of the parameter",
             labels=tuple(self.keys[k] for k in known),
             series=(Series(values=numbers(self.logarithmic[g, known])),),
             signed=True,

@@ -270,7 +270,7 @@ class SpreadDesigns:
 
     Attributes:
         path: of the scene file; `spreads` (k,) of its keys; `goals` (g,).
-        middle: the design all parameters at nominal values, which completed; `readings` (g,) of it.
+        middle: the design with all parameters at nominal values, which completed; `readings` (g,) of it.
         failures: runs that failed, in words.
     """
 
@@ -287,7 +287,7 @@ class SpreadDesigns:
 
         Raises:
             InputError: goals or spreads that mean nothing, or that make scenes impossible.
-            SolveError: the scene all parameters at nominal values cannot be solved.
+            SolveError: the scene with all parameters at nominal values cannot be solved.
         """
         self.path, self.spreads, self.goals = runs.path, tuple(spreads), tuple(goals)
         keys, own = [one.key for one in spreads], tuple(one.own for one in spreads)

@@ -96,7 +96,7 @@ class Uncertainty(Finding):
                 (goal, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
                 for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True))
             ]
-            heading = ("goal", "unit", "nominal values", *self.statistics.named, "worst case")
+            heading = ("response", "unit", "nominal", *self.statistics.named, "worst case")
             yield Section(heading, rows).for_report()
         yield from (self._parts(g).for_report() for g in range(len(self.goals)))
         if self.bands:
@@ -115,7 +115,8 @@ class Uncertainty(Finding):
             one = self.spreads[k]
             cells = [f"{100.0 * self.shares[g, k]:.1f} %"]
             if i := self.indices:
-                cells = [with_error(i.first[g, k], i.first_error[g, k]), with_error(i.total[g, k], i.total_error[g, k])]
+                pairs = ((i.first, i.first_error), (i.total, i.total_error))
+                cells = [f"{with_error(100.0 * part[g, k], 100.0 * error[g, k])} %" for part, error in pairs]
             rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
         parts = ("alone", "with others") if self.indices else ("share of the variance",)
         return Section(("key", "spread", *parts), rows, of=self.goals[g])
@@ -218,9 +219,11 @@ class Uncertainty(Finding):
 
 def goal_line(goal: str, reading: Reading) -> str:
     """With all nominal values."""
-    return f"{goal}: {reading.in_words()} all parameters at nominal values"
+    return f"{goal}: {reading.in_words()} with all parameters at nominal values"
 
 
 def with_error(value: float, error: float) -> str:
-    """`0.17 ± 0.01`; nothing where there is no value."""
-    return "" if np.isnan(value) else f"{value:.5g} ± {error:.1g}"
+    """`0.173 ± 0.01`: one digit more than the error leaves, five at most; nothing where there is no value."""
+    known = np.floor(np.log10(abs(value) / error)) + 2 if value and error > 0.0 else 5
+    digits = ((value, int(np.clip(known, 1, 5))), (error, 1))
+    return "" if np.isnan(value) else " ± ".join(f"{float(f'{one:.{count}g}'):g}" for one, count in digits)

@@ -17,6 +17,7 @@ from ffrobot.design.spreads import (
     sobol_indices,
     statistics,
 )
+from ffrobot.design.uncertainty_record import with_error
 
 MOMENT = "joints.shoulder.moment"
 SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
@@ -158,3 +159,11 @@ def test_failed_samples_are_told_and_left_out(write, ffrobot, tmp_path):
         masses = np.array([float(one[MASS]) for one in list(csv.DictReader(file))[1:]])
     assert float(row["mean"]) == pytest.approx(masses[masses > 0.0].mean(), rel=1e-12)
     assert float(row["deviation"]) == pytest.approx(masses[masses > 0.0].std(ddof=1), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [(6.5872, 0.02, "6.587 ± 0.02"), (90.89, 20.0, "91 ± 20"), (0.109, 1.0, "0.1 ± 1"), (2.0, 0.0, "2 ± 0")],
+)
+def test_numbers_have_one_digit_more_than_their_error_leaves(value, error, text):
+    assert with_error(value, error) == text
