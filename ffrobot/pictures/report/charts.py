@@ -27,7 +27,7 @@ MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 FAR = 10  # times the largest value of a chart: limits beyond it would leave its curves flat
 DASHES = ("solid", "dash", "dashdot", "dot")
 # Violet to green (viridis, its dark end brighter: dark pages), for series with an order: patches along a link, modes.
-SHADES = np.array([[110, 80, 170], [65, 115, 175], [33, 145, 140], [94, 201, 98]], dtype=float)
+SHADES = np.array([[165, 90, 200], [65, 115, 175], [33, 145, 140], [94, 201, 98]], dtype=float)
 
 
 @dataclass

@@ -17,6 +17,8 @@ from .charts import axes_layout, encoded, plain
 AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages
 LETTERS, LINE = 15, 15  # of a label, in a line; pixels that a line takes
 BAR, REST = 34, 120  # pixels: of a bar, of what is round them
+NAME = 26  # likewise of a bar or a point, as `wrapped` counts
+ROOM = 0.4  # of the axis, beside the longest bars: for their numbers
 Trace = dict[str, Any]
 
 
@@ -54,13 +56,14 @@ def drawn(diagram: Diagram, name: str) -> DrawnDiagram:
 
 def _bars(diagram: Bars, name: str) -> DrawnDiagram:
     """The first label on top, a colour for each series, of a signed one for each sign."""
-    traces = []
+    traces, names = [], [_broken(label, NAME) for label in diagram.labels]
     form = "+.3g" if diagram.signed else ".3g"
     for k, series in enumerate(diagram.series):
         values = [value or 0.0 for value in series.values]
         traces.append({
             "type": "bar", "orientation": "h", "name": plain(series.label), "x": values,
-            "y": [plain(label) for label in diagram.labels], "text": [f"{value:{form}}" for value in values],
+            "y": names, "text": [f"{value:{form}}" for value in values],
+            "textposition": "none" if series.errors else "outside",  # where they would lie on the errors
             "marker": {"color": [COLORS[1] if diagram.signed and value < 0.0 else COLORS[k] for value in values]},
             "hovertemplate": "%{y}: %{x:.5g}<extra></extra>",
         })  # fmt: skip
@@ -68,8 +71,13 @@ def _bars(diagram: Bars, name: str) -> DrawnDiagram:
             traces[-1]["error_x"] = {"type": "data", "array": list(series.errors), "thickness": 1, "color": AXIS}
     look = axes_layout(diagram.title, diagram.x_label, "", legend=len(traces) > 1)
     look |= {"bargap": 0.25, "barmode": "group"}
+    values = [0.0, *(value or 0.0 for series in diagram.series for value in series.values)]
+    low, high = min(values), max(values)
+    room = ROOM * (high - low)
+    look["xaxis"] |= {"autorangeoptions": {"include": [low - room * (low < 0.0), high + room * (high > 0.0)]}}
     look["yaxis"] |= {"autorange": "reversed", "type": "category"}
-    return DrawnDiagram(name, traces, look, "long", REST + BAR * len(diagram.labels) * len(traces))
+    of_name = max(BAR * len(traces), LINE * max((text.count("<br>") + 1 for text in names), default=0))
+    return DrawnDiagram(name, traces, look, "long", REST + of_name * len(names))
 
 
 def _parallel(diagram: Parallel, name: str) -> DrawnDiagram:
@@ -142,10 +150,15 @@ def _limits(limits: list[tuple[int, Axis]]) -> Trace:
 
 def _texts(k: int, axis: Axis) -> Iterator[dict[str, Any]]:
     """The name above an axis and its ticks at the left."""
-    name = "<br>".join(plain(line) for line in wrapped(axis.label, LETTERS))
+    name = _broken(axis.label, LETTERS)
     yield {"x": k, "y": 1.03, "text": name, "showarrow": False, "yanchor": "bottom", "font": {"size": 11}}
     look = {"showarrow": False, "xanchor": "right", "font": {"size": 10}}
     yield from ({"x": k, "y": place, "text": f"{plain(text)} –", **look} for place, text in axis.ticks)
+
+
+def _broken(label: str, letters: int) -> str:
+    """In lines of about so many letters."""
+    return "<br>".join(plain(line) for line in wrapped(label, letters))
 
 
 def _progress(diagram: Progress) -> Iterator[Trace]:
@@ -178,7 +191,7 @@ def _band(band: Band) -> Iterator[Trace]:
         yield edge | {"y": encoded(np.array(low)), "showlegend": False, "name": f"{plain(label)}: lower end"}
         yield edge | {"y": encoded(np.array(high)), "fill": "tonexty", "fillcolor": color, "name": plain(label)}
     for values, label, line in (
-        (band.median, "median", {"color": COLORS[0]}),
+        (band.median, "median", {"color": COLORS[1]}),
         (band.nominal, "nominal values", {"color": AXIS, "dash": "dot"}),
     ):
         yield {
@@ -192,7 +205,7 @@ def _points(diagram: Points) -> Trace:
     mode = "+".join(["lines"] * diagram.joined + ["markers"] + ["text"] * diagram.named)
     trace: Trace = {
         "type": "scatter", "mode": mode, "x": list(diagram.x), "y": list(diagram.y),
-        "text": [plain(label) for label in diagram.labels], "textposition": _sides(diagram),
+        "text": [_broken(label, NAME) for label in diagram.labels], "textposition": _sides(diagram),
         "hovertemplate": "%{text}<br>%{x:.6g}, %{y:.6g}<extra></extra>", "cliponaxis": False,
         "line": {"color": COLORS[0]},
         "marker": {"size": 8, "color": COLORS[0], "symbol": ["circle" if one else "circle-open" for one in sure]},
@@ -205,7 +218,7 @@ def _points(diagram: Points) -> Trace:
 def _sides(diagram: Points) -> list[str]:
     """Names stay within the chart: to the left of points in its right half."""
     middle = 0.5 * max(diagram.x, default=0.0)
-    return [f"top {'left' if x > middle else 'right'}" for x in diagram.x]
+    return [f"middle {'left' if x > middle else 'right'}" for x in diagram.x]
 
 
 @dataclass(frozen=True)

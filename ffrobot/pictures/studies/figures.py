@@ -90,15 +90,15 @@ def _number(value: float | None, sign: str) -> str:
 
 
 def draw_band(band: Band) -> Figure:
-    """The worst case behind the band, the median, and the history all parameters at nominal values."""
+    """The worst case behind the band, the median, and the history with all parameters at nominal values."""
     figure, axes = new_axes(band.title)
     axes.fill_between(
         band.time, band.lowest, band.highest, color=COLORS[5], alpha=0.3, linewidth=0.0, label=band.worst_label
     )
     axes.fill_between(band.time, band.low, band.high, color=COLORS[4], alpha=0.7, linewidth=0.0, label=band.band_label)
-    axes.plot(band.time, band.median, color=COLORS[0], label="median")
+    axes.plot(band.time, band.median, color=COLORS[1], label="median")
     axes.plot(band.time, band.nominal, color=COLORS[6], linestyle=":", label="nominal values")
-    axes.set_xlabel("Time (s)")
+    axes.set_xlabel("time (s)")
     axes.set_ylabel(band.y_label)
     axes.margins(x=0.0)
     legend(axes)
