@@ -12,6 +12,10 @@ import pytest
 from checkpoints import check_table, column, peak, readme_table, tip_error
 from reference_scenes import NIGHTLY
 
+from ffrobot import Results
+from ffrobot.pictures.report.runs import runs
+from ffrobot.pictures.report.tables import placements_table
+
 
 def peaks(*names):
     """Of datasets, with the name of a row for {}; deflections after "mm" in mm."""
@@ -129,6 +133,15 @@ TABLES = {
 def test_numbers_of_the_readme(solved, table):
     case, (tolerance, of_row) = solved(table[0]), TABLES[table]
     check_table(*table, tolerance, lambda row: of_row(case, row), smallest=1e-9)
+
+
+def test_the_page_has_places_of_patches(solved):
+    """The optimum and the evenly spaced patches, as in the README."""
+    with Results(solved("two_link_placement").file.filename) as results:
+        found = {name: cells[-2:] for name, *cells in placements_table(runs([results])).rows}
+    for name, (*of_readme, _) in readme_table("two_link_placement", "analysis").items():
+        numbers = [float(cell.removesuffix(" V")) for cell in found[name]]
+        np.testing.assert_allclose(numbers, of_readme, rtol=0.01, err_msg=name)
 
 
 def test_patches_and_links_without_them(solved, two_link):

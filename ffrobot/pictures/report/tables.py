@@ -11,7 +11,7 @@ from ...mbs.solve.zero_dynamics import is_unstable
 from ...results.file import Results
 from ...results.joints import joint_coordinates
 from ...results.linear import read_metrics
-from ...results.tables import Cells, analysis_cells, loop_cells, voltage_cells
+from ...results.tables import Cells, analysis_cells, loop_cells, voltage_cells, volts
 from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
@@ -168,14 +168,30 @@ def zeros_table(runs: Sequence[Run]) -> Table:
             kind = phase if about["minimum_phase"] else "not minimum phase: stable inversion"
             largest, least = zeros[..., 0].max(), abs(zeros[..., 0]).min()
             rows.append((run.label, kind, f"{about['factor']:.3g}", f"{largest:.4g}", number(least)))
-    heading = ("motors only", "zeros along the path", "of the vibration in the output", "largest real part (1/s)",
+    heading = ("motors only", "zeros along the path", "share of the vibration in the output", "largest real part (1/s)",
                "nearest to the axis (1/s)")  # fmt: skip
     return Table(heading, rows)
+
+
+def placements_table(runs: Sequence[Run]) -> Table:
+    """Where searches place patches, against as many spread evenly."""
+    rows = []
+    for run in runs:
+        group = f"{run.analysis}/placement"
+        if run.results.has(group):
+            about = run.results.attributes(group)
+            reach = (f"{run.results[f'{group}/{which}/value']:.4g}" for which in ("best", "even"))
+            voltages = (f"{volts(volt)} V" for volt in run.results[f"{group}/largest_voltage"])
+            centers = ", ".join(f"{x:.4g}" for x in run.results[f"{group}/best/centers"])
+            pair = voltages if about["criterion"] == "voltage" else reach
+            rows.append((run.label, about["body"], about["criterion"], centers, *pair))
+    return Table(("placement", "on", "by", "centers (m)", "optimum", "evenly spaced"), rows)
 
 
 TABLES: Mapping[str, Callable[[Sequence[Run]], Table]] = {
     "loops": loops_table,
     "zeros": zeros_table,
+    "placements": placements_table,
     "warnings": warnings_table,
     "bending": bending_table,
     "peaks": peaks_table,
