@@ -119,11 +119,11 @@ def _answer(
     has_limits = any(motor.has_limits for motor in motors.values()) or any(
         np.isfinite(e["available_moment"]).any() for e in group.get("feasibility/pzt", {}).values()
     )
-    within = "within the limits that are given" if has_limits else "no limits are given"
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         means = "motors and patches" if missed.with_patches else "motor torques"
-        return f"{means} cannot do it: see the warning ({within})", False
-    least = ""
+        within = " within their limits" if has_limits else ""
+        return f"{means}{within} cannot do it: the path needs other forces on the links, see the warning", False
+    within, least = "within the limits that are given" if has_limits else "no limits are given", ""
     if "tracking" in group:
         about = group["tracking"].attrs
         off = about.get("without_patches", np.nan)

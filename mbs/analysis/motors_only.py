@@ -253,10 +253,10 @@ def _warnings(inversion: Inversion, run: Outcome) -> tuple[str, ...]:
         return ()
     joint = next((one for one in held.scene.joint if one.name == farthest.joint), None)
     turns = farthest.angle is not None if joint is None else joint.units == ("rad",)
-    unit = "m or rad" if farthest.orientation is not None else "rad" if turns else "m"
+    unit, scale = ("m or rad", 1) if farthest.orientation is not None else ("rad", 1) if turns else ("mm", 1e3)
     return (
         f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of trajectory"
-        f' "{farthest.name}" is off by up to {errors[farthest.name]:.3g} {unit}',
+        f' "{farthest.name}" is off by up to {scale * errors[farthest.name]:.3g} {unit}',
     )
 
 

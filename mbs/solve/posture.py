@@ -211,7 +211,7 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
         yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
     if rows and found.followed < found.freedom:
         yield (
-            f"{found.freedom - found.followed} degrees of freedom are not prescribed; gravity and inertia move"
+            f"{found.freedom - found.followed} degrees of freedom are not prescribed; forces and inertia move"
             f' {", ".join(found.left)}: prescribe a joint by a trajectory, or set redundancy = "least-motion" or'
             ' "least-torque"'
         )

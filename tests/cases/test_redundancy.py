@@ -80,7 +80,7 @@ def test_least_motion_has_no_part_in_the_freedom_left(tmp_path):
         across = [left_free(angles) @ rate for angles, rate in zip(q, rates, strict=True)]
         assert np.abs(rates).max() > 0.5
         assert np.abs(across).max() < 1e-6 * np.abs(rates).max()
-        assert not any("gravity and inertia move" in text for text in found.attributes("inverse")["warnings"])
+        assert not any("forces and inertia move" in text for text in found.attributes("inverse")["warnings"])
         assert len(found.attributes("inverse")["resolved_by"]) == 1
 
 
@@ -114,7 +114,7 @@ def test_least_torque_is_the_least_of_whole_motions(tmp_path):
 
 def test_freedom_that_nothing_settles_is_told_with_the_joints_that_move(tmp_path):
     with solve(arm(RUN), tmp_path) as found:
-        (told,) = (text for text in found.attributes("inverse")["warnings"] if "gravity and inertia move" in text)
+        (told,) = (text for text in found.attributes("inverse")["warnings"] if "forces and inertia move" in text)
         moving = np.abs(left_free(GUESS)) > 1e-6
         assert told.startswith("1 degrees of freedom are not prescribed")
         assert [joint in told for joint in JOINTS] == moving.tolist()

@@ -202,7 +202,7 @@ def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
     assert 1e-4 < left.max() < 0.05  # m, of a path of 1 m
     assert left[0].max() < 1e-6  # at rest nothing is left
     (told,) = outcome.statistics.warnings
-    assert told.endswith(f" is off by up to {left.max():.3g} m")
+    assert told.endswith(f" is off by up to {1e3 * left.max():.3g} mm")
     replayed = exact_forward(model, outcome)
     same = np.abs(off_path(replayed))
     np.testing.assert_allclose(same, left, atol=1e-6)
