@@ -10,7 +10,7 @@ const COMMON_LAYOUT = {
   margin: { l: 70, r: 15, t: 55, b: 50 },
   colorway: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A7A7A"],
   legend: {
-    orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: NARROW ? 10 : 11 }, tracegroupgap: 0,
+    orientation: "h", yref: "container", y: 0, yanchor: "bottom", maxheight: 0.9, font: { size: NARROW ? 10 : 11 }, tracegroupgap: 0,
     ...(NARROW ? { xref: "container", x: 0, entrywidthmode: "fraction" } : {}),
   },
   hovermode: "closest",
@@ -65,7 +65,9 @@ const every = (values, step, offset) => Array.from(values).filter((_, i) => i % 
 const CHARTS = JSON.parse(document.getElementById("chart-data").textContent);
 
 // Of a legend on phones and paper: its entries, and how many stand side by side; on phones Plotly puts groups below each other.
-const legendEntries = ({ data, layout }) => [...data, ...(layout.shapes ?? []).filter((shape) => shape.showlegend)];
+const legendEntries = ({ data, layout }) => [
+  ...data.filter((trace) => trace.showlegend !== false), ...(layout.shapes ?? []).filter((shape) => shape.showlegend),
+];
 const legendColumns = (chart) =>
   legendEntries(chart).some(({ name, legendgroup }) => (name ?? "").length > 22 || (NARROW && legendgroup)) ? 1 : 2;
 
@@ -73,8 +75,10 @@ function drawChart(element) {
   const chart = CHARTS[element.dataset.chart];
   if (chart && !element.dataset.drawn) {
     element.dataset.drawn = "yes";
-    const rows = Math.ceil(legendEntries(chart).length / legendColumns(chart)) - 3; // of the legend, on a phone, beyond what the height is for
-    if (NARROW && rows > 0 && !element.style.height) element.style.height = `calc(19rem + ${19 * rows}px)`;
+    // Rows of the legend beyond those that the height is for; on a wide page one more entry stands side by side.
+    const [columns, few, height] = NARROW ? [legendColumns(chart), 3, 19] : [legendColumns(chart) + 1, 6, 22];
+    const rows = Math.ceil(legendEntries(chart).length / columns) - few;
+    if (rows > 0 && !element.style.height) element.style.height = `calc(${height}rem + ${19 * rows}px)`;
     Plotly.newPlot(element, chart.data, chartLayout(chart), CONFIG);
   }
 }
@@ -90,7 +94,7 @@ SCREEN.addEventListener("change", () => drawn().forEach(repaint));
 
 // On paper: every chart, two side by side on A4 or letter, and everything that is folded. A chart keeps the size that it
 // is drawn with, and the width of the paper is not known before the page is laid out.
-const ROW = 14; // of a legend, in pixels
+const ROW = 16; // of a legend, in pixels
 const SIZES = {
   paper: {
     mechanism: { width: 690, height: 400, "legend.y": -0.2 },
