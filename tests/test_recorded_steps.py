@@ -1,4 +1,4 @@
-"""Forces of an inverse analysis between its outputs, by its steps made again."""
+"""Forces of an inverse analysis between its outputs, by its recorded steps."""
 
 import numpy as np
 import pytest
