@@ -20,6 +20,7 @@ from ...mbs.model.model import Model, build_model, row_values
 from ...mbs.model.rows import rows_of_joint
 from ...mbs.model.system import ZERO, MultibodySystem
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
+from ...mbs.solve.start import undeformed_posture
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
@@ -28,9 +29,9 @@ from .signals import check_joint, volts_on_file
 TOLERANCE, MOST_ITERATIONS = 1e-10, 20
 
 
-def rigid_freedom(model: Model, q: Array) -> int:
-    """How many independent joint coordinates the mechanism with rigid links has near q (n_q,)."""
-    joints = model.tree.joint_columns
+def rigid_freedom(model: Model) -> int:
+    """How many independent joint coordinates the mechanism with rigid links has where it starts."""
+    joints, q = model.tree.joint_columns, undeformed_posture(model).q
     C_v = row_values(model, q[None], np.zeros(1))[1][0][model.loop_rows][:, joints]
     return int(np.count_nonzero(joints)) - int(np.linalg.matrix_rank(C_v) if C_v.size else 0)
 
@@ -43,7 +44,7 @@ class RigidArm:
     """
 
     def __init__(self, model: Model, q: Array) -> None:
-        freedom, count = rigid_freedom(model, q), sum(len(columns) for columns in model.motors.values())
+        freedom, count = rigid_freedom(model), sum(len(columns) for columns in model.motors.values())
         if count != freedom:
             raise InputError(
                 f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them), found"
@@ -170,7 +171,7 @@ class Robot:
     @property
     def motors_fit(self) -> bool:
         """Whether there are as many motors as the mechanism with rigid links has freedom."""
-        return len(self.motors) == rigid_freedom(self.model, self.source.q[0])
+        return len(self.motors) == rigid_freedom(self.model)
 
     @cached_property
     def links(self) -> Mapping[str, LinkModes]:

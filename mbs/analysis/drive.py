@@ -24,13 +24,16 @@ from ..solve.diagnosis import find_cause
 from ..solve.integrator_choice import choose_integrator
 from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
 from ..solve.limits import left_ranges, watch_limits
-from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_size
+from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_size, worst_posture
 from ..solve.reach import out_of_reach
+from ..solve.start import rank_of_redundant_loops
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .samples import about_highest, in_order, new_samples, reached_samples, some_of, stops
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
+
+POSTURES = 2001  # outputs whose postures are looked at where the core does not watch them
 
 STATUS = {
     _core.IntegrationStatus.completed: "completed",
@@ -93,9 +96,10 @@ def drive_robot(
     is_rigid = not any(node.body.n_modes for node in model.tree.nodes)
     ends = stops(times, paths, loads, is_driven=is_rigid and is_followed, is_replay=is_rigid and is_replay)
     controls.stops = as_list(ends)
-    system.integrated.scene.watch_posture(
-        [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
-    )
+    rows = system.integrated.rows
+    loop_rank = None if is_rigid or not is_followed else rank_of_redundant_loops(model, rows)
+    if loop_rank is None:
+        system.integrated.scene.watch_posture([model.rows[k].is_trajectory for k in rows], robot_size(model))
     watch_limits(system.integrated.scene, model.tree)
     recording = _core.Recording() if is_recorded else None
     continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
@@ -105,6 +109,11 @@ def drive_robot(
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
     posture = describe_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
+    if loop_rank is not None and len(motion.time):
+        some = np.unique(np.linspace(0, len(motion.time) - 1, POSTURES).astype(int))
+        ratio, worst = worst_posture(model, motion.time[some], motion.q[some], loop_rank)
+        at = motion.time[some[worst]], motion.q[some[worst]]
+        posture = describe_posture(model, ratio, float(at[0]), at[1], is_end=False, loop_rank=loop_rank)
     cause = ""
     if in_posture:
         cause = f"{posture}: {out_of_reach(model, times) or 'move the path, or start in another posture'}"

@@ -21,12 +21,13 @@ from ..model.body import Body
 from ..model.divided_link import DividedLink
 from ..model.gears import refuse_prescribed_motors
 from ..model.motors import driven_mechanism, fastest_mechanism
+from ..model.system import MultibodySystem
 from ..scene.analysis import Check, TimedAnalysis
 from ..solve.posture import check_path, mobility
 from ..solve.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
 from ..solve.reach import check_reach
 from ..solve.redundancy import resolved
-from ..solve.start import undeformed_posture
+from ..solve.start import shape_in_redundant_loops, undeformed_posture
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 
@@ -97,7 +98,6 @@ class Fcid(TimedAnalysis):
         began = time.perf_counter()
         has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
         motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
-        shape = _shape(context, self, motion, q)
 
         def at(times: Array) -> Outcome:
             found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
@@ -107,7 +107,14 @@ class Fcid(TimedAnalysis):
                 statistics=Statistics(warnings=warnings), prescribed=Prescription(equations, shape, q),
             )  # fmt: skip
 
-        run = at(self.times)
+        try:
+            shape = _shape(context, self, motion, q)
+            run = at(self.times)
+        except SolveError as error:
+            cause = shape_in_redundant_loops(model, MultibodySystem(model).integrated.rows)
+            if not cause:
+                raise
+            raise SolveError(f"{error}; {cause}") from None
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began)
         return replace(run, statistics=statistics).with_look(at)
 

@@ -128,15 +128,31 @@ def mobility(model: Model, q: Array) -> Mobility:
     return Mobility(count - len(model.tree.gears), followed, ratio, left, J.shape[1] - count)
 
 
-def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool) -> str:
+def worst_posture(model: Model, times: Array, q: Array, loop_rank: int) -> tuple[float, int]:
+    """The least ratio of `Mobility` at `times` (T,) and q (T, n_q), and at which of these.
+
+    Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
+    `loop_rank` is their rank with straight ones.
+    """
+    J, is_loop = _scaled_rows_at(model, times, q), model.loop_rows
+    free = np.linalg.svd(J[:, is_loop])[2][:, loop_rank:].swapaxes(1, 2)
+    values = np.linalg.svd(J[:, ~is_loop] @ free, compute_uv=False)
+    ratios = values[:, -1] / values[:, 0]
+    return float(ratios.min()), int(ratios.argmin())
+
+
+def describe_posture(
+    model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int | None = None
+) -> str:
     """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine.
 
-    Of one in which the run ends it is said to be singular.
+    Of one in which the run ends it is said to be singular. `loop_rank` as in `worst_posture`.
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
     J, is_loop = _scaled_rows(model, q, t), model.loop_rows
-    free = null_space(J[is_loop], SINGULAR, 1.0)
+    loops = J[is_loop]
+    free = null_space(loops, SINGULAR, 1.0) if loop_rank is None else np.linalg.svd(loops)[2][loop_rank:].T
     least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
@@ -181,8 +197,13 @@ def _ratio(J: Array, rank: int) -> float:
 
 def _scaled_rows(model: Model, q: Array, t: float = 0.0) -> Array:
     """C_v (rows, joint coordinates) at q (n_q,) and time t, in radians and sizes of the robot."""
-    C_v = row_values(model, q[None], np.array([t]))[1][0]
-    return as_floats((C_v * joint_scales(model) / row_sizes(model)[:, None])[:, model.tree.joint_columns])
+    return _scaled_rows_at(model, np.array([t]), q[None])[0]
+
+
+def _scaled_rows_at(model: Model, times: Array, q: Array) -> Array:
+    """The same (T, rows, joint coordinates) at `times` (T,) and q (T, n_q)."""
+    C_v = row_values(model, q, times)[1]
+    return as_floats((C_v * joint_scales(model) / row_sizes(model)[:, None])[:, :, model.tree.joint_columns])
 
 
 def check_path(model: Model, q: Array, end: float) -> Iterator[str]:

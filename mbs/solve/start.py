@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans
+from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State
 from ..model.model import Model, row_values, turned_over
-from .posture import MET, MOST_ITERATIONS, joint_scales, row_sizes, solve_posture, solve_postures, with_rates
+from .posture import MET, MOST_ITERATIONS, joint_scales, mobility, row_sizes, solve_posture, solve_postures, with_rates
 from .reach import check_reach, turned_guesses, working_guess
 
 AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
@@ -63,6 +63,27 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
         for node in model.tree.nodes:
             named[node.v] = node.joint.name in model.scene.initial.named(table)
     return named
+
+
+def rank_of_redundant_loops(model: Model, rows: Indices) -> int | None:
+    """Of the constraints of loops among `rows`, where straight links make some of them redundant; else None.
+
+    Bent links raise it: joints seem to be locked that the links let move.
+    """
+    count = int(np.count_nonzero(model.loop_rows[rows]))
+    rank = mobility(model, undeformed_posture(model).q).loop_rank if count else 0
+    return rank if rank < count else None
+
+
+def shape_in_redundant_loops(model: Model, rows: Indices) -> str:
+    """Why links in such loops cannot be given a shape; "" where there are none."""
+    if rank_of_redundant_loops(model, rows) is None:
+        return ""
+    owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
+    return (
+        f"constraints of the loop that {owners} closes are redundant with straight links, and do not hold with bent"
+        ' ones of any shape. Use joints with more degrees of freedom, or kind = "pcid"'
+    )
 
 
 def displaced_joints(model: Model) -> Iterator[str]:

@@ -18,7 +18,9 @@ import numpy as np
 from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
 from ...common.errors import SolveError
 from ...common.structs import struct
+from ..model.system import MultibodySystem
 from .servo import Servo, stiffness
+from .start import shape_in_redundant_loops
 
 MOST_ITERATIONS = 50
 TOLERANCE = 1e-12  # of the last Newton step to an equilibrium, relative
@@ -69,7 +71,9 @@ def equilibrium(servo: Servo, t: float) -> Array:
 
 def cause_in_posture(servo: Servo) -> str:
     """Why links that bend leave an output without a posture, and the cure, where postures are it; else ""."""
-    return servo.doubt and f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
+    if servo.doubt:
+        return f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
+    return shape_in_redundant_loops(servo.model, MultibodySystem(servo.model).integrated.rows)
 
 
 def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
