@@ -97,7 +97,7 @@ def chosen_posture(results: Results, model: Model) -> str:
             branch = branch_names(model, undeformed_posture(model).q)
             as_line = f" ({in_words(branch)})" if branch else ""
             return (
-                f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}, found from zeros; where"
+                f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}; where"
                 " another posture reaches the path as well (elbow up or down), [initial] chooses"
             )
     return ""

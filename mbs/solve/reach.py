@@ -90,22 +90,19 @@ def _chain(model: Model, point: str) -> _Chain | None:
         number, label = node.inner.body, node.inner.point
 
 
-def working_guess(model: Model, guess: Array) -> str:
-    """`joints = { … }`, in whole degrees, from which a regular posture meets all rows at t = 0; "" if none is found.
+def working_start(model: Model, guess: Array) -> Array | None:
+    """(n_q,) in whole degrees, from which a regular posture meets all rows at t = 0; None if none is found.
 
     Of random coordinates of joints that turn, those nearest to `guess` (n_q,); others stay there.
     """
-    turning, columns = turning_joints(model)
+    columns = turning_joints(model)[1]
     if not columns.size or not model.rows:
-        return ""
+        return None
     found = regular_postures(model, random_angles(guess, columns, TRIES))
     rounded = np.tile(guess, (len(found), 1))
     rounded[:, columns] = np.radians(np.round(np.degrees(np.angle(np.exp(1j * found[:, columns])))))
     works = [q for q in rounded if len(regular_postures(model, q[None]))]
-    if not works:
-        return ""
-    nearest = min(works, key=lambda q: float(np.abs(q[columns] - guess[columns]).sum()))
-    return as_guess(turning, nearest)
+    return min(works, key=lambda q: float(np.abs(q[columns] - guess[columns]).sum()), default=None)
 
 
 def turning_joints(model: Model) -> tuple[list[Node], Indices]:

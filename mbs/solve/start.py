@@ -12,7 +12,7 @@ from ...common.errors import InputError, quoted
 from ..model.known_motion import State
 from ..model.model import Model, row_values, turned_over
 from .posture import MET, MOST_ITERATIONS, joint_scales, mobility, row_sizes, solve_posture, solve_postures, with_rates
-from .reach import check_reach, turned_guesses, working_guess
+from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
 
 AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
 
@@ -20,7 +20,8 @@ AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than lin
 def undeformed_posture(model: Model) -> State:
     """The state with p = ṗ = 0 that meets all rows at t = 0, next to the guessed coordinates and rates.
 
-    Raises `InputError` where no posture near the guess does.
+    Where a point follows a path and no joint has a guess, zero may be singular: then next to the nearest to zero that
+    works. Raises `InputError` where no posture near the guess does.
     """
     tree = model.tree
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
@@ -29,10 +30,15 @@ def undeformed_posture(model: Model) -> State:
     q = solve_posture(model, 0.0, guess) if q is None else q
     if q is None:
         check_reach(model, 0.0)
+        works, scene = working_start(model, guess), model.scene
+        follows = any(path.point is not None for path in scene.trajectory)  # a note then says from where
+        if works is not None and follows and not scene.initial.named("joints"):
+            q = solve_posture(model, 0.0, works)
+    if q is None:
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), list(turned_guesses(model.scene))
         advice += _turned_over(model, guess)
-        if works := working_guess(model, guess):
-            advice.append(f"from [initial] {works}, for one, it goes")
+        if works is not None:
+            advice.append(f"from [initial] {as_guess(turning_joints(model)[0], works)} it works")
         raise InputError(
             f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
             f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps"

@@ -67,12 +67,26 @@ def test_a_path_that_leaves_the_reach_says_where():
 def test_guesses_that_work_are_named():
     """A straight arm in line with its target is at a dead center; from what the message says it is reached."""
     path = {"x": "0.7", "y": "0.2", "z": "0.3"}
-    with pytest.raises(InputError, match=r"from \[initial\] joints = \{ yaw = .* \}, for one, it goes") as caught:
-        ffrobot.solve(arm(path, {}))
+    with pytest.raises(InputError, match=r"from \[initial\] joints = \{ yaw = .* \} it works") as caught:
+        ffrobot.solve(arm(path, {"elbow": 0.0}))
     text = str(caught.value)
     guess = tomllib.loads(text[text.index("joints = {") : text.index("}") + 1])["joints"]
     with ffrobot.solve(arm(path, guess)) as results:
         np.testing.assert_allclose(results["inverse/points/b.tip/position"][0], [0.7, 0.2, 0.3], atol=1e-9)
+
+
+def test_without_a_guess_a_singular_zero_is_left():
+    """The same arm without any guess; the note after the run says where it starts. The tip is 0.632 m from the hub."""
+    path = {"x": "0.7", "y": "0.2", "z": "0.3"}
+    bend = 2 * np.arccos(0.3 / 0.7)
+    for branch, sign in ({}, None), ({"elbow": "up"}, 1.0), ({"elbow": "down"}, -1.0):
+        scene = arm(path, {})
+        scene = scene.model_copy(update={"initial": scene.initial.model_copy(update={"branch": branch})})
+        with ffrobot.solve(scene) as results:
+            np.testing.assert_allclose(results["inverse/points/b.tip/position"][0], [0.7, 0.2, 0.3], atol=1e-9)
+            elbow = results["inverse/joints/elbow/coordinate"][0]
+        assert abs(elbow) == pytest.approx(bend, rel=1e-6)
+        assert sign is None or sign * elbow > 0
 
 
 def test_guesses_beyond_a_turn_are_warned_of_once():
