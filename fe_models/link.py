@@ -237,6 +237,14 @@ def _up_to_date(path: Path, digest: str) -> ModalBody | None:
     return body if body.input_hash == digest else None
 
 
+def is_outdated(path: Path) -> bool:
+    """Whether the link file next to a modal body file, if there is one of its name, makes another modal body now."""
+    with suppress(FfrobotError):
+        made_from = read_modal_body(path).input_hash
+        return made_from not in ("", input_hash(read_link(path.with_suffix(".toml"))))
+    return False
+
+
 def _silent(_: str) -> None:
     pass
 

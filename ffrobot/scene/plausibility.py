@@ -47,6 +47,12 @@ def remarks(scene: Scene) -> Iterator[str]:
             with suppress(InputError):  # which stage 1 tells
                 links[body.name] = read_link(body.link)
                 yield from remarks_on_link(links[body.name], f'link "{body.name}"')
+        elif body.modal is not None:
+            from ..fe_models.link import is_outdated
+
+            if is_outdated(body.modal):
+                link, made = body.modal.with_suffix(".toml").name, body.modal.name
+                yield f"{made} is older than {link}, or than the program: ffrobot link {link} makes it again"
         elif body.rigid is not None:
             yield from _long(_size(body.rigid), f'body "{body.name}"')
     if (fall := float(np.linalg.norm(scene.gravity))) > HEAVIEST_FALL:

@@ -67,3 +67,13 @@ def test_bad_modal_file(given, refused, damage, named):
     message = refused(given, "solve", "scene.toml")
     assert "link1.h5" in message
     assert named in message
+
+
+def test_a_modal_file_of_another_link_file_is_noted(given, ffrobot):
+    link = given / "link1.toml"
+    note = "link1.h5 is older than link1.toml, or than the program: ffrobot link link1.toml makes it again"
+    assert note not in ffrobot.ok("solve", "scene.toml", cwd=given).stdout
+    text = link.read_text(encoding="utf-8")
+    link.write_text(text.replace("density = 7850", "density = 7800"), encoding="utf-8")
+    assert link.read_text(encoding="utf-8") != text
+    assert note in ffrobot.ok("solve", "scene.toml", cwd=given).stdout
