@@ -117,12 +117,19 @@ def validate(
         return record.model_validate_json(json.dumps(data, default=str), context=context)
     except ValidationError as error:
         items = error.errors(include_url=False)
-        within = [item["loc"] for item in items]
-        whole = [  # entries that are wrong count as missing ones, too
-            item for item in items if item["type"] != "too_short" or all(loc[:-1] != item["loc"] for loc in within)
-        ]
-        problems = [_describe(item, record, data, space) for item in whole]
+        within = {item["loc"] for item in items}
+        kinds = {_describe(item, record, data, space): item["type"] for item in items if not _follows(item, within)}
+        judged = {problem.key for problem, kind in kinds.items() if kind == "value_error"}  # of a type that is allowed
+        problems = [one for one, kind in kinds.items() if kind == "value_error" or one.key not in judged]
         raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None
+
+
+def _follows(item: ErrorDetails, within: Collection[tuple[int | str, ...]]) -> bool:
+    """Whether others say it: entries that are wrong count as missing ones, too, and the last missing one counts all."""
+    loc = item["loc"]
+    if item["type"] == "too_short":
+        return any(len(other) > len(loc) and other[: len(loc)] == loc for other in within)
+    return item["type"] == "missing" and isinstance(loc[-1], int) and (*loc[:-1], loc[-1] + 1) in within
 
 
 def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noqa: ANN401 (whatever TOML may hold)
@@ -213,7 +220,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
             ", found an unknown key" + did_you_mean(str(loc[-1]), known),
         )
     if kind == "missing" and isinstance(loc[-1], int):
-        return _Problem(key, "expected a list with more entries", f", found {_show(item['input'])}")
+        return _Problem(key, f"expected a list of {int(loc[-1]) + 1} entries", f", found {_show(item['input'])}")
     if kind == "missing":
         if demand := _demand(record, loc):
             return _Problem(key_path(loc[:-1], data, kind=""), demand, "")

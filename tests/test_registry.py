@@ -170,7 +170,7 @@ for n in (2, 3):
     power = (0.1 + 2.0 * 0.5**2) * rate * acceleration
     np.testing.assert_allclose(results["inverse/joints/O/moment"] * w, power, atol=1e-7 * np.abs(power).max())
 
-for n, line in ((2, "axis: expected at most 2 entries, found [1.0, 0.0, 0.0]"), (3, "axis: expected a list with more")):
+for n, line in ((2, "axis: expected at most 2 entries, found [1.0, 0.0, 0.0]"), (3, "axis: expected a list of 3")):
     try:
         mechanism(n, axis=[1.0, 0.0, 0.0][: 5 - n])
     except ffrobot.InputError as error:

@@ -71,6 +71,7 @@ PART = 'title = "d"\n[[part]]\nname = "p"\n'
         (PART + "count = 1.5", 'part "p": count: expected a whole number, found 1.5'),
         (PART + 'ratio = "x"', 'part "p": ratio: expected a number or a list, found "x"'),
         (PART + "position = [1, 2, 3]", 'part "p": position: expected at most 2 entries, found [1, 2, 3]'),
+        (PART + "position = []", 'part "p": position: expected a list of 2 entries, found []'),
         (PART + 'position = [1, "2"]', 'part "p": position[1]: expected a number, found "2"'),
         ('title = "d"\npart = 3', "part: expected a list, found 3"),
         ('title = "d"\n[[part]]\n', "part no. 1: name: expected a value, since this key is required, found none"),
