@@ -41,8 +41,12 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
     axes = np.stack([x, y, np.cross(x, y)])
     in_file = METRES[part.unit]
 
-    others = [face for face in part.faces if face.kind in ("plane", "bore") and face is not root and face is not tip]
-    mass_on = _masses(part, [root, tip, *others])
+    others = {
+        f"{face.kind}_{k}": face  # numbered as in the table and the picture
+        for k, face in enumerate(part.faces, start=1)
+        if face.kind in ("plane", "bore") and face is not root and face is not tip
+    }
+    mass_on = _masses(part, [root, tip, *others.values()])
 
     def interface(label: str, face: PartFace) -> dict[str, Any]:
         place = axes @ (face.point - root.point)
@@ -66,7 +70,7 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
         "damping": {"ratio": 0.01},
         "interface": [interface("root", root), interface("tip", tip)],
     }
-    tables = [interface(f"{face.kind}_{k}", face) for k, face in enumerate(others, start=1)]
+    tables = [interface(label, face) for label, face in others.items()]
     head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n\n"
     return head + toml_text(keys) + "".join(_commented(tables))
 

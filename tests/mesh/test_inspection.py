@@ -87,6 +87,21 @@ def test_a_draft_wherever_the_part_lies(bores, length, tmp_path):
     np.testing.assert_allclose(here.frequency[:3], there.frequency[:3], rtol=1e-6)
 
 
+def test_other_faces_of_a_draft_have_their_numbers(tmp_path):
+    """Those of the table and the picture: a face is as far from the root in the link as in the file."""
+    plate(tmp_path / "plate.step")
+    part = inspect_part(tmp_path / "plate.step")
+    draft = draft_link(part, tmp_path / "plate.step", "plate", tmp_path).split("\n# [[interface]]\n")
+    root = bores_of(part)[0]
+    assert len(draft) == 1 + len(part.faces) - 2
+    for block in draft[1:]:
+        keys = tomllib.loads(block.replace("# ", ""))
+        kind, number = keys["name"].split("_")
+        face = part.faces[int(number) - 1]
+        assert kind == face.kind
+        assert np.linalg.norm(keys["position"]) == pytest.approx(np.linalg.norm(face.point - root.point), abs=1e-8)
+
+
 def test_axes_of_a_fork_are_those_of_its_faces(tmp_path):
     """Of the two lugs at its end the draft takes one, 10 mm off the plane of symmetry."""
     with gmsh_session():
