@@ -31,17 +31,22 @@ def summary_lines(
     What has no room is counted, and left to `--verbose`. `notes` stand below warnings; `accuracy` and `results` (the
     name of the file) come last.
     """
-    texts = [*_texts(verdict), *_labelled("note", notes)]
+    of_analyses = [_analysis(one) for one in verdict.analyses]
+    remarks: list[str] = []
+    if max(map(len, _aligned([ANALYSES, *of_analyses]))) > width:  # the last column moves below
+        remarks = list(_labelled("remark", ["; ".join(alike((row[0], row[-1]) for row in of_analyses if row[-1]))]))
+        of_analyses = [(*row[:-1], "") for row in of_analyses]
+    texts = [*remarks, *_texts(verdict), *_labelled("note", notes)]
     motors, worst = list(_motors(verdict.analyses)), list(_worst_motors(verdict.analyses))
     room = LINES - printed - 3 - bool(motors)  # without both headers, accuracy, results
     for_motors = min(len(worst), MOTORS, (room + 1) // 2)
-    analyses = _at_most([_analysis(one) for one in verdict.analyses], room - for_motors - min(len(texts), TEXTS))
+    analyses = _at_most(of_analyses, room - for_motors - min(len(texts), TEXTS))
     room -= len(analyses)
     rows = motors if len(motors) + min(len(texts), TEXTS) <= room else worst
     rows = _at_most(rows, max(for_motors, room - len(texts)))
     lines = _aligned([ANALYSES, *analyses]) + (_aligned([MOTOR, *rows]) if rows else [])
     lines += _fitted(texts, room - len(rows), width)
-    lines += [f"accuracy   {accuracy}"]
+    lines += _fitted([f"accuracy   {accuracy}"], LINES - printed - 1 - len(lines), width)
     return [_cut(line.rstrip(), width) for line in lines] + [f"results    {results}"]
 
 
@@ -132,7 +137,7 @@ def _fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
         free = room - len(lines) - (len(shown) - k - 1)
         whole = wrap(text, width, subsequent_indent=" " * 11, break_long_words=False)
         if len(whole) > free:
-            whole = [*whole[: free - 1], _cut(" ".join(whole[free - 1 : free + 1]), width)]
+            whole = [*whole[: free - 1], _cut(" ".join([whole[free - 1], whole[free].strip()]), width)]
         lines += whole
     more = f" (+{len(texts) - room} more: {REST})" if len(texts) > room else ""
     return [*lines[:-1], _cut(lines[-1], width - len(more)) + more]

@@ -86,6 +86,8 @@ def test_every_case_has_a_summary_of_one_screen(case, solved):
         lines = summary_lines(verdict, ["a note"], 30 * "accuracy ", "scene.results.h5", width)
         assert len(lines) <= LINES == 15
         assert max(map(len, lines)) <= width
+        cut = [line for line in lines if line.endswith("…")]
+        assert width < 120 or not any(line.startswith(f"{one.name} ") for line in cut for one in verdict.analyses)
     shown = sum(line.startswith(one.name) for one in verdict.analyses for line in lines[1 : 1 + len(verdict.analyses)])
     left_out = sum(int(line.split()[0]) for line in lines if line.endswith("more: --verbose"))
     judged = [one for one in verdict.analyses if one.feasible is not None]
