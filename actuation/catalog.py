@@ -14,6 +14,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.keys import NotNegative, Positive
 from ..common.peaks import root_mean_square
+from ..common.tables import shown
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import Record, validate
 
@@ -88,6 +89,8 @@ def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
     lines = list(csv.DictReader(read_text(path, "catalog of motors").splitlines(), skipinitialspace=True))
     if not lines:
         raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below, found none")
+    if len(lines[0]) < 2:
+        raise InputError(f"{path}: line 1: expected columns with commas between them, found {shown(str(*lines[0]))}")
     return validate(_Catalog, {"motor": [_of_line(line, path, k) for k, line in enumerate(lines, 2)]}, path).motor
 
 

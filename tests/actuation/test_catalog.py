@@ -73,6 +73,7 @@ def test_csv_and_toml_say_the_same(tmp_path):
         ("", "expected a line of columns"),
         (CSV.replace("0.3", "strong"), "peak_torque"),
         (CSV + "B, 1\n", "line 3: expected as many cells"),
+        (CSV.replace(",", ";"), "line 1: expected columns with commas between them, found name; "),
     ],
 )
 def test_wrong_catalogs(tmp_path, text, message):
