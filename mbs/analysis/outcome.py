@@ -34,8 +34,8 @@ ADVICE = {
     " need too fine a mesh. Add damping, leave out high modes, smooth the path or loosen the tolerance",
     "inversion not converged": "no motion follows the path with motor torques only: slow the path down, add"
     ' damping, leave out high modes, or use output = "redefined"',
-    "diverged": "a link is bent by as much as it is long, which small deformations do not describe: loads beyond"
-    " buckling, a spin that needs geometric_stiffening = true, or an arm without motors that falls apart",
+    "diverged": "a link is bent by as much as it is long: a path too fast, loads beyond buckling, a spin that needs"
+    " geometric_stiffening = true, or an arm without motors that falls apart",
 }
 
 

@@ -75,8 +75,8 @@ def too_far_bent(links: Iterable[tuple[str, Array, float]]) -> str:
         return ""
     return (
         f'"{name}" is bent by {100 * most:.0f} % of its length, which violates small deformations. Possible causes: a'
-        " load beyond buckling, a spin that needs geometric_stiffening = true, a link too soft, or an arm without"
-        " motors that falls apart"
+        " path too fast, a load beyond buckling, a spin that needs geometric_stiffening = true, a link too soft,"
+        " or an arm without motors that falls apart"
     )
 
 
