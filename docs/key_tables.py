@@ -131,7 +131,7 @@ def _default(key: str, record: Schema) -> str:
 
 def _meaning(key: str, entry: dict[str, Any]) -> str:
     """The description; of a constant, for which editors show the first line about its table, what it is."""
-    if "const" in entry:
+    if "const" in entry and key != "check":
         return "Dimension of the motion." if key == "space" else f"{key.capitalize()} of this table."
     return str(entry["description"])
 

@@ -1,6 +1,7 @@
 """The README's own arm, as a reader would copy it."""
 
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -43,6 +44,14 @@ def test_solve_prints_what_the_readme_quotes(arm, capsys):
     printed = " ".join(capsys.readouterr().out.split())
     for line in quoted.splitlines():
         assert " ".join(line.strip(" …").split()) in printed
+
+
+def test_every_command_of_the_readme_runs(arm, monkeypatch):
+    monkeypatch.chdir(arm)
+    commands = re.findall(r"^    ffrobot (\w+ [^#\n]+)", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {"solve", "plot", "report", "view", "map", "feasibility"} == {command.split()[0] for command in commands}
+    for command in commands:
+        cli(shlex.split(command), standalone_mode=False)
 
 
 DOCUMENTS = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("cases/*/README.md"))]

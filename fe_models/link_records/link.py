@@ -83,7 +83,8 @@ class Material(Record):
     """Density ρ, kg/m³."""
     # Beams need it for torsion and shear only, solids always.
     poissons_ratio: Poisson | None = None
-    """Poisson's ratio ν; beams need it for torsion and shear only, solids always."""
+    """Poisson's ratio ν; beams need it for torsion and shear only, solids always. G is E/(2(1 + ν)): carbon fibers
+    along a tube have less, which a solid with three moduli describes."""
 
 
 class OrthotropicMaterial(Record):
