@@ -22,7 +22,7 @@ from ..common.errors import FfrobotError, InputError
 from ..common.structs import struct
 from .cells import CellName
 from .compat import coordinate_element, create_solid_mesh, geometry_nodes
-from .part import kept_or_new
+from .part import part_mesh
 from .part_mesh import PartMesh, Tags, facet_keys
 from .records import PartTables
 
@@ -168,17 +168,15 @@ class SolidMesh:
         return self.regions[region], *self.overlaps.get(region, ())
 
 
-def solid_mesh(
-    tables: PartTables, comm: MPI.Comm = MPI.COMM_WORLD, progress: Progress = lambda _: None, *, remesh: bool = False
-) -> SolidMesh:
+def solid_mesh(tables: PartTables, comm: MPI.Comm = MPI.COMM_WORLD, progress: Progress = lambda _: None) -> SolidMesh:
     """Mesh of a solid link, distributed over `comm`, all of whose processes call; see `part_mesh`.
 
-    Unless `remesh` a mesh of the same part kept from an earlier run counts. Raises `InputError` on every process.
+    Raises `InputError` on every process.
     """
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:
         try:
-            outcome = kept_or_new(tables, progress, remesh=remesh)
+            outcome = part_mesh(tables, progress)
         except FfrobotError as error:
             outcome = error
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)
