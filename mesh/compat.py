@@ -61,17 +61,11 @@ def geometry_nodes(mesh: Mesh) -> Integers:
     return np.asarray(dofmap.array, dtype=np.int64).reshape(-1, dofmap.links(0).size if cells else 1)[:cells]
 
 
-def geometry_degree(mesh: Mesh) -> int:
-    """Polynomial degree of the cells' shape."""
-    cmap = mesh.geometry.cmap
-    return int(cmap.degree)
-
-
 def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
     """Basix element that maps the reference cell to the cells of `mesh`, by `geometry_nodes`."""
     cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
     equispaced = basix.LagrangeVariant.equispaced
-    return basix.create_element(basix.ElementFamily.P, cell, geometry_degree(mesh), equispaced)
+    return basix.create_element(basix.ElementFamily.P, cell, mesh.geometry.cmap.degree, equispaced)
 
 
 def compiled_form(form: ufl.Form) -> fem.Form:
@@ -104,17 +98,8 @@ def _compiling(comm: MPI.Comm) -> Iterator[dict[str, Any]]:
         logging.disable(before)
 
 
-def lagrange_space(mesh: Mesh, degree: int, *, vector: bool) -> FunctionSpace:
-    """Continuous Lagrange functions on a mesh of solids: scalar ones, or one for each direction of space."""
-    return _space(mesh, degree, (3,) if vector else ())
-
-
-def constant_space(mesh: Mesh, shape: tuple[int, ...]) -> FunctionSpace:
-    """Functions that are constant in each cell, with values of `shape`."""
-    return _space(mesh, 0, shape)
-
-
-def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
+def function_space(mesh: Mesh, degree: int, shape: tuple[int, ...] = ()) -> FunctionSpace:
+    """Lagrange functions with values of `shape`: continuous ones, or those of degree 0 that are constant in cells."""
     options: dict[str, Any] = {"discontinuous": degree == 0}
     if degree:
         options["lagrange_variant"] = basix.LagrangeVariant.gll_warped

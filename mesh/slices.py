@@ -20,7 +20,7 @@ import numpy as np
 from ..common.arrays import Array, Booleans, Integers
 from ..common.structs import struct
 from .cells import HEXAHEDRON, KUHN, TETRAHEDRON
-from .compat import coordinate_element, geometry_degree, geometry_nodes
+from .compat import coordinate_element, geometry_nodes
 
 if TYPE_CHECKING:
     from dolfinx.mesh import Mesh
@@ -85,7 +85,7 @@ class _Cells:
         self.index, self.nodes, self.f = index, nodes, f
         self.element = coordinate_element(mesh)
         self.tetrahedral = self.element.cell_type == basix.CellType.tetrahedron
-        self.affine = self.tetrahedral and geometry_degree(mesh) == 1
+        self.affine = self.tetrahedral and mesh.geometry.cmap.degree == 1
 
     def basis(self, X: Array, derivatives: int) -> Array:
         """(1 + 3 or 1, q, v) values, and derivatives along X, of the shape functions at `X` (q, 3)."""

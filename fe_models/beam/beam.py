@@ -18,7 +18,7 @@ from ...common.structs import struct
 from ..link_records.families import Family
 from ..link_records.link import BeamLink, Solver
 from .line import gram, hermite, lagrange
-from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
+from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
 
 # Rows of a station: displacement and rotation of the cross section about x, y, z.
 U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
@@ -73,7 +73,7 @@ Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list
 
 def _euler_bernoulli(link: BeamLink, nodes: Array, stations: Array, second_moment: Property) -> Bending:
     """K = ∫EI w'' v'' dx, M = ∫ρA w v dx on cubic Hermite elements; stations read w and w'."""
-    V, E, rho = hermite(nodes), link_modulus(link), link.material.density
+    V, E, rho = hermite(nodes), link.material.youngs_modulus, link.material.density
     strain = V.root(cellwise(link, nodes, lambda s: E * second_moment(s)), derivative=2)
     inertia = V.root(cellwise(link, nodes, lambda s: rho * s.area))
     held = [0, 1] if link.reference.holds_root else [0, V.x.size - 2]
@@ -86,7 +86,7 @@ def _timoshenko(link: BeamLink, nodes: Array, stations: Array, second_moment: Pr
     Stations read w and the section's rotation θ.
     """
     W, T = lagrange(nodes, 3), lagrange(nodes, 2)
-    E, G, rho = link_modulus(link), shear_modulus(link), link.material.density
+    E, G, rho = link.material.youngs_modulus, shear_modulus(link), link.material.density
     EI = cellwise(link, nodes, lambda s: E * second_moment(s))
     kGA = cellwise(link, nodes, lambda s: s.shear * G * s.area)
     rhoA = cellwise(link, nodes, lambda s: rho * s.area)

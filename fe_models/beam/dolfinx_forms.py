@@ -11,11 +11,11 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
 from ...common.arrays import Array
-from ...mesh.compat import compiled_form, constant_space, lagrange_space
+from ...mesh.compat import compiled_form, function_space
 from ..link_records.families import Family
 from ..link_records.link import BeamLink
 from .line import Functions, hermite, lagrange
-from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
+from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
 
 
 def assembled(link: BeamLink, family: Family, nodes: Array) -> tuple[sp.csr_matrix, sp.csr_matrix]:
@@ -27,7 +27,7 @@ def assembled(link: BeamLink, family: Family, nodes: Array) -> tuple[sp.csr_matr
         cubics = lagrange(nodes, 3)
         return beam.matrix(stiffness * u.dx(0) * v.dx(0), cubics), beam.matrix(inertia * u * v, cubics)
     moment, rho = second_moment(family), link.material.density
-    EI = beam.constant(lambda s: link_modulus(link) * moment(s))
+    EI = beam.constant(lambda s: link.material.youngs_modulus * moment(s))
     rhoA = beam.constant(lambda s: rho * s.area)
     if link.model.theory == "euler-bernoulli":
         # Of all piecewise cubics those whose slopes meet.
@@ -56,12 +56,12 @@ class _Forms:
 
     def functions(self, degree: int) -> tuple[ufl.Argument, ufl.Argument]:
         """Trial and test function, continuous and piecewise of a degree."""
-        space = lagrange_space(self._mesh, degree, vector=False)
+        space = function_space(self._mesh, degree)
         return ufl.TrialFunction(space), ufl.TestFunction(space)
 
     def constant(self, quantity: Property) -> fem.Function:
         """`quantity` of the section in each element."""
-        function = fem.Function(constant_space(self._mesh, ()))
+        function = fem.Function(function_space(self._mesh, 0))
         middle = function.function_space.tabulate_dof_coordinates()[:, 0]
         function.x.array[:] = cellwise(self._link, self._nodes, quantity)[np.searchsorted(self._nodes, middle) - 1]
         return function

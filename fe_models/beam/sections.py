@@ -15,11 +15,6 @@ from ..link_records.section import Section
 Property = Callable[[Section], float]
 
 
-def link_modulus(link: BeamLink) -> float:
-    """E in Pa."""
-    return link.material.youngs_modulus
-
-
 def shear_modulus(link: BeamLink) -> float:
     """G = E / (2 (1 + ν)) in Pa; the link file has been checked for ν where G is needed."""
     assert link.material.poissons_ratio is not None
@@ -28,7 +23,7 @@ def shear_modulus(link: BeamLink) -> float:
 
 def rod_properties(link: BeamLink, family: Family) -> tuple[Property, Property]:
     """Stiffness, EA in N or GJ in N·m², and mass or moment of inertia per length, of axial or torsional motion."""
-    E, rho = link_modulus(link), link.material.density
+    E, rho = link.material.youngs_modulus, link.material.density
     if family == "axial":
         return lambda s: E * s.area, lambda s: rho * s.area
     G = shear_modulus(link)

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 
 from ...common.arrays import Array, Integers, NDArray
 from ...common.structs import struct
-from ...mesh.compat import compiled_form, constant_space, geometry_degree, lagrange_space, node_map
+from ...mesh.compat import compiled_form, function_space, node_map
 from ..link_records.link import Material, OrthotropicMaterial
 from .constitutive import stiffness
 
@@ -161,7 +161,7 @@ def material_map(
 
 def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     """Spaces, mass matrix and stiffness form of a solid; `stiffness_matrix` then assembles."""
-    V, S = lagrange_space(mesh, order, vector=True), lagrange_space(mesh, order, vector=False)
+    V, S = function_space(mesh, order, (3,)), function_space(mesh, order)
     nodes = node_map(V)
     assert np.array_equal(nodes, node_map(S)), "scalar and vector space number their nodes alike"
     owned = V.dofmap.index_map.size_local
@@ -205,14 +205,14 @@ def stiffness_matrix(model: SolidModel, held: Sequence[Any] = ()) -> PETSc.Mat:
 
 def strain_degree(mesh: Mesh, order: int) -> int:
     """Degree of quadrature for products of two strains: exact on straight-sided cells."""
-    geometry = geometry_degree(mesh)
+    geometry = mesh.geometry.cmap.degree
     highest = order - 1 if _is_simplex(mesh) else order
     return 2 * highest + 2 * (geometry - 1)
 
 
 def mass_degree(mesh: Mesh, order: int) -> int:
     """Degree of quadrature for products of two displacements: exact, but for curved order beyond the second."""
-    geometry = geometry_degree(mesh)
+    geometry = mesh.geometry.cmap.degree
     return 2 * order + (3 * (geometry - 1) if _is_simplex(mesh) else 3 * geometry - 1)
 
 
@@ -240,7 +240,7 @@ def _stiffness_form(V: fem.FunctionSpace, materials: MaterialMap, degree: int) -
 
 def _cellwise(mesh: Mesh, values: Array, of_cell: Integers) -> fem.Function:
     """The function that is values[of_cell[c]] in cell c."""
-    function = fem.Function(constant_space(mesh, values.shape[1:]))
+    function = fem.Function(function_space(mesh, 0, values.shape[1:]))
     cells = node_map(function.function_space)[:, 0]
     function.x.array.reshape(-1, *values.shape[1:])[cells] = values[of_cell]
     return function

@@ -17,7 +17,7 @@ from dolfinx.mesh import meshtags
 
 from ...common.arrays import Array
 from ...common.structs import struct
-from ...mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
+from ...mesh.compat import compiled_form, function_space, lagrange_element, node_map
 from ...mesh.slices import section_quadratures
 from ..modal_body.parts import LEVI_CIVITA
 from .elasticity import SolidModel
@@ -70,7 +70,7 @@ def face_averages(model: SolidModel, facet_tags: object, tags: Sequence[int]) ->
 def section_averages(model: SolidModel, x: Array) -> Averages:
     """Mean motion of the cross sections at `x` (k,) in m; collective."""
     element, nodes = lagrange_element(model.V), node_map(model.V)
-    degree = model.order + geometry_degree(model.mesh)
+    degree = model.order + model.mesh.geometry.cmap.degree
     size = model.V.dofmap.index_map.size_local + model.V.dofmap.index_map.num_ghosts
     rows, moments, ranges, masses = [], [], [], []
     for section in section_quadratures(model.mesh, x, degree):
@@ -112,13 +112,13 @@ def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Arra
     facets = facet_tags.find(tag)  # type: ignore[attr-defined]
     # Tag 1 of a set of its own, so that one form serves all faces: its numbers are compiled into it.
     face = meshtags(mesh, 2, facets, np.ones(len(facets), dtype=np.int32))
-    degree = 2 * geometry_degree(mesh) + model.order
+    degree = 2 * mesh.geometry.cmap.degree + model.order
     ds = ufl.Measure("ds", domain=mesh, subdomain_data=face, metadata={"quadrature_degree": degree})(1)
     select = fem.Constant(mesh, np.zeros(4))
     other = fem.Constant(mesh, np.zeros(4))
     x = ufl.SpatialCoordinate(mesh)
     monomial, factor = (c[0] + sum(c[k + 1] * x[k] for k in range(3)) for c in (select, other))
-    load = compiled_form(monomial * ufl.TestFunction(lagrange_space(mesh, model.order, vector=False)) * ds)
+    load = compiled_form(monomial * ufl.TestFunction(function_space(mesh, model.order)) * ds)
     moment = compiled_form(monomial * factor * ds)
     weights, moments = [], np.zeros((4, 4))
     for row, unit in enumerate(np.eye(4)):

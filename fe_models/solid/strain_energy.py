@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ...common.arrays import Array
 from ...common.structs import struct
-from ...mesh.compat import coordinate_element, geometry_degree, geometry_nodes, lagrange_element, node_map
+from ...mesh.compat import coordinate_element, geometry_nodes, lagrange_element, node_map
 from .elasticity import SolidModel, strain_degree
 
 # Numbers that a chunk of gradients may have: 2 MB, with products of modes as large, which stay in the cache.
@@ -71,7 +71,7 @@ def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
     points = geometry_nodes(mesh)[: mesh.topology.index_map(3).size_local]
     nodes, values = node_map(model.V), fields.reshape(-1, 3 * k)
     # The Jacobian of a straight tetrahedron is the same everywhere.
-    straight = cell == basix.CellType.tetrahedron and geometry_degree(mesh) == 1
+    straight = cell == basix.CellType.tetrahedron and mesh.geometry.cmap.degree == 1
     maps = coordinate_element(mesh).tabulate(1, X[:1] if straight else X)[1:, :, :, 0]
     step = max(1, CHUNK // (9 * len(rule) * k))
     for start in range(0, len(points), step):

@@ -19,7 +19,7 @@ from ffrobot.fe_models.modal_body.unit_loads import unit_load_names, work_on_mod
 from ffrobot.fe_models.modal_body_file import read_modal_body
 from ffrobot.fe_models.solid.constitutive import stiffness
 from ffrobot.fe_models.solid.stress import point_stresses
-from ffrobot.mesh.compat import lagrange_space
+from ffrobot.mesh.compat import function_space
 from ffrobot.mesh.solid_mesh import solid_mesh
 
 E, NU, RHO, L, H, B = 2.0e11, 0.3, 7800.0, 0.4, 0.06, 0.02
@@ -59,7 +59,7 @@ def clamped(path):
     """Displacements (dofs, 2) of the bar, clamped at its root, under a force along y and a moment at its tip."""
     link = read_link(path)
     solid = solid_mesh(link.part(path))
-    space = lagrange_space(solid.mesh, 2, vector=True)
+    space = function_space(solid.mesh, 2, (3,))
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     mu, lambda_ = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
     sigma = 2 * mu * ufl.sym(ufl.grad(u)) + lambda_ * ufl.div(u) * ufl.Identity(3)

@@ -12,14 +12,14 @@ from petsc4py import PETSc
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.fe_models.solid.stress import locate, point_stresses, pulled_back, surface_stresses
 from ffrobot.fe_models.solid.surface_patches import outlined_patches
-from ffrobot.mesh.compat import create_solid_mesh, geometry_nodes, lagrange_space
+from ffrobot.mesh.compat import create_solid_mesh, function_space, geometry_nodes
 
 
 @pytest.mark.parametrize("cell", CELLS)
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_linear_displacements_strain_uniformly(cell, order):
     gradient = np.arange(1.0, 10.0).reshape(3, 3)
-    space = lagrange_space(box(cell, skew=0.2), order, vector=True)
+    space = function_space(box(cell, skew=0.2), order, (3,))
     modes = field(space, lambda x: gradient @ x)
     # A corner, an edge, inside, a face, and a node between cells.
     points = {"a": (0, H / 2, B / 2), "b": (0.4, H / 2, B / 2), "c": (0.31, 0.02, 0.01), "d": (L, 0.03, 0.02)}
@@ -35,7 +35,7 @@ def test_linear_displacements_strain_uniformly(cell, order):
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_pure_bending(cell):
-    space = lagrange_space(box(cell), 2, vector=True)
+    space = function_space(box(cell), 2, (3,))
     points = {"top": (0.5, H / 2, 0.0), "inside": (0.37, 0.03, -0.02), "end": (0.0, -H / 2, B / 2)}
     found = point_stresses(space, C, field(space, bending), points, PATH)
     for name, (_, y, _) in points.items():
@@ -44,7 +44,7 @@ def test_pure_bending(cell):
 
 def test_two_materials_and_their_border():
     """Softer by ten beyond x = ½: a strain common to both; the border takes the mean."""
-    space = lagrange_space(box("hexahedron"), 1, vector=True)
+    space = function_space(box("hexahedron"), 1, (3,))
     domain = space.mesh
     cells = domain.topology.index_map(3).size_local
     middles = domain.geometry.x[geometry_nodes(domain)].mean(axis=1)
@@ -58,7 +58,7 @@ def test_two_materials_and_their_border():
 
 
 def test_point_outside_the_part():
-    space = lagrange_space(box("tetrahedron"), 1, vector=True)
+    space = function_space(box("tetrahedron"), 1, (3,))
     modes = field(space, lambda x: x)
     with pytest.raises(
         InputError, match=r"link\.toml: stress\.points\.a: expected a point of the part, found .*, 0\.1 m"
@@ -78,7 +78,7 @@ def curved():
 
 
 def test_curved_cells_are_inverted(curved):
-    space = lagrange_space(curved, 2, vector=True)
+    space = function_space(curved, 2, (3,))
     x = field(space, lambda x: x).reshape(-1, 3)
     reference = np.random.default_rng(1).dirichlet(np.ones(4), size=50)[:, :3]
     values = space.sub(0).element.basix_element.tabulate(0, reference)[0, :, :, 0]
@@ -89,7 +89,7 @@ def test_curved_cells_are_inverted(curved):
 
 def test_point_next_to_a_curved_face(curved):
     """A point of the true face may be off that of the mesh: up to 2 % of a cell it counts, with the strain there."""
-    space = lagrange_space(curved, 2, vector=True)
+    space = function_space(curved, 2, (3,))
     modes = field(space, lambda x: x)
     inside = np.array([0.4, 0.4, 0.4])  # the middle of the bulging face lies at 0.377
     face = np.full(3, (-1 / 9 + 8 / 9 * 0.55) * 1.0)
@@ -104,7 +104,7 @@ def test_point_next_to_a_curved_face(curved):
 @pytest.mark.parametrize("cell", CELLS)
 def test_patch_in_pure_bending(cell, sides):
     """ε_xx = −y: ∫ over the upper patch is −H/2 times its area."""
-    space = lagrange_space(box(cell, (8, 2, 2)), 2, vector=True)
+    space = function_space(box(cell, (8, 2, 2)), 2, (3,))
     tags, faces, record = patch_tags(space.mesh)
     record = record.model_copy(update={"faces": sides})
     found = outlined_patches(space, tags, faces, record, L, field(space, bending), PATH)
@@ -118,7 +118,7 @@ def test_patch_in_pure_bending(cell, sides):
 
 
 def test_facets_that_do_not_follow_the_outline():
-    space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
+    space = function_space(box("tetrahedron", (8, 2, 2)), 1, (3,))
     tags, faces, record = patch_tags(space.mesh)
     longer = record.model_copy(update={"length": 0.26})
     with pytest.raises(
@@ -134,7 +134,7 @@ def test_patches_bend_a_cantilever_as_beam_theory(sides):
     Every degree of freedom serves as a mode, so that what `outlined_patches` returns is the load vector.
     """
     domain = box("hexahedron", (16, 2, 2))
-    space = lagrange_space(domain, 2, vector=True)
+    space = function_space(domain, 2, (3,))
     tags, faces, record = patch_tags(domain)
     size = space.dofmap.index_map.size_local * 3
     found = outlined_patches(space, tags, faces, record, L, np.eye(size), PATH)

@@ -10,13 +10,13 @@ import pytest
 from ffrobot.common.locks import held, is_running, this_process
 
 COMPILE = """
-from ffrobot.mesh.compat import MPI, compiled_form, lagrange_space
+from ffrobot.mesh.compat import MPI, compiled_form, function_space
 from ffrobot.mesh.form_cache import form_folder
 from dolfinx.mesh import create_unit_cube
 import ufl
 mesh = create_unit_cube(MPI.COMM_SELF, 1, 1, 1)
 {between}
-space = lagrange_space(mesh, 1, vector=False)
+space = function_space(mesh, 1)
 compiled_form(ufl.TestFunction(space) * ufl.TrialFunction(space) * ufl.dx)
 """
 KILLED = """
