@@ -10,7 +10,6 @@ from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..common.structs import struct
 from ..mbs._core import TimeFunction
-from ..mbs.analysis.samples import targets_of
 from ..mbs.joints.joint import MotorLimits
 from ..mbs.model.gears import rotor
 from ..mbs.model.known_motion import mass_matrices
@@ -146,7 +145,7 @@ def path_jump(motion: RobotMotion, analysis: Analysis, at: float) -> str:
         return ""
     h = INSTANT * end
     near = NEARBY * end * (round(at / end / NEARBY) + np.arange(-1.0, 2.0))
-    for target in (target for path in motion.model.scene.trajectory for target in targets_of(path)):
+    for target in (target for path in motion.model.scene.trajectory for _, target in path.targets):
 
         def acceleration(t: Array, target: TimeFunction = target) -> Array:
             return np.where(

@@ -279,10 +279,10 @@ def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple
         return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
     joints = make(0.0)
     for k in range(round(1 / FACTOR_STEP) + 1):
-        servo = joints.with_factor(max(0.0, 1.0 - k * FACTOR_STEP))
+        servo = replace(joints, factor=max(0.0, 1.0 - k * FACTOR_STEP))
         linear = linearise(servo, end, samples=2)
         if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
-            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), end)
+            return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), end)
     raise InputError(
         f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined", found zeros in'
         f" the right half plane even then: {describe_zeros(linear)}"
@@ -295,9 +295,9 @@ def _with_expected_deflections(servo: Servo, end: float) -> tuple[Servo, Lineari
     A function of time alone: it changes the output's target, not its zeros.
     """
     times = as_floats(np.linspace(0.0, end, SAMPLES))
-    sag = shape_along(servo.with_factor(1.0), times)
+    sag = shape_along(replace(servo, factor=1.0), times)
     offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
-    servo = servo.with_offset(tuple(offset))
+    servo = replace(servo, offset=tuple(offset))
     return servo, linearise(servo, end)
 
 

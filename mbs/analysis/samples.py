@@ -94,7 +94,7 @@ def stops(
     forces have to be looked at. `is_replay`: forces follow from paths that steps do not know, and end where these bend.
     """
     ends, paths, loads = times[[0, -1]], list(paths), list(loads)
-    targets = [target for path in paths for target in targets_of(path)]
+    targets = [target for path in paths for _, target in path.targets]
     duration, found = ends[1] - ends[0], [np.zeros(0)]
     for function in (*targets, *loads):
         found += [ends, _brief_parts(function, ends)]
@@ -155,7 +155,7 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
     `others`: loads, and whatever else is prescribed.
     """
     paths = list(paths)
-    functions = [*(target for path in paths for target in targets_of(path)), *others]
+    functions = [*(target for path in paths for _, target in path.targets), *others]
     found = _with_others(times, _even(times[[0, -1]]))
     of_paths = (path.path.breaks for path in paths if path.path is not None)
     of_pieces = (_brief_parts(function, times[[0, -1]]) for function in functions)
@@ -174,12 +174,6 @@ def _with_others(times: Array, others: Array) -> Array:
     at = np.clip(np.searchsorted(times, others), 1, max(len(times) - 1, 1))
     gap = np.minimum(np.abs(others - times[at - 1]), np.abs(others - times[np.minimum(at, len(times) - 1)]))
     return np.union1d(times, others[gap > SHORTEST * np.ptp(times)])
-
-
-def targets_of(path: Trajectory) -> tuple[TimeFunction, ...]:
-    """What a path prescribes: places, a coordinate, an orientation."""
-    law = path.orientation
-    return (*path.components.values(), *(() if law is None else law.functions))
 
 
 def _resolved(target: TimeFunction, times: Array, share: float = RESOLVED) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .._core import TimeFunction
-from ..analysis.samples import path_times, targets_of
+from ..analysis.samples import path_times
 from ..scene.analysis import TimedAnalysis
 from ..scene.trajectories import Trajectory
 
@@ -56,7 +56,7 @@ def _unseen(path: Trajectory, times: Array, analysis: TimedAnalysis) -> Iterator
     """The fastest of its components that moves faster between outputs than at any of them."""
     every = path_times(times, [path], analysis.end)
     between, seen = (some[(some >= 0.0) & (some <= analysis.end)] for some in (every, times))
-    for target in targets_of(path):
+    for _, target in path.targets:
         rate = np.abs(target.sample(between)[1])
         k = int(rate.argmax())
         if rate[k] > MISSED * (at_outputs := float(np.abs(target.sample(seen)[1]).max())):

@@ -59,7 +59,8 @@ class Servo:
     near: Array
     where: str  # scene and analysis, for messages
     goes_on: Callable[[], bool]  # is asked again and again whether to go on
-    offset: tuple[TimeFunction, ...] = ()  # one for each mode of all bodies, or none
+    # what is expected of deflections that the output leaves out: one for each mode of all bodies, or none
+    offset: tuple[TimeFunction, ...] = ()
 
     @cached_property
     def scale(self) -> Array:
@@ -90,14 +91,6 @@ class Servo:
         for path in self.model.scene.trajectory:
             for component, function in path.targets:
                 yield Target(path.name, component, function)
-
-    def with_factor(self, factor: float) -> Servo:
-        """The same with another factor."""
-        return replace(self, factor=factor)
-
-    def with_offset(self, offset: tuple[TimeFunction, ...]) -> Servo:
-        """The same with what is expected of the deflections that the output leaves out."""
-        return replace(self, offset=offset)
 
     def slowed(self, factor: float) -> Servo:
         """The same path in `factor` times the time, by quintic Hermite pieces of what it is."""
@@ -249,7 +242,7 @@ def make_servo(
     servo = Servo(held, end, factor, times, start[None], where, goes_on)
     modes = np.tile(np.concatenate([start[node.p_q] for node in model.tree.nodes]), (POSTURES, 1))
     rest = np.zeros_like(modes)
-    near: Array = servo.with_factor(1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q
+    near: Array = replace(servo, factor=1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q
     for k in np.flatnonzero(~np.isfinite(near).all(axis=1)):  # where rates have no limits, as in singular postures
         q = solve_posture(held, float(times[k]), near[k - 1] if k else start)
         if q is None:
