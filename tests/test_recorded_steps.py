@@ -1,4 +1,4 @@
-"""Forces of an inverse analysis between its outputs, by its recorded steps."""
+"""Forces of an inverse analysis between its outputs, by its steps made again."""
 
 import numpy as np
 import pytest

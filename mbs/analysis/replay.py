@@ -1,6 +1,7 @@
 """What an inverse analysis found, at any time of it, to act again in other runs.
 
-Splines interpolate those of recorded steps; prescribed motions are solved anew.
+Steps that were recorded are made again, stage by stage where another run has the same ones; prescribed motions are
+solved anew.
 """
 
 from __future__ import annotations
@@ -138,10 +139,7 @@ def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.
 
 
 def _found(run: Outcome, reader: Reader, system: MultibodySystem | None = None) -> _core.ForceSource:
-    """Read of the recorded steps of a run, as `system` was integrated (None: in 3D), or of its prescribed motion.
-
-    Forces of recorded steps are off by at most a hundredth of the tolerance, relative to their mean sizes.
-    """
+    """Read of the recorded steps of a run, as `system` was integrated (None: in 3D), or of its prescribed motion."""
     if run.recording is not None:
         of_run = driven_mechanism(run.model, has_motors=False) if system is None else integrated_mechanism(system)
         return _core.recorded_forces(of_run, run.recording, reader(of_run))

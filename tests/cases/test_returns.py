@@ -99,13 +99,12 @@ def departure(inverse, run):
 
 
 @pytest.mark.parametrize("apply", ["joints+pzt", "trajectory"])
-def test_with_the_steps_of_the_inverse_run_the_interpolation_of_forces_is_left(solution, apply):
-    """A hundredth of the tolerance."""
+def test_with_the_steps_of_the_inverse_run_round_off_is_all_that_is_left(solution, apply):
     inverse = inverse_of(solution.model, 1e-5, integrator="dop853", keep_steps=True)
     steps = Steps(Path(), "dop853", inverse.statistics.step_ends)
     back = replay_of(solution.model, inverse, apply, 1e-5, repeat_steps=steps)
     assert back.statistics.steps == inverse.statistics.steps > 100
-    assert departure(inverse, back) < 1e-7
+    assert departure(inverse, back) < 1e-12
 
 
 @pytest.mark.parametrize("apply", ["joints+pzt", "trajectory"])

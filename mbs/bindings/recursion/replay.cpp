@@ -73,8 +73,7 @@ Source recorded(const DrivenMechanism<Space> &driven, const Recording &recording
   const auto size = static_cast<std::size_t>(driven.mechanism.n_q + driven.mechanism.n_v);
   if (recording.times.size() < 2 || recording.states.size() != size * recording.times.size())
     throw nb::value_error("recording: expected one of this mechanism, with a step");
-  const nb::gil_scoped_release unlocked;
-  return recorded_forces<Space>(driven.mechanism, driven.scene, recording, std::move(reader));
+  return std::make_shared<RecordedForces<Space>>(driven.mechanism, driven.scene, recording, std::move(reader));
 }
 
 template <class Space>
@@ -95,7 +94,8 @@ template <class Space> void bind_found_forces(nb::module_ &m, const std::string 
         "they\nreach by those on the modes, allocation).");
   m.def("path_reader", &paths_of<Space>, "driven"_a, "axes"_a, "parts"_a, "count"_a, nb::keep_alive<0, 1>(),
         "Forces of constraint equations (number, column, sign): see mbs/core/analysis/found_forces.h.");
-  m.def("recorded_forces", &recorded<Space>, "driven"_a, "recording"_a, "reader"_a, "Read of a recorded run: splines.");
+  m.def("recorded_forces", &recorded<Space>, "driven"_a, "recording"_a, "reader"_a, nb::keep_alive<0, 1>(),
+        nb::keep_alive<0, 2>(), nb::keep_alive<0, 3>(), "Read of a recorded run.");
   m.def("prescribed_forces", &prescribed<Space>, "motion"_a, "shape"_a, "q"_a, "reader"_a, nb::keep_alive<0, 1>(),
         nb::keep_alive<0, 4>(), "Read of a prescribed motion; shape: p(t) by body; q (n_q): near the first posture.");
 }

@@ -12,27 +12,42 @@
 
 namespace ffrobot {
 
+class TimedSource {
+public:
+  virtual ~TimedSource() = default;
+
+  // What the source has found is that of time t afterwards. Costs nothing where it is already: stages of a step and
+  // outputs meet.
+  void evaluate(double t) {
+    if (t != time_)
+      time_ = find(t) ? t : nowhere;
+  }
+
+  // As OdeSystem has them: the next times will be the stages of a step, and where one had best end.
+  void set_stage_times(const double *times, int count) {
+    time_ = nowhere;
+    prepare(times, count);
+  }
+  virtual double end_of_step(double t, double h) { return t + h; }
+
+protected:
+  // False where it is of a stage of a step, not of time t at any other moment.
+  virtual bool find(double t) = 0;
+  virtual void prepare(const double *, int) {}
+
+private:
+  static constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+  double time_ = nowhere;
+};
+
 // Forces and voltages, number by number.
-class ForceSource {
+class ForceSource : public TimedSource {
 public:
   explicit ForceSource(Eigen::Index count) : values_(Eigen::VectorXd::Zero(count)) {}
-  virtual ~ForceSource() = default;
-
-  // Costs nothing where t is that of the call before: stages of a step and outputs meet.
-  void evaluate(double t) {
-    if (t == time_)
-      return;
-    find(t);
-    time_ = t;
-  }
   const Eigen::VectorXd &values() const { return values_; } // (count) of the last evaluate()
 
 protected:
-  virtual void find(double t) = 0;
   Eigen::VectorXd values_; // filled by find()
-
-private:
-  double time_ = std::numeric_limits<double>::quiet_NaN();
 };
 
 class ForcesOfTime final : public ForceSource {
@@ -41,26 +56,31 @@ public:
       : ForceSource(static_cast<Eigen::Index>(functions.size())), functions_(std::move(functions)) {}
 
 private:
-  void find(double t) override {
+  bool find(double t) override {
     for (std::size_t i = 0; i < functions_.size(); ++i)
       values_[static_cast<Eigen::Index>(i)] = functions_[i](t).value;
+    return true;
   }
 
   std::vector<TimeFunction> functions_;
 };
 
-// The numbers of one source, then those of another.
+// The numbers of one source, then those of another, which says nothing about steps.
 class ForcesOfBoth final : public ForceSource {
 public:
   ForcesOfBoth(std::shared_ptr<ForceSource> first, std::shared_ptr<ForceSource> second)
       : ForceSource(first->values().size() + second->values().size()), first_(std::move(first)),
         second_(std::move(second)) {}
 
+  double end_of_step(double t, double h) override { return first_->end_of_step(t, h); }
+
 private:
-  void find(double t) override {
+  bool find(double t) override {
     first_->evaluate(t), second_->evaluate(t);
     values_ << first_->values(), second_->values();
+    return false; // they know themselves where they are
   }
+  void prepare(const double *times, int count) override { first_->set_stage_times(times, count); }
 
   std::shared_ptr<ForceSource> first_, second_;
 };

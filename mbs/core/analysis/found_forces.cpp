@@ -1,7 +1,5 @@
 #include "core/analysis/found_forces.h"
 
-#include "core/analysis/spline_forces.h"
-#include "core/integrate/recorded_motion.h"
 #include "core/linear/products.h"
 #include "core/linear/small_product.h"
 #include "core/recursion/constrained_aba/once.h"
@@ -14,36 +12,35 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 template <class Space>
-std::shared_ptr<ForceSource> recorded_forces(const Mechanism<Space> &mechanism, const Scene &scene,
-                                             const Recording &recording, std::shared_ptr<ForceReader<Space>> reader) {
-  constexpr double share = 0.01, least = 1e-10; // of the tolerance; more than rounding
-  const std::vector<double> &times = recording.times;
-  RecursiveMotion<Space> motion(mechanism, scene, times.front(), recording.states.data(),
-                                recording.states.data() + mechanism.n_q);
-  motion.plan(times.back() - times.front());
-  RecordedMotion recorded(motion, recording);
-  const auto read = [&](double t, double *to) { reader->read(recorded.state(t), motion.workspace(), nullptr, to); };
-  return std::make_shared<SplineForces>(times, reader->smooth_count(), read,
-                                        std::max(share * recording.tolerance, least), reader->count(),
-                                        [reader](const double *smooth, double *to) { reader->limit(smooth, to); });
+RecordedForces<Space>::RecordedForces(const Mechanism<Space> &mechanism, const Scene &scene, const Recording &recording,
+                                      std::shared_ptr<ForceReader<Space>> reader)
+    : ForceSource(reader->count()), motion_(mechanism, scene, recording.times.front(), recording.states.data(),
+                                            recording.states.data() + mechanism.n_q),
+      recorded_(motion_, recording), reader_(std::move(reader)) {
+  motion_.plan(recording.times.back() - recording.times.front());
+}
+
+template <class Space> bool RecordedForces<Space>::find(double t) {
+  const double *q = recorded_.state(t);
+  reader_->read(q, motion_.workspace(), nullptr, values_.data());
+  return !recorded_.is_at_stage();
 }
 
 template <class Space>
 PrescribedForces<Space>::PrescribedForces(PrescribedMotion<Space> &motion, std::vector<ModalShape> shape,
                                           const VectorXd &q, std::shared_ptr<ForceReader<Space>> reader)
     : ForceSource(reader->count()), motion_(motion), shape_(std::move(shape)),
-      holding_(VectorXd::Zero(motion.driven().mechanism.n_v)), read_(reader->smooth_count()),
-      reader_(std::move(reader)) {
+      holding_(VectorXd::Zero(motion.driven().mechanism.n_v)), reader_(std::move(reader)) {
   motion_.start_at(q);
 }
 
-template <class Space> void PrescribedForces<Space>::find(double t) {
+template <class Space> bool PrescribedForces<Space>::find(double t) {
   // was found at all output times before; a failure in between shows as a step that is refused
   if (motion_.move(t, modes_at(shape_, t)))
     motion_.balance();
   holding_(motion_.driven().of_modes) = motion_.shape_force();
-  reader_->read(motion_.q(), motion_.workspace(), &holding_, read_.data());
-  reader_->limit(read_.data(), values_.data());
+  reader_->read(motion_.q(), motion_.workspace(), &holding_, values_.data());
+  return true;
 }
 
 template <class Space>
@@ -57,34 +54,20 @@ template <class Space> Index ActuatorReader<Space>::count() const {
   return found;
 }
 
-template <class Space> Index ActuatorReader<Space>::smooth_count() const {
-  Index found = limit_.size();
-  for (const LinkPatches &of_link : patches_)
-    found += of_link.reached.rows();
-  return found;
-}
-
 template <class Space>
 void ActuatorReader<Space>::read(const double *q, const Workspace<Space, double> &w, const VectorXd *shape,
                                  double *to) {
   motors_.resolve(q, w.lambda.data(), w);
-  to = std::copy_n(motors_.tau().data(), limit_.size(), to);
+  for (Index k = 0; k < limit_.size(); ++k)
+    *to++ = std::clamp(motors_.tau()[k], -limit_[k], limit_[k]);
   modal_ = motors_.left();
   if (shape)
     modal_ += *shape;
-  for (const auto &[first, reached, allocation] : patches_) {
-    multiply_small(reached, modal_.data() + first, to);
-    to += reached.rows();
-  }
-}
-
-template <class Space> void ActuatorReader<Space>::limit(const double *smooth, double *to) {
-  for (Index k = 0; k < limit_.size(); ++k)
-    *to++ = std::clamp(*smooth++, -limit_[k], limit_[k]);
   for (auto &[first, reached, allocation] : patches_) {
-    const VectorXd &V = allocation.solve(Eigen::Map<const VectorXd>(smooth, reached.rows()));
+    reached_.resize(reached.rows());
+    multiply_small(reached, modal_.data() + first, reached_.data());
+    const VectorXd &V = allocation.solve(reached_);
     to = std::copy_n(V.data(), V.size(), to);
-    smooth += reached.rows();
   }
 }
 
@@ -151,10 +134,8 @@ void PointReader::read(const double *q, const Workspace<Spatial, double> &w, con
   }
 }
 
-template std::shared_ptr<ForceSource> recorded_forces(const Mechanism<Planar> &, const Scene &, const Recording &,
-                                                      std::shared_ptr<ForceReader<Planar>>);
-template std::shared_ptr<ForceSource> recorded_forces(const Mechanism<Spatial> &, const Scene &, const Recording &,
-                                                      std::shared_ptr<ForceReader<Spatial>>);
+template class RecordedForces<Planar>;
+template class RecordedForces<Spatial>;
 template class PrescribedForces<Planar>;
 template class PrescribedForces<Spatial>;
 template class ActuatorReader<Planar>;

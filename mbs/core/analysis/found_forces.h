@@ -1,13 +1,12 @@
-// Forces that an inverse analysis found, at any time of it: of a recorded run splines, of a prescribed motion solved
-// anew.
+// Forces that an inverse analysis found, at any time of it: of a recorded run stage by stage for another one with the
+// same steps, of a prescribed motion solved anew.
 #pragma once
 
 #include "core/analysis/allocation.h"
 #include "core/analysis/force_source.h"
-#include "core/integrate/integrate.h"
+#include "core/integrate/recorded_motion.h"
 #include "core/recursion/inverse/prescribed_motion.h"
 
-#include <algorithm>
 #include <memory>
 
 namespace ffrobot::recursion {
@@ -17,19 +16,27 @@ template <class Space> class ForceReader {
 public:
   virtual ~ForceReader() = default;
   virtual Eigen::Index count() const = 0;
-  // Of q (n_q), with the kinematics and multipliers of w: writes (smooth_count) numbers. `shape` (n_v): forces that
-  // hold prescribed modes, zero along joints; null: none.
+  // Of q (n_q), with the kinematics and multipliers of w: writes (count) numbers. `shape` (n_v): forces that hold
+  // prescribed modes, zero along joints; null: none.
   virtual void read(const double *q, const Workspace<Space, double> &w, const Eigen::VectorXd *shape, double *to) = 0;
-
-  // What limits make of these, in which they have kinks: (count).
-  virtual Eigen::Index smooth_count() const { return count(); }
-  virtual void limit(const double *smooth, double *to) { std::copy_n(smooth, count(), to); }
 };
 
-// Of a recorded run, at any time of it: off by no more than a hundredth of the tolerance of that.
-template <class Space>
-std::shared_ptr<ForceSource> recorded_forces(const Mechanism<Space> &mechanism, const Scene &scene,
-                                             const Recording &recording, std::shared_ptr<ForceReader<Space>> reader);
+// The recorded run made again. Mechanism, scene and recording must outlive this.
+template <class Space> class RecordedForces final : public ForceSource {
+public:
+  RecordedForces(const Mechanism<Space> &mechanism, const Scene &scene, const Recording &recording,
+                 std::shared_ptr<ForceReader<Space>> reader);
+
+  double end_of_step(double t, double h) override { return recorded_.end_of_step(t, h); }
+
+private:
+  bool find(double t) override;
+  void prepare(const double *times, int count) override { recorded_.set_stage_times(times, count); }
+
+  RecursiveMotion<Space> motion_;
+  RecordedMotion recorded_;
+  std::shared_ptr<ForceReader<Space>> reader_;
+};
 
 // The motion, which must outlive this, is solved anew at every time, first from the posture q (n_q).
 template <class Space> class PrescribedForces final : public ForceSource {
@@ -38,11 +45,11 @@ public:
                    std::shared_ptr<ForceReader<Space>> reader);
 
 private:
-  void find(double t) override;
+  bool find(double t) override;
 
   PrescribedMotion<Space> &motion_;
   std::vector<ModalShape> shape_;
-  Eigen::VectorXd holding_, read_; // (n_v), (smooth_count)
+  Eigen::VectorXd holding_; // (n_v)
   std::shared_ptr<ForceReader<Space>> reader_;
 };
 
@@ -60,16 +67,14 @@ public:
   ActuatorReader(DrivenMechanism<Space> driven, Eigen::VectorXd limit, std::vector<LinkPatches> patches);
 
   Eigen::Index count() const override;
-  Eigen::Index smooth_count() const override;
   void read(const double *q, const Workspace<Space, double> &w, const Eigen::VectorXd *shape, double *to) override;
-  void limit(const double *smooth, double *to) override;
 
 private:
   DrivenMechanism<Space> driven_;
   Motors<Space> motors_;
   Eigen::VectorXd limit_;
   std::vector<LinkPatches> patches_;
-  Eigen::VectorXd modal_; // (n_v) for patches
+  Eigen::VectorXd modal_, reached_; // (n_v) for patches; what those of a link reach of it
 };
 
 // Forces -lambda of constraint equations: along joint coordinates as they are, and of others the force and the moment

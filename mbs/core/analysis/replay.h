@@ -27,6 +27,8 @@ public:
     for (const auto &[number, entry, share] : at_points_)
       wrench[entry] += share * source_->values()[number];
   }
+  void set_stage_times(const double *times, int count) override { source_->set_stage_times(times, count); }
+  double end_of_step(double t, double h) override { return source_->end_of_step(t, h); }
 
   const ForceSource &source() const { return *source_; }
   const ZeroOrderHold &along() const { return along_; }

@@ -45,6 +45,11 @@ bool Dop853::step(double t, const double *y, double h, double) {
   return true;
 }
 
+const double *Dop853::stage(int i, double t, const double *y, double h) {
+  run_stage<Tableau, Tableau::stages - 1>(i + 1, system_, stage_time(i, t, h), y, h, K_, stage_);
+  return stage_.data();
+}
+
 // A coordinate and its rate have one factor, and every pair its own: large slow motion, whose estimate of order 5 is
 // far below that of order 3, would bring the error of fast vibration down as well.
 void Dop853::estimate(double h, Eigen::VectorXd &error) {

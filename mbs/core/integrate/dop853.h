@@ -14,6 +14,9 @@ public:
   explicit Dop853(OdeSystem &system);
 
   bool step(double t, const double *y, double h, double tolerance) override;
+  int stages() const override { return Dop853Tableau::stages - 1; }
+  double stage_time(int i, double t, double h) const override { return t + Dop853Tableau::c[i + 1] * h; }
+  const double *stage(int i, double t, const double *y, double h) override;
   bool finish(double t) override { return system_.finish(t, end_.data(), last_slope()); }
 
   // Estimate of order 5, times a factor that the estimate of order 3 brings it down by: together they shrink as h^8.

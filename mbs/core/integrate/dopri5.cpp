@@ -17,6 +17,11 @@ bool Dopri5::step(double t, const double *y, double h, double) {
   return true;
 }
 
+const double *Dopri5::stage(int i, double t, const double *y, double h) {
+  run_stage<Tableau, Tableau::stages - 1>(i + 1, system_, stage_time(i, t, h), y, h, K_, stage_);
+  return stage_.data();
+}
+
 void Dopri5::estimate(double h, Eigen::VectorXd &error) {
   for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
     const Combination<Tableau::e, Tableau::stages + 1, T, 1> of(K_.data(), n_, i);

@@ -14,6 +14,9 @@ public:
   explicit Dopri5(OdeSystem &system);
 
   bool step(double t, const double *y, double h, double tolerance) override;
+  int stages() const override { return Dopri5Tableau::stages - 1; }
+  double stage_time(int i, double t, double h) const override { return t + Dopri5Tableau::c[i + 1] * h; }
+  const double *stage(int i, double t, const double *y, double h) override;
   bool finish(double t) override { return system_.finish(t, end_.data(), last_slope()); }
   void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 5; }

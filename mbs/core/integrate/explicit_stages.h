@@ -75,6 +75,15 @@ void run_stage(OdeSystem &system, double t, const double *y, double h, Eigen::Ma
   system.slope(t, stage.data(), K.col(Stage).data());
 }
 
+// The same where the number is known only now, from 1 on.
+template <class Tableau, int Last>
+void run_stage(int number, OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K,
+               Eigen::VectorXd &stage) {
+  [&]<int... i>(std::integer_sequence<int, i...>) {
+    ((number == i + 1 ? run_stage<Tableau, i + 1>(system, t, y, h, K, stage) : void()), ...);
+  }(std::make_integer_sequence<int, Last>());
+}
+
 // Slopes First … Last of the tableau (nodes c)
 template <class Tableau, int First, int Last>
 void run_stages(OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K, Eigen::VectorXd &stage) {

@@ -221,7 +221,10 @@ private:
     const double fastest = system_.local().fastest_rotation(z_.data() + system_.n_v());
     const double step = std::min(step_limit_.of(t_, wanted), most_turn / fastest);
     const bool is_limited = step < wanted;
-    return {target, step, step == target - t_ ? target : t_ + step, is_limited};
+    if (step == target - t_)
+      return {target, step, target, is_limited};
+    const double end = lands || is_limited ? t_ + step : std::min(system_.end_of_step(t_, step), target);
+    return {target, end == t_ + step ? step : end - t_, end, is_limited};
   }
 
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.

@@ -19,6 +19,12 @@ public:
   // `tolerance` bounds what iterations may leave. False where the equations of the step could not be solved.
   virtual bool step(double t, const double *y, double h, double tolerance) = 0;
 
+  // Explicit methods: the stages of such a step after its first slope, of which a step has `stages`, one by one.
+  // Returns the state of number i.
+  virtual int stages() const { return 0; }
+  virtual double stage_time(int, double t, double) const { return t; }
+  virtual const double *stage(int, double, const double *, double) { return nullptr; }
+
   // Moves end() back onto the invariants, and finds last_slope() there; false where that fails.
   virtual bool finish(double t) = 0;
 

@@ -28,6 +28,9 @@ public:
   // The next slopes will be at these times (count): what depends on time alone can be found for all at once.
   virtual void set_stage_times([[maybe_unused]] const double *times, [[maybe_unused]] int count) {}
 
+  // Where a step from t on that could be of length h had best end: what acts may cost less at times that it knows.
+  virtual double end_of_step(double t, double h) { return t + h; }
+
   // Moves z back onto the system's invariants after a step; false where that fails (the step is then rejected).
   virtual bool correct(double t, double *z) = 0;
 

@@ -64,6 +64,11 @@ template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
   }
 }
 
+template <class Space> void RecursiveMotion<Space>::set_stage_times(const double *times, int count) {
+  laws_.set_stage_times(times, count);
+  forces_.set_stage_times(times, count);
+}
+
 template <class Space>
 [[gnu::always_inline]] inline void RecursiveMotion<Space>::evaluate_here(double t, const double *q, const double *v,
                                                                          double *a) {

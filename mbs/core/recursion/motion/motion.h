@@ -34,7 +34,8 @@ public:
   void judge(MotorForces<Space> &motors); // their errors, too; must outlive this
 
   void slope(double t, const double *z, double *z_dot) override;
-  void set_stage_times(const double *times, int count) override { laws_.set_stage_times(times, count); }
+  void set_stage_times(const double *times, int count) override;
+  double end_of_step(double t, double h) override { return forces_.end_of_step(t, h); }
   bool correct(double t, double *z) override;
   bool finish(double t, double *z, double *z_dot) override;
   double error_size(double t, const double *z, const double *e) override;

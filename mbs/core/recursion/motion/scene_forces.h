@@ -13,6 +13,8 @@ public:
   // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim); q (n_q) says where
   // directions are that modes turn.
   virtual void add(double t, const double *q, double *force, double *wrench) = 0;
+  virtual void set_stage_times(const double *, int) {} // as OdeSystem has it
+  virtual double end_of_step(double t, double h) { return t + h; }
 };
 
 // Mechanism, scene and what acts beside it must outlive this; `held`, which may change between steps, and `external`
@@ -32,6 +34,12 @@ public:
   Acting at(double t, const double *q, const double *v, Workspace<Space, double> &w);
 
   const double *generalized() const { return has_generalized_ ? generalized_.data() : nullptr; } // of the last at()
+
+  void set_stage_times(const double *times, int count) {
+    if (external_)
+      external_->set_stage_times(times, count);
+  }
+  double end_of_step(double t, double h) { return external_ ? external_->end_of_step(t, h) : t + h; }
 
 private:
   void add_along_coordinates(double t, const double *q, const double *v);
