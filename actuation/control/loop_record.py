@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.peaks import largest
 from ...common.structs import struct
 from ...mbs.analysis.outcome import Details
 from ...mbs.analysis.samples import in_order
@@ -32,8 +33,9 @@ class LoopRecord(Details):
     reference: Array  # (K, outputs) what they would be on the reference motion
     commands: Array  # (K, inputs) within limits
     wanted: Array  # before
-    tip_error: Array
-    metrics: Metrics  # how well it went; `tip_error` (T,) m at the outputs of the run
+    tip_error: Array  # (T,) m at the outputs of the run
+    tip_error_peak_time: float  # s, of the largest at all times
+    metrics: Metrics  # how well it went
     warnings: tuple[str, ...]  # one line each
     margins: Margins | None = None  # by the linear model, of loops of joint PID controllers alone; else None
     advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
@@ -96,7 +98,8 @@ def loop_record(
     warnings = tuple(_warnings(analysis, acting, metrics, gears))
     record = LoopRecord(
         setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
-        loop.commands[taken], loop.wanted[taken], tip_error, metrics, warnings,
+        loop.commands[taken], loop.wanted[taken], tip_error,
+        largest(run.time, np.linalg.norm(run.error, axis=1))[1], metrics, warnings,
     )  # fmt: skip
     return _judged(record, analysis, models)
 

@@ -167,18 +167,18 @@ def save_models(models: Sequence[LinearModel], path: Path) -> None:
 
 def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> None:
     """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
-    group["tip_error"] = record.tip_error
+    found, error = record.metrics, group.create_dataset("tip_error", data=record.tip_error)
+    error.attrs.update(peak=found.tip_error_max, peak_time=record.tip_error_peak_time, rms=found.tip_error_rms)
     group = group.create_group("control")
     for key in ("time", "readings", "reference", "commands", "wanted"):
         group[key] = getattr(record, key)
     group.attrs["inputs"] = list(record.inputs)
     group.attrs["outputs"] = list(record.outputs)
     group.attrs["warnings"] = list(record.warnings)
-    group.attrs.update(vars(record.metrics))
+    group.attrs.update(vars(found))
     group.attrs["advice"] = list(record.advice)
-    if record.margins is not None:
-        found = record.margins
-        group.attrs.update(spectral_radius=found.radius, gain_margin=found.gain, delay_margin=found.delay)
+    if (margins := record.margins) is not None:
+        group.attrs.update(spectral_radius=margins.radius, gain_margin=margins.gain, delay_margin=margins.delay)
 
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:

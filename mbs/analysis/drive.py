@@ -28,12 +28,13 @@ from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_s
 from ..solve.reach import out_of_reach
 from ..solve.start import rank_of_redundant_loops
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .samples import about_highest, in_order, new_samples, reached_samples, some_of, stops
+from .samples import LOOKED_AT, about_highest, in_order, new_samples, reached_samples, some_of, stops
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
 
 POSTURES = 2001  # outputs whose postures are looked at where the core does not watch them
+INSTANT = 1e-9  # s, before and after which commands are read where they change: see `Control.held`
 
 STATUS = {
     _core.IntegrationStatus.completed: "completed",
@@ -180,6 +181,9 @@ def _between(
     `ends` of steps, s, are among what is looked at.
     """
     core, scene, _ = system.integrated
+    if control is not None:
+        times, states, both = _with_both_sides(times, states, control.times + control.delay)
+        ends = np.append(ends, both)
 
     def at(rows: Indices) -> _core.TreeRun:
         chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
@@ -196,6 +200,20 @@ def _between(
         motion = motion.with_rows_of(_motion(system, others, times[more]), order)
         replayed = np.concatenate([replayed, others.replayed])[order]
     return replace(found, motion=motion), replayed
+
+
+def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array, Array, Array]:
+    """Times (k,), s, and states (k, n), with the instants before commands change, at `changes` (m,), s, beside these.
+
+    And those on both sides of changes, by which means over time are, where they are not too many.
+    """
+    near = np.clip(np.searchsorted(times, changes - INSTANT), 0, len(times) - 1)
+    near = near[np.abs(times[near] - changes) < INSTANT]
+    before = times[near] - 2.0 * INSTANT
+    every = np.append(times, before)
+    order = np.argsort(every, kind="stable")
+    both = np.append(before, times[near]) if len(near) < LOOKED_AT else before[:0]
+    return every[order], np.concatenate([states, states[near]])[order], both
 
 
 def _motion(system: MultibodySystem, run: _core.TreeRun, times: Array) -> Motion:

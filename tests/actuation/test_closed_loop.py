@@ -8,6 +8,7 @@ import pytest
 from beam_links import paper_link
 from scipy.linalg import expm, solve_discrete_are
 
+import ffrobot
 from ffrobot.actuation.context import ActuatedContext
 from ffrobot.actuation.control.linear_model import sampled
 from ffrobot.actuation.control.lqr import gains
@@ -141,6 +142,29 @@ def test_brief_disturbances_are_felt(lasts):
     push = [{"point": "w.rim", "y": f"where(t < 0.2031, 0, where(t < {0.2031 + lasts!r}, 5, 0))"}]
     run = solve_scene(wheel(loop(disturbance=push, feed_forward="none", tip="w.rim"))).outcomes["loop"]
     assert run.v[-1, 0] == pytest.approx(0.3 * 5.0 * lasts / INERTIA, rel=1e-6)
+
+
+@pytest.mark.parametrize(("delay", "step"), [(0.0, T), (0.004, 0.1), (2.5 * T, 0.1)])
+def test_means_are_those_of_commands_that_are_held(delay, step):
+    """RMS and work of a motor, ∫ τ γ̇ by ∫ τ dγ with constant τ from change to change, by sampled commands alone."""
+    held = {"controller": [PID | {"integral": {"O": 30.0}}], "delay": delay, "feed_forward": "none"}
+    held |= {"disturbance": blow(until=0.1), "sensor": [{"joint": "O", "resolution": 2e-3}]}
+    with ffrobot.solve(wheel(loop(output_step=step, **held))) as results:
+        moment, joint, error, seen = (
+            results.attributes(f"loop/{name}") for name in ("joints/O/moment", "joints/O", "tip_error", "control")
+        )
+        commands = results["loop/control/commands"][:, 0]
+        changes = np.minimum(np.append(results["loop/control/time"] + delay, 0.5), 0.5)
+    lasts = np.diff(changes) / 0.5
+    assert np.ptp(commands) > 0.1
+    assert moment["rms"] == pytest.approx(np.sqrt(commands**2 @ lasts), rel=1e-6)
+    assert moment["mean"] == pytest.approx(commands @ lasts, rel=1e-6, abs=1e-9)
+    with ffrobot.solve(wheel(loop(output_step=1e-4, **held))) as fine:
+        gamma = np.interp(changes, fine.time("loop"), fine["loop/joints/O/coordinate"])
+        distance = fine["loop/tip_error"]
+    assert joint["mean_power"] == pytest.approx(commands @ np.diff(gamma) / 0.5, rel=1e-3)
+    assert (error["peak"], error["rms"]) == (seen["tip_error_max"], seen["tip_error_rms"])
+    assert error["peak"] == pytest.approx(distance.max(), rel=1e-5)
 
 
 def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
