@@ -20,6 +20,8 @@ VOLTAGE = "pzt/*/voltage"
 
 POWER = "peak_power"
 """Attribute of a joint with one coordinate: the largest power of its motor, W."""
+MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
+"""Attributes of a joint: of the power of its motor, summed over its coordinates, W."""
 
 
 def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
@@ -65,14 +67,17 @@ def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator
 
 
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:
-    """The largest of all columns, or of one, and when it is, s; of files without peaks that of the outputs."""
-    if "peak" not in dataset.attrs:
-        values = np.abs(dataset[()].reshape(len(time), -1))
-        if column is not None:
-            return largest(time, values[:, column])
-        sizes = np.linalg.norm(values, axis=1) if _is_vector(dataset.name.split("/", 2)[2]) else values.max(axis=1)
-        return largest(time, sizes)
-    peaks, times = np.atleast_1d(dataset.attrs["peak"]), np.atleast_1d(dataset.attrs["peak_time"])
+    """The largest of all columns, or of one, and when it is, s; by outputs where the file does not know it.
+
+    That is so of a component of a vector, whose length has a peak, and of files without peaks.
+    """
+    values = dataset[()].reshape(len(time), -1)
+    peaks, times = (np.atleast_1d(dataset.attrs.get(key, ())) for key in ("peak", "peak_time"))
+    if column is not None and len(peaks) < values.shape[1]:
+        return largest(time, values[:, column])
+    if not len(peaks):
+        is_vector = _is_vector(dataset.name.split("/", 2)[2])
+        return largest(time, np.linalg.norm(values, axis=1) if is_vector else np.abs(values).max(axis=1))
     k = int(peaks.argmax()) if column is None else column
     return float(peaks[k]), float(times[k])
 
@@ -80,8 +85,9 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
 def write_peaks(group: h5py.Group, time: Array, found: Mapping[str, Array], outputs: Indices) -> None:
     """To an analysis histories `found` at `time` (T,), s: those of them that are outputs, and peaks of all.
 
-    Attributes `peak`, `peak_time`, `rms` are of every column, of vectors of the length.
+    Attributes `peak`, `peak_time`, `rms`, `mean` are of every column, of vectors of the length.
     """
+    weights = shares(time)
     for name, values in found.items():
         dataset = group.create_dataset(name, data=values[outputs])
         if len(time):
@@ -91,14 +97,17 @@ def write_peaks(group: h5py.Group, time: Array, found: Mapping[str, Array], outp
             if matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
                 limit = dataset.parent.attrs.get("limit", np.inf)
                 tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(columns).max(axis=0), limit))
-            means = np.sqrt(shares(time) @ columns**2)
-            for key, sizes in (("peak", tops[:, 0]), ("peak_time", tops[:, 1]), ("rms", means)):
+            means = {"rms": np.sqrt(weights @ columns**2), "mean": weights @ columns}
+            for key, sizes in ({"peak": tops[:, 0], "peak_time": tops[:, 1]} | means).items():
                 dataset.attrs[key] = sizes[0] if len(sizes) == 1 else sizes
     for name, joint in group.get("joints", {}).items():
         of = f"joints/{name}/"
         moment, rate = found.get(of + "moment"), found.get(of + "motor_rate", found.get(of + "rate"))
-        if moment is not None and rate is not None and rate.ndim == 1 and len(time):
-            joint.attrs[POWER] = largest(time, moment * rate)[0]
+        if moment is not None and rate is not None and len(time):
+            power = (moment * rate).reshape(len(time), -1).sum(axis=1)
+            joint.attrs[MEAN_POWER], joint.attrs[RMS_POWER] = weights @ power, np.sqrt(weights @ power**2)
+            if rate.ndim == 1:
+                joint.attrs[POWER] = largest(time, power)[0]
 
 
 def _is_vector(name: str) -> bool:

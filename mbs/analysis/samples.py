@@ -6,7 +6,7 @@ where steps are long. A prescribed motion is known at any time: it is looked at 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -30,6 +30,7 @@ SHORTEST = 1e-9  # of a run, between two times
 SAME = 1e-13  # of the latest time, by which equal ones differ at most
 BRIEF, FAR = 0.01, 20.0  # of a run; times the longest way of a piece in the time of the run: see `stops`
 PARTS = 16  # of such a piece
+DENSE, HUMP, FEW = 8, 0.02, 0.1  # times within an interval, of the range, of the intervals: see `_humps`
 
 
 def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | None:
@@ -98,6 +99,7 @@ def stops(
     duration, found = ends[1] - ends[0], [np.zeros(0)]
     for function in (*targets, *loads):
         found += [ends, _brief_parts(function, ends)]
+    found += [_humps(function, ends) for function in (*_formulas(paths), *loads)]
     for path in paths:
         if path.path is not None and duration > 0.0:
             breaks = path.path.breaks
@@ -128,6 +130,26 @@ def _brief_parts(function: TimeFunction, ends: Array) -> Array:
     return np.union1d(pieces, _parts(pieces, np.diff(pieces) < BRIEF * np.ptp(ends)))
 
 
+def _humps(function: TimeFunction, ends: Array) -> Array:
+    """Times (n,) s about places where a function comes and goes between two `_even` times; none where it does all over.
+
+    Of times that are `DENSE` times as close those in such intervals and in the ones next to them. Jumps are left out:
+    steps find them, and end at those that conditions tell.
+    """
+    times = np.linspace(ends[0], ends[1], FEWEST * DENSE + 1)
+    values = np.nan_to_num(function.sample(times)[0])
+    cells = values[np.arange(FEWEST)[:, None] * DENSE + np.arange(DENSE + 1)]
+    change, range_ = cells[:, -1] - cells[:, 0], np.ptp(cells, axis=1)
+    off = np.abs(cells - cells[:, :1] - change[:, None] * np.linspace(0.0, 1.0, DENSE + 1)).max(axis=1)
+    steps = np.abs(np.diff(cells, axis=1)).max(axis=1)
+    leaving = (off > HUMP * np.ptp(values)) & (np.minimum(np.abs(change), steps) < 0.5 * range_)
+    if not 0 < np.count_nonzero(leaving) < FEW * FEWEST:
+        return times[:0]
+    about = np.convolve(leaving, np.ones(3), mode="same") > 0
+    about &= np.histogram(function.switches(), times[::DENSE])[0] == 0
+    return times[:-1][np.repeat(about, DENSE)]
+
+
 def _bends(target: TimeFunction, grid: Array) -> Array:
     """Times (n,) s of the grid and between them, so that no step from one to the next passes more than half a period.
 
@@ -154,12 +176,13 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
 
     `others`: loads, and whatever else is prescribed.
     """
-    paths = list(paths)
+    paths, others, ends = list(paths), list(others), times[[0, -1]]
     functions = [*(target for path in paths for _, target in path.targets), *others]
-    found = _with_others(times, _even(times[[0, -1]]))
+    found = _with_others(times, _even(ends))
     of_paths = (path.path.breaks for path in paths if path.path is not None)
-    of_pieces = (_brief_parts(function, times[[0, -1]]) for function in functions)
-    breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *of_pieces]))
+    of_pieces = (_brief_parts(function, ends) for function in functions)
+    of_humps = (_humps(function, ends) for function in (*_formulas(paths), *others))
+    breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *of_pieces, *of_humps]))
     found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
     moving = (found >= 0.0) & (found <= end)
     inside = found[moving]
@@ -176,14 +199,19 @@ def _with_others(times: Array, others: Array) -> Array:
     return np.union1d(times, others[gap > SHORTEST * np.ptp(times)])
 
 
+def _formulas(paths: Iterable[Trajectory]) -> Iterator[TimeFunction]:
+    """Targets of which no breaks are known."""
+    yield from (target for path in paths if path.path is None for _, target in path.targets)
+
+
 def _resolved(target: TimeFunction, times: Array, share: float = RESOLVED) -> Array:
     """The times with others between them, where value or rate change more than their derivatives at both ends say.
 
     By a `share` of their size.
     """
-    value, rate, _ = target.sample(times)
-    sizes = float(np.ptp(value)), float(np.abs(rate).max())
     for _ in range(ROUNDS):
+        value, rate, _ = target.sample(times)
+        sizes = float(np.ptp(value)), float(np.abs(rate).max())
         rough = np.zeros(len(times) - 1, dtype=bool)
         for order, size in enumerate(sizes):
             rough |= misfits(target, times, order) > share * size

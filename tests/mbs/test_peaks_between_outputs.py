@@ -236,3 +236,27 @@ def test_rms_of_a_torque_that_jumps(lasts, end):
     scene["load"] = [{"joint": "O", "moment": f"where(t < 0.5011, 0, where(t < {0.5011 + lasts}, 80, 0))"}]
     scene["analysis"][0]["end"] = end
     assert motor(solve(scene)).rms_moment == pytest.approx(80.0 * np.sqrt(lasts / end), rel=1e-5)
+
+
+@pytest.mark.parametrize("width", [2e-3, 2e-4, 1e-4])
+@pytest.mark.parametrize("body", [{"rigid": ROD}, {"link": LINK}], ids=["rigid", "flexible"])
+@pytest.mark.parametrize("of", ["expression", "python"])
+def test_a_smooth_pulse_of_a_load_between_outputs(width, body, of):
+    """80 exp(−((t − 0.50037)/w)²) N m on a joint that turns evenly: its motor bears that, RMS² = 80² w √(π/2)."""
+    pulse = f"80*exp(-((t - 0.50037)/{width})**2)"
+    load = [
+        {
+            "joint": "O",
+            "moment": pulse if of == "expression" else lambda t: 80 * np.exp(-(((t - 0.50037) / width) ** 2)),
+        }
+    ]
+    found = motor(solve(rod({"value": "0.1*t"}, 0.1, body=[{"name": "arm"} | body], load=load)))
+    assert found.moment == pytest.approx(80.0, rel=1e-2)
+    assert found.rms_moment == pytest.approx(80.0 * np.sqrt(width * np.sqrt(np.pi / 2)), rel=2e-2)
+
+
+def test_peaks_of_components_are_their_own():
+    """Of a rod at rest, whose joint bears its weight alone."""
+    results = solve(rod({"value": "0"}, 0.5, gravity=[0.0, -G]))
+    found = [results.peak(f"inverse/joints/O/reaction{column}")[0] for column in ("[0]", "[1]", "")]
+    assert found == pytest.approx([0.0, M * G, M * G], abs=1e-12)
