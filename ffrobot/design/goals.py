@@ -11,13 +11,13 @@ import numpy as np
 from ..actuation.catalog import CatalogMotor, choice_of
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, did_you_mean, either, quoted
-from ..common.peaks import root_mean_square
+from ..common.peaks import root_mean_square, shares
 from ..common.tables import shown
 from ..fe_models.modal_body import ModalBody
 from ..present.feasibility import joint_tasks
 from ..results.file import Results
 from ..sweep.files import value_of
-from .readings import POWER, Followed, Goal, History, Peak, Reading, read_history
+from .readings import MISSED, POWER, UNCERTAIN, Followed, Goal, History, Peak, Reading, read_history
 from .variables import Space, Variable
 
 
@@ -60,8 +60,6 @@ def _of_scene(results: Results, variable: Variable) -> tuple[CatalogMotor, float
     return variable.motors[variable.rows.index(row)], row[0]
 
 
-UNCERTAIN = "uncertain, as outputs, which alone count here, miss a part of the history: take a smaller output_step"
-
 FORMS = (
     "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
     "frequency NUMBER BODY", "mass", "mass BODY", "motors mass", "motors cost",
@@ -69,12 +67,15 @@ FORMS = (
 )  # fmt: skip
 
 
+ROUNDING = 1e-9  # of a history: by so much means of nothing may differ
+
+
 @dataclass(frozen=True)
 class OfHistory(Goal):
     """A mean of some kind of a history of one column, or its value at a time."""
 
     text: str
-    reduce: Callable[[History], float]
+    reduce: Callable[[History, bool], float]  # with True by all times that the run looked at, NaN if not known
     name: str
     times: str = ""  # what its unit is that of the history times
 
@@ -82,15 +83,15 @@ class OfHistory(Goal):
         """Of the history's only column."""
         history = self._history(results)
         joined = "·".join(part for part in (history.unit, self.times) if part) if history.unit else ""
-        unit, value = {"W·s": "J"}.get(joined, joined), self.reduce(history)
-        if self.reduce is _rms and history.is_missed:
-            return Reading(history.rms[1], unit, missed_by=value)
-        return Reading(value, unit, doubt=UNCERTAIN if self.reduce in (_mean, _integral) and history.is_missed else "")
+        unit = {"W·s": "J"}.get(joined, joined)
+        value, by_all = self.reduce(history, False), self.reduce(history, True)
+        if abs(by_all - value) > MISSED * max(abs(by_all), abs(value)) + ROUNDING * history.rms:
+            return Reading(by_all, unit, missed_by=value)
+        return Reading(value, unit, doubt=UNCERTAIN if history.is_in_doubt else "")
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
         """Its value by results of a changed scene."""
-        history = self._history(results)
-        return Followed(history.rms[1] if nominal.is_between else self.reduce(history))
+        return Followed(self.reduce(self._history(results), nominal.is_between))
 
     def _history(self, results: Results) -> History:
         history = read_history(results, self.name, f'"{self.text}"')
@@ -181,7 +182,7 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
         case "peak", [name]:
             return Peak(text, name)
         case "at", [time, name] if (t := _number(time)) is not None:
-            return OfHistory(text, lambda history: _value_at(history, t, text), name)
+            return OfHistory(text, lambda history, _: _value_at(history, t, text), name)
         case "energy", [joint]:
             return OfHistory(text, _integral, f"{joint}.{POWER}", "s")
         case (("rms" | "mean" | "integral"), [name]):
@@ -199,24 +200,26 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
     raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
 
 
-def _integral(history: History) -> float:
+def _duration(history: History) -> float:
+    return float(np.ptp(history.time))
+
+
+def _integral(history: History, by_all: bool) -> float:
     """By the trapezoidal rule."""
-    f = history.values[:, 0]
-    return float(0.5 * np.sum((f[1:] + f[:-1]) * np.diff(history.time)))
+    return _mean(history, by_all) * _duration(history)
 
 
-def _mean(history: History) -> float:
+def _mean(history: History, by_all: bool) -> float:
     """Over time."""
-    duration = history.time[-1] - history.time[0]
-    return _integral(history) / float(duration) if duration > 0.0 else float(history.values[0, 0])
+    return history.mean if by_all else float(shares(history.time) @ history.values[:, 0])
 
 
-def _rms(history: History) -> float:
+def _rms(history: History, by_all: bool) -> float:
     """Over time."""
-    return root_mean_square(history.time, history.values[:, 0])
+    return history.rms if by_all else root_mean_square(history.time, history.values[:, 0])
 
 
-REDUCTIONS: Mapping[str, Callable[[History], float]] = {"rms": _rms, "mean": _mean, "integral": _integral}
+REDUCTIONS: Mapping[str, Callable[[History, bool], float]] = {"rms": _rms, "mean": _mean, "integral": _integral}
 
 
 def _value_at(history: History, t: float, text: str) -> float:

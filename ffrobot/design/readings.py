@@ -20,11 +20,12 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, did_you_mean
-from ..common.peaks import shares, top_at
+from ..common.peaks import root_mean_square, top_at
 from ..mbs.joints.joints import JOINT_TYPES
 from ..results.datasets import COLUMN
 from ..results.file import Results
 from ..results.meanings import meaning
+from ..results.peaks import MEAN_POWER, RMS_POWER
 from ..results.peaks import POWER as PEAK_POWER
 from ..sweep.runs import by_dots, is_vector
 
@@ -41,7 +42,7 @@ class Reading:
         column, sign: of its history, and of the value there.
         mode: of a frequency, the family and its number in it.
         coarse: of a peak, its value by every second output; NaN of all else.
-        missed_by: of a peak or RMS that outputs miss, what it is by these; NaN of all else.
+        missed_by: of a peak or mean that outputs miss, what it is by these; NaN of all else.
         doubt: why the value is uncertain; empty where it is not.
     """
 
@@ -114,8 +115,8 @@ POWER = "power"
 """What joints have besides their datasets: the power of their motors, W."""
 
 SAME = 1e-6  # of an output step: times that are one
-MISSED = 1e-3  # of a peak: how much larger values between outputs are that count as the peak
-MISSED_RMS = 0.05  # of a root mean square, likewise: both are sums over times that are not close everywhere
+MISSED = 1e-3  # of a peak, or of the RMS of a mean: how much values between outputs change it where they count
+UNCERTAIN = "uncertain, as outputs, which alone count here, miss a part of the history: take a smaller output_step"
 SUPPORT = 6  # outputs that a value between outputs is made from
 
 
@@ -123,8 +124,8 @@ SUPPORT = 6  # outputs that a value between outputs is made from
 class History:
     """`values` (T, columns) at `time` (T,), s; of a vector its length, one column.
 
-    `largest`: of all columns and of all times that the run looked at; `rms` (2,): by outputs and by all these times, of
-    a motor's power those of its moment. NaN where that is not known.
+    `largest`, `rms`, `mean`: of all columns and of all times that the run looked at; NaN where that is not known.
+    `is_in_doubt`: whether that is so of a part of a vector whose length outputs miss.
     """
 
     name: str
@@ -132,13 +133,9 @@ class History:
     time: Array
     values: Array
     largest: float = float("nan")
-    rms: tuple[float, float] = (float("nan"), float("nan"))
-
-    @property
-    def is_missed(self) -> bool:
-        """Whether outputs miss a part of it that counts, or count a part for too long."""
-        by_outputs, by_all = self.rms
-        return abs(by_all - by_outputs) > MISSED_RMS * max(by_all, by_outputs)
+    rms: float = float("nan")
+    mean: float = float("nan")
+    is_in_doubt: bool = False
 
     def at(self, t: float, column: int, every: int = 1) -> float:
         """The value at t: that of an output, or of the polynomial through the six nearest (Lagrange).
@@ -177,29 +174,24 @@ def read_history(results: Results, name: str, option: str) -> History:
     is_power = found.endswith(f"/{POWER}")
     values = _power(results, found) if is_power else results.data(found)
     about = results.attributes(found.removesuffix(f"/{POWER}"))
-    peaks = np.atleast_1d(about.get(PEAK_POWER if is_power else "peak", np.nan))
+    names = (PEAK_POWER, RMS_POWER, MEAN_POWER) if is_power else ("peak", "rms", "mean")
+    sizes = [np.atleast_1d(about.get(key, np.nan)) for key in names]
+    time, in_doubt = results.time(found), False
     if match:
         k = int(match["column"])
         if k >= values.shape[1]:
             raise InputError(f'{option}: expected a column below {values.shape[1]} of "{wanted}", found {k}')
-        peaks = peaks[k : k + 1] if len(peaks) == values.shape[1] else np.array([np.nan])  # that of a vector's length
+        if len(sizes[1]) < values.shape[1]:  # those of a vector's length
+            length = root_mean_square(time, np.linalg.norm(values, axis=1))
+            in_doubt = bool(abs(sizes[1][0] - length) > MISSED * sizes[1][0])
+            sizes = [np.array([np.nan])] * len(names)
+        else:
+            sizes = [one[k : k + 1] if len(one) == values.shape[1] else np.array([np.nan]) for one in sizes]
         values = values[:, k : k + 1]
     elif is_vector(results, found, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
-    rms = _rms(results, found.replace(f"/{POWER}", "/moment") if is_power else found, match and int(match["column"]))
-    unit = _unit(results, found).replace(" ", "·")
-    return History(name, unit, results.time(found), as_floats(values), float(peaks.max()), rms)
-
-
-def _rms(results: Results, name: str, column: int | None) -> tuple[float, float]:
-    """Of all columns together, or of one: by outputs, and by all times that the run looked at; NaN if not known."""
-    by_all = np.atleast_1d(results.attributes(name).get("rms", np.nan))
-    by_outputs = np.sqrt(shares(results.time(name)) @ results.data(name) ** 2)
-    if column is not None and len(by_all) == len(by_outputs):
-        by_all, by_outputs = by_all[column : column + 1], by_outputs[column : column + 1]
-    elif column is not None:
-        by_all = np.array([np.nan])  # that of a vector's length
-    return float(np.linalg.norm(by_outputs)), float(np.linalg.norm(by_all))
+    largest, rms, mean = (float(one.max()) for one in sizes)
+    return History(name, _unit(results, found).replace(" ", "·"), time, as_floats(values), largest, rms, mean, in_doubt)
 
 
 def _known(results: Results) -> dict[str, str]:
@@ -265,7 +257,8 @@ class Peak(Goal):
         value, coarse = (sign * history.at(time, column, every) for every in (1, COARSE))
         if seen.largest > value * (1.0 + MISSED):
             return Reading(seen.largest, history.unit, missed_by=value)
-        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse)
+        doubt = UNCERTAIN if history.is_in_doubt else ""
+        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse, doubt=doubt)
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
         """At the time, in the column and with the sign of the `nominal` peak; of one between outputs the largest."""

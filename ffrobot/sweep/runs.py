@@ -16,6 +16,7 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
 from ..common.locks import is_running, this_process
+from ..common.peaks import root_mean_square
 from ..results.file import Results
 from ..results.meanings import meaning
 from ..run.inputs import changed, digest_of_file
@@ -28,14 +29,14 @@ MAKING = "results.of-"  # begins the names of results that a process is about to
 STOPPED = [code for number in (signal.SIGINT, signal.SIGTERM) for code in (-number, 128 + number)]
 """Exit codes of a run that was asked to end: nothing of the run itself."""
 
-REDUCTIONS: Mapping[str, Callable[[Array], Any]] = {
-    "max": lambda values: np.abs(values).max(),
-    "rms": lambda values: np.sqrt(np.mean(values**2)),
-    "first": lambda values: values[0],
-    "last": lambda values: values[-1],
-    "lowest": lambda values: values.min(),
+REDUCTIONS: Mapping[str, Callable[[Array, Array], Any]] = {
+    "max": lambda _, values: np.abs(values).max(),
+    "rms": root_mean_square,
+    "first": lambda _, values: values[0],
+    "last": lambda _, values: values[-1],
+    "lowest": lambda _, values: values.min(),
 }
-"""What becomes of a history (T,), by the word behind the colon of `--collect`."""
+"""What becomes of times and a history (T,), by the word behind the colon of `--collect`."""
 
 STANDARD = ("joints/{}/moment", "pzt/{}/required_voltage", "pzt/{}/voltage", "points/{}/deflection")
 """Histories of which the largest value is in every table."""
@@ -188,16 +189,20 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
         values = results.data(name)
     except InputError:
         return float("nan")
-    peaks = results.attributes(name.partition("[")[0])
-    if reduction == "max" and "peak" in peaks and "[" not in name:
-        return float(np.max(peaks["peak"]))
-    if reduction == "rms" and "[" not in name and np.size(peaks.get("rms", ())) == 1:
-        return float(peaks["rms"])
+    dataset, bracket, column = name.partition("[")
+    key = {"max": "peak", "rms": "rms"}.get(reduction, "")
+    known = np.atleast_1d(results.attributes(dataset).get(key, ()))  # of all times that the run looked at
+    if bracket and len(known) == results.data(dataset).shape[1]:
+        return float(known[int(column.rstrip("]"))])
+    if len(known) and not bracket and (reduction == "max" or len(known) == 1):
+        return float(known.max())
     vector = is_vector(results, name, values)
     history = np.linalg.norm(values, axis=1) if vector else values[:, 0]
     if values.shape[1] > 1 and not vector and (reduction == "max" or not is_spectrum(name)):
         history = np.abs(values).max(axis=1)
-    return float(REDUCTIONS[reduction](history))
+    time = results.time(dataset)
+    time = time if len(time) == len(history) else np.arange(float(len(history)))  # of zeros, which have their own
+    return float(REDUCTIONS[reduction](time, history))
 
 
 def is_spectrum(name: str) -> bool:

@@ -154,6 +154,25 @@ def test_names_of_collected_datasets(ffrobot, short_scene):
     assert f'found no "{names[2]}" in any run (did you mean "inverse/points/rod.mid/deflection"?)' in done.stderr
 
 
+@pytest.mark.parametrize("column", ["", "[0]"])
+def test_what_outputs_miss_is_collected(ffrobot, tmp_path, column):
+    """A force of 8 N m for 3 ms between outputs, borne by a motor at rest: its peak and RMS in closed form."""
+    rod = {"mass": 1.0, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0]}}
+    scene = {
+        "name": "rod", "gravity": [0.0, 0.0], "body": [{"name": "arm", "rigid": rod}],
+        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
+        "trajectory": [{"name": "rest", "joint": "O", "value": "0"}],
+        "load": [{"joint": "O", "moment": "where(t < 0.5011, 0, where(t < 0.5041, 8, 0))"}],
+        "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
+    }  # fmt: skip
+    path, names = tmp_path / "scene.toml", [f"joints.O.moment{column}:{one}" for one in ("max", "rms")]
+    path.write_text(tomli_w.dumps(scene))
+    ffrobot.ok("sweep", path, "--vary", "body.arm.rigid.mass=1,2", *(w for name in names for w in ("--collect", name)))
+    for row in table(path):
+        found = [float(row[name.replace(":", " ")]) for name in names]
+        assert found == pytest.approx([8.0, 8.0 * math.sqrt(3e-3)], rel=1e-5)
+
+
 def test_wrong_reduction_and_folder(refused, ffrobot, short_scene):
     folder = short_scene.parent
     message = refused(folder, "sweep", "scene.toml", "--vary", MASSES, "--collect", "inverse/time:mean")

@@ -159,6 +159,32 @@ def test_designs_that_fail_are_passed_over(write):
     assert found.converged
 
 
+def test_a_search_that_ends_at_a_design_that_fails_keeps_its_best(write, tmp_path):
+    """A controller that fails on short ways: trust-constr ends there, after designs that are better than the start."""
+    (tmp_path / "short.py").write_text(
+        """import numpy as np
+
+def controller(setup):
+    if setup.reference[-1, 0] < 0.4:
+        raise ValueError("too short")
+    return lambda k, y: np.zeros(len(setup.inputs))
+"""
+    )
+    loop = {
+        "name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.05,
+        "controller": [{"kind": "python", "python": "short.py:controller"}], "sensor": [{"joint": "shoulder"}],
+    }  # fmt: skip
+    path = {"name": "swing", "joint": "shoulder", "via": [0.0, 0.5], "duration": 0.2}
+    scene = ARM | {"gravity": [0.0, 0.0], "trajectory": [path], "analysis": [*ARM["analysis"], loop]}
+    found = ffrobot.optimise(
+        write(scene), ["trajectory.swing.via.1=0.3:0.6"], minimise="peak inverse.joints.shoulder.moment",
+        subject_to=["peak loop.joints.shoulder.coordinate <= 9"], method="trust-constr",
+    )  # fmt: skip
+    assert "ended at a design that fails" in found.message
+    least = min(one.readings[0].value for one in found.tried if one.completed)
+    assert found.value == least < 0.98 * found.start.readings[0].value
+
+
 @pytest.mark.nightly
 def test_catalogue_beside_a_number(write):
     """Of each rotor the best gear has 4 √(J J_m): the lightest rotor, with the gear between bounds found to 1e-4."""

@@ -279,12 +279,20 @@ def test_what_outputs_miss_has_its_closed_form(write, response):
     assert any("between them, which counts" in line for line in found.remarks())
 
 
-def test_means_that_outputs_miss_are_uncertain(write):
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+def test_means_that_outputs_miss_have_their_closed_forms(write, kind):
+    """A load of 8 N m for 3 ms on a joint that turns at 0.1 rad/s; outputs miss it, or have its last value for 2 s."""
     load = [{"joint": "shoulder", "moment": "where(t < 10.0011, 0, where(t < 10.0041, 8, 0))"}]
     keys = {"gravity": [0.0, 0.0], "load": load, "trajectory": [{"name": "s", "joint": "shoulder", "value": "0.1*t"}]}
-    for end, told in ((20.0, True), (20.0041, True), (0.5, False)):
-        of = {"name": "inverse", "kind": "pcid", "end": end, "output_step": end / 10}
-        found = ffrobot.sensitivity(
-            write(ARM | keys | {"analysis": [of]}), of=["energy joints.shoulder"], to=["payload.0.mass"]
-        )
-        assert any("uncertain" in line for line in found.remarks()) is told
+    shape = {"shape": "zero"} if kind == "fcid" else {}
+    for end in (20.0, 20.0041):
+        of = {"name": "inverse", "kind": kind, "end": end, "output_step": end / 10} | shape
+        expected = {
+            "energy joints.shoulder": -8.0 * 0.1 * 3e-3,
+            "integral joints.shoulder.moment": -8.0 * 3e-3,
+            "mean joints.shoulder.moment": -8.0 * 3e-3 / end,
+            "rms joints.shoulder.power": 0.8 * np.sqrt(3e-3 / end),
+        }
+        found = ffrobot.sensitivity(write(ARM | keys | {"analysis": [of]}), of=list(expected), to=["payload.0.mass"])
+        assert found.value == pytest.approx(list(expected.values()), rel=1e-5)
+        assert sum("between them, which counts" in line for line in found.remarks()) == len(expected)
