@@ -43,6 +43,8 @@ from .records import Controller as Record
 from .robot import Robot, input_names
 from .signals import Sensing, make_signals, merged
 
+APART = 1e-6  # of a run, between two times of a spline
+
 
 def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sensor]:
     """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
@@ -131,7 +133,9 @@ class ClosedLoop(SampledAnalysis):
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
         times, rows = times_of_run(outputs, place_at, lowest)
         samples = sample_times(outputs, self.sample_time)
-        reference = between(samples, source.time, sensing.read(moved.q, moved.v, moved.a))
+        seen = source if moved.gears else _resolved(source)  # gears that give are known at outputs
+        of_seen = moved if moved.gears else with_motor_coordinates(seen, plant)
+        reference = between(samples, seen.time, sensing.read(of_seen.q, of_seen.v, of_seen.a))
         setup = Setup(
             robot, robot.model, context.patches, input_names(robot), tuple(signal.name for signal in read), samples,
             self.sample_time, self.delay, reference, _feed_forward(context, self, source, moved, samples), robot.source,
@@ -162,6 +166,13 @@ class ClosedLoop(SampledAnalysis):
             return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
+
+
+def _resolved(source: Outcome) -> Outcome:
+    """The run with times between its outputs, but for those that are so near to others that a spline would swing."""
+    run = source.closer
+    apart = np.diff(run.time, prepend=-np.inf) > APART * np.ptp(source.time)
+    return run.at([int(k) for k in np.flatnonzero(apart)])
 
 
 def _robot(context: ActuatedContext, source: Outcome) -> Robot:

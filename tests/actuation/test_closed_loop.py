@@ -37,7 +37,8 @@ def wheel(*analyses, joint=None, target="0", bodies=(), joints=(), gravity=(0.0,
     """A wheel about O that is to stand still, or to follow `target`: I γ̈ = u, the simplest plant."""
     body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "rim": [0.3, 0.0]}}
     revolute = {"name": "O", "type": "revolute", "between": ["ground", "w.root"]} | (joint or {})
-    inverse = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T, "tolerance": 1e-9}
+    step = keys.pop("step", T)
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": step, "tolerance": 1e-9}
     return make_scene(
         name="wheel", gravity=gravity, body=[{"name": "w", "rigid": body}, *bodies], joint=[revolute, *joints],
         trajectory=[{"name": "stand", "joint": "O", "value": target}], analysis=[inverse, *analyses], **keys,
@@ -165,6 +166,18 @@ def test_means_are_those_of_commands_that_are_held(delay, step):
     assert joint["mean_power"] == pytest.approx(commands @ np.diff(gamma) / 0.5, rel=1e-3)
     assert (error["peak"], error["rms"]) == (seen["tip_error_max"], seen["tip_error_rms"])
     assert error["peak"] == pytest.approx(distance.max(), rel=1e-5)
+
+
+@pytest.mark.parametrize("step", [0.25, T])
+def test_references_do_not_depend_on_outputs(step):
+    """The path and its rate at samples; within these the tip, 0.3 m away, errs by no more than γ̈ T² of them."""
+    target = "0.4*(10*(2*t)**3 - 15*(2*t)**4 + 6*(2*t)**5)"
+    record = solve_scene(wheel(loop(controller=[PID], tip="w.rim"), target=target, step=step)).outcomes["loop"].details
+    u = 2.0 * record.time
+    path = 0.4 * u**3 * (10.0 - 15.0 * u + 6.0 * u**2), 24.0 * u**2 * (1.0 - u) ** 2
+    np.testing.assert_allclose(record.reference.T, path, atol=1e-8)
+    assert record.metrics.tip_error_max < 0.3 * 16.0 / np.sqrt(3.0) * T**2
+    assert record.metrics.verdict == "stable"
 
 
 def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
