@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.peaks import largest, root_mean_square
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
@@ -19,6 +20,8 @@ from ..run.solution import AnalysisResult, Solution
 
 if TYPE_CHECKING:
     from ..mbs.solve.stable_inversion import Inversion
+
+SAME = 1e-9  # of a time: what differs by less is rounding
 
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
@@ -115,6 +118,24 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
         if functions := list(trajectory.components.values()):
             entry["target"] = np.stack([function.sample(inside)[0] for function in functions], axis=1)
         _write_path(entry, trajectory)
+
+
+def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """How far a replay is off the paths that its actuation follows, at outputs and between: off_path/."""
+    source, run, motion = str(group.attrs["actuation"]), result.histories.run, result.histories.motion
+    if source not in solution.analyses or "control" in group or not len(run.time):
+        return
+    of, last = group.parent[source], solution.analyses[source].analysis.last_time
+    both = (run.time >= of["time"][0]) & (run.time <= of["time"][-1] * (1.0 + SAME))
+    inside = np.clip(run.time[both], 0.0, last)
+    for trajectory in motion.model.scene.trajectory:
+        if f"trajectories/{trajectory.name}/target" in of and trajectory.point is not None and trajectory.components:
+            position = motion.point(trajectory.point).position[both]
+            off = [position[:, "xyz".index(axis)] - f.sample(inside)[0] for axis, f in trajectory.components.items()]
+            distance = np.linalg.norm(off, axis=0)
+            entry = group.create_group(f"off_path/{trajectory.name}")
+            entry.attrs["point"], entry.attrs["distance"] = trajectory.point, largest(run.time[both], distance)[0]
+            entry.attrs["distance_rms"] = root_mean_square(run.time[both], distance)
 
 
 def _write_zero_dynamics(group: h5py.Group, inversion: Inversion) -> None:

@@ -64,10 +64,14 @@ def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> Too
 
 
 def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
-    """Of a replay: each point with its largest distance (m) from the path and the RMS, at outputs that both have.
+    """Of a replay: each point with its largest distance (m) from the path and the RMS, while both last.
 
-    Of points whose path was given, along the axes for which it was.
+    Of points whose path was given, along the axes for which it was; of old files at outputs that both have.
     """
+    if "off_path" in group:
+        for one in group["off_path"].values():
+            yield str(one.attrs["point"]), float(one.attrs["distance"]), float(one.attrs["distance_rms"])
+        return
     name = str(group.attrs.get("actuation", ""))  # of an analysis that takes none: empty
     if not name or "control" in group:
         return

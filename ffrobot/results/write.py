@@ -21,7 +21,7 @@ from ..run.solution import AnalysisResult, Solution
 from .actuators import write_feasibility, write_placement, write_point_forces, write_tracking, write_voltages
 from .file import FORMAT
 from .linear import write_joint_conditions, write_linear, write_loop
-from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress
+from .motion import write_bending, write_bodies, write_joints, write_off_path, write_paths, write_stress
 from .peaks import peaking, write_peaks
 from .resume import write_state
 
@@ -99,6 +99,7 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
     if (write := DETAILS.get(type(run.details).__name__)) is not None:
         write(group, motion, run.details)
+    write_off_path(group, solution, result)
 
 
 def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
