@@ -10,13 +10,14 @@ import ffrobot
 
 TOLERANCE = 1e-9
 CLOSE = 1e-7  # of the peak of each kind of dataset: forces amplify errors of the motion
-# What inverse analyses have beside, and what runs differ in by nature
-ALONE = ("predicted_shift", "trajectories/", "pzt/", "feasibility", "modal_force")
+# What inverse analyses or replays alone have, and what runs differ in by nature
+ALONE = ("predicted_shift", "trajectories/", "pzt/", "feasibility", "modal_force", "off_path")
 NOT_COMPARED = (
     "kind", "apply", "actuation", "steps", "rejected", "evaluations", "wall_seconds", "integrator", "integrator_reason",
     "unresolved",
 )  # fmt: skip
-BY_STEPS = ("peak", "peak_time", "rms", "peak_power")  # from times between outputs, which are not the same
+# From times between outputs, which are not the same
+BY_STEPS = ("peak", "peak_time", "rms", "mean", "peak_power", "rms_power", "mean_power")
 END = 0.3
 
 

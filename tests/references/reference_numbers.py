@@ -30,6 +30,7 @@ MEASURES = {
     "modal": "position", "deflection": "position", "predicted_shift": "position", "error": "position",
     "tip_error": "position", "tip_error_max": "position", "tip_error_rms": "position", "overshoot": "position",
     "vibration": "position", "at_start": "position", "moments_repeated": "position",
+    "distance": "position", "distance_rms": "position", "mean_power": "rms_power",
     "modal_velocity": "velocity", "strain": "kinetic", "modal_force": "reaction", "mode_required": "reaction",
     "reaction_moment": "reaction", "linear": "velocity", "angular": "angular_velocity",
 }  # fmt: skip
@@ -205,7 +206,7 @@ def _words(name, of):
 def quantity(name):
     """Analysis, and what a dataset or an attribute is of; peaks and means are of their dataset."""
     dataset, _, key = name.partition("@")
-    return dataset.partition("/")[0], dataset.rpartition("/")[2] if key in ("", "peak", "rms") else key
+    return dataset.partition("/")[0], dataset.rpartition("/")[2] if key in ("", "peak", "rms", "mean") else key
 
 
 def _scales(entries):
