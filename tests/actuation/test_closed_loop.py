@@ -67,7 +67,7 @@ def moving_at(rates, scene):
     context = ActuatedContext(model=prepare_scene(scene).model, outcomes={}, progress=lambda _: True, is_replayed=True)
     inverse, analysis = scene.analysis
     source = inverse.run(context)
-    source = replace(source, motion=replace(source.motion, v=rates(source.v)))
+    source = replace(source, motion=replace(source.motion, v=rates(source.v)), look_closer=None)
     return analysis.run(replace(context, outcomes={"inverse": source}))
 
 
