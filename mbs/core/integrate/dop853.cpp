@@ -1,9 +1,5 @@
 #include "core/integrate/dop853.h"
 
-#include "core/integrate/explicit_stages.h"
-
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace ffrobot {
@@ -28,9 +24,7 @@ template <class Tableau, int k, class T> [[gnu::always_inline]] inline T dense_s
 
 } // namespace
 
-Dop853::Dop853(OdeSystem &system)
-    : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::dense_stages)), stage_(n_), end_(n_),
-      start_(n_), mean_(n_), F_(n_, Tableau::dense_order) {}
+Dop853::Dop853(OdeSystem &system) : ExplicitMethod(system), mean_(n_) {}
 
 bool Dop853::step(double t, const double *y, double h, double) {
   run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
@@ -43,11 +37,6 @@ bool Dop853::step(double t, const double *y, double h, double) {
     }
   });
   return true;
-}
-
-const double *Dop853::stage(int i, double t, const double *y, double h) {
-  run_stage<Tableau, Tableau::stages - 1>(i + 1, system_, stage_time(i, t, h), y, h, K_, stage_);
-  return stage_.data();
 }
 
 // A coordinate and its rate have one factor, and every pair its own: large slow motion, whose estimate of order 5 is
@@ -94,16 +83,6 @@ bool Dop853::estimate_dense(Eigen::VectorXd &error) const {
   constexpr double largest_of_last = 0.0084, of_error = 6;
   error = largest_of_last / of_error * F_.col(Tableau::dense_order - 1);
   return true;
-}
-
-void Dop853::interpolate(double t, double *y) const {
-  const double x = (t - t0_) / h_;
-  for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
-    T out{};
-    for (int k = Tableau::dense_order - 1; k >= 0; --k)
-      out = (k % 2 == 0 ? x : 1 - x) * (out + read_at<T>(F_.data() + k * n_ + i));
-    write_at(y + i, read_at<T>(start_.data() + i) + out);
-  });
 }
 
 } // namespace ffrobot

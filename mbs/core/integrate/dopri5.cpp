@@ -1,15 +1,11 @@
 #include "core/integrate/dopri5.h"
 
-#include "core/integrate/explicit_stages.h"
-
 namespace ffrobot {
 
 using Eigen::Index;
 using Tableau = Dopri5Tableau;
 
-Dopri5::Dopri5(OdeSystem &system)
-    : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::stages + 1)), stage_(n_), end_(n_),
-      start_(n_), F_(n_, 4) {}
+Dopri5::Dopri5(OdeSystem &system) : ExplicitMethod(system) {}
 
 bool Dopri5::step(double t, const double *y, double h, double) {
   run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
@@ -17,14 +13,9 @@ bool Dopri5::step(double t, const double *y, double h, double) {
   return true;
 }
 
-const double *Dopri5::stage(int i, double t, const double *y, double h) {
-  run_stage<Tableau, Tableau::stages - 1>(i + 1, system_, stage_time(i, t, h), y, h, K_, stage_);
-  return stage_.data();
-}
-
 void Dopri5::estimate(double h, Eigen::VectorXd &error) {
   for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
-    const Combination<Tableau::e, Tableau::stages + 1, T, 1> of(K_.data(), n_, i);
+    const Combination<Tableau::e, Tableau::dense_stages, T, 1> of(K_.data(), n_, i);
     write_at(error.data() + i, h * of.sum[0]);
   });
 }
@@ -37,14 +28,8 @@ void Dopri5::prepare_dense(double t, const double *y, double h) {
   F_.col(1) = h * K_.col(0) - F_.col(0);
   F_.col(2) = F_.col(0) - h * K_.col(Tableau::stages) - F_.col(1);
   F_.col(3).setZero();
-  for (Index j = 0; j <= Tableau::stages; ++j)
+  for (Index j = 0; j < Tableau::dense_stages; ++j)
     F_.col(3) += (h * Tableau::d[j]) * K_.col(j);
-}
-
-void Dopri5::interpolate(double t, double *y) const {
-  const double x = (t - t0_) / h_;
-  Eigen::Map<Eigen::VectorXd>(y, n_) =
-      start_ + x * (F_.col(0) + (1 - x) * (F_.col(1) + x * (F_.col(2) + (1 - x) * F_.col(3))));
 }
 
 } // namespace ffrobot

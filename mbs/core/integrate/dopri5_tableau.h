@@ -6,7 +6,9 @@
 namespace ffrobot {
 
 struct Dopri5Tableau {
-  static constexpr int stages = 6; // of a step; the slope at its end is stage 6 (first same as last)
+  static constexpr int stages = 6;       // of a step; the slope at its end is stage 6 (first same as last)
+  static constexpr int dense_stages = 7; // for dense output, that one too
+  static constexpr int dense_order = 4;
 
   static constexpr double c[7] = {0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1, 1};
   static constexpr double a[7][7] = {
