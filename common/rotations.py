@@ -48,14 +48,6 @@ def left_jacobian_slope(vector: Array, of: Array) -> Array:
     return np.outer(by_size, 2 * vector) - turning
 
 
-def left_jacobian_rate(vectors: Array, rates: Array) -> Array:
-    """(dJ_l/dt) φ̇ (…, 3) = ȧ φ×φ̇ + ḃ φ×(φ×φ̇) + b φ̇×(φ×φ̇), with J_l = I + a φ~ + b φ~²."""
-    x, x_dot = np.sum(np.square(vectors), axis=-1)[..., None], 2 * np.sum(vectors * rates, axis=-1)[..., None]
-    across = np.cross(vectors, rates)
-    (_, a_slope), (b, b_slope) = series(2, x), series(3, x)
-    return x_dot * (a_slope * across + b_slope * np.cross(vectors, across)) + b * np.cross(rates, across)
-
-
 def series(m: int, x: Array) -> tuple[Array, Array]:
     """c_m = Σ (−x)ᵏ/(2k + m)! of any x = φ² ≥ 0, and its derivative by x.
 

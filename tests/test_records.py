@@ -180,6 +180,8 @@ def test_waypoints_that_are_no_rotation(tmp_path):
     "keys",
     [
         {"rotation_vector": ["0.3*sin(t)", "t", "t**2"], "reference_rotation_vector": [1.0, 2.0, -0.5]},
+        {"rotation_vector": ["0", "t-0.7", "0"]},
+        {"rotation_vector": ["5+t", "2*t", "-3"]},
         {"rpy": ["t", "2*sin(t)", "1-t**2"]},
         {"tool_axis": [0.0, 1.0, 1.0], "direction": ["cos(t)", "2*sin(t)", "0.3+t"]},
     ],

@@ -18,27 +18,15 @@ import h5py
 import numpy as np
 
 from ..common import checksum
-from ..common.arrays import as_list
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
 from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
 from ..common.version import VERSION
 from ..mbs import _core
-from ..mbs.analysis.outcome import (
-    METHOD_HISTORY,
-    SAMPLED,
-    STEPS,
-    TREE_MEMORY,
-    TREE_VECTORS,
-    Continuation,
-    EarlierRun,
-    Motion,
-    Outcome,
-    Statistics,
-)
-from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
-from ..mbs.solve.integrators import METHODS, Choice
+from ..mbs.analysis.outcome import Continuation, EarlierRun, Motion, Outcome, Statistics
+from ..mbs.scene.analysis import Analysis
+from ..mbs.solve.integrators import Choice
 from ..run.bodies import LoadedBody
 from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.prepare import with_stiffening
@@ -148,6 +136,10 @@ def input_files(scene: Scene) -> dict[str, str]:
 
 
 ROWS = ("q", "v", "a", "multipliers")
+KEPT: dict[str, type[_core.TreeCheckpoint | _core.Recording | _core.Samples]] = {
+    "checkpoint": _core.TreeCheckpoint, "recording": _core.Recording, "samples": _core.Samples
+}  # fmt: skip
+"""What a `Continuation` may have, as bytes of the core."""
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 
 
@@ -156,26 +148,9 @@ def write_earlier_run(group: h5py.Group, outcome: Outcome) -> None:
     assert outcome.continuation is not None
     for name in ROWS:
         group[name] = getattr(outcome, name)
-    _write_checkpoint(group, outcome.continuation.checkpoint)
-    if (samples := outcome.continuation.samples) is not None:
-        group["samples/times"] = samples.times
-        group["samples/states"] = samples.states
-        group["samples"].attrs.update({key: getattr(samples, key) for key in SAMPLED})
-    if (recording := outcome.continuation.recording) is not None:
-        group["recording/times"] = recording.times
-        group["recording/states"] = recording.states
-        names = {kind: name for name, kind in METHODS.items()}
-        group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
-
-
-def _write_checkpoint(group: h5py.Group, checkpoint: _core.TreeCheckpoint) -> None:
-    """Add "checkpoint" to what is kept of an analysis."""
-    for name in TREE_VECTORS:
-        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
-    about = {name: getattr(checkpoint, name) for name in ("time", "outputs", *TREE_MEMORY)}
-    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
-    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
-    group["checkpoint"].attrs.update(about)
+    for name in KEPT:
+        if (kept := getattr(outcome.continuation, name)) is not None:
+            group[name] = np.frombuffer(kept.to_bytes(), dtype=np.uint8)
 
 
 def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, EarlierRun]:
@@ -200,39 +175,17 @@ def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
     return EarlierRun(
         Motion(file.time(name), q, v, a, multipliers),
         Statistics(about["status"], Choice(about["integrator"], about["integrator_reason"]), **counts, step_ends=ends),
-        _continuation(file, analysis),
+        _continuation(file, group),
     )
 
 
-def _continuation(file: Results, analysis: Analysis) -> Continuation:
-    group = f"{analysis.name}/{GROUP}"
-    checkpoint, samples = _checkpoint(file, f"{group}/checkpoint"), _samples(file, f"{group}/samples")
-    if not file.has(f"{group}/recording"):
-        return Continuation(checkpoint, samples=samples)
-    assert isinstance(analysis, IntegratedAnalysis)
-    times, states = (file[f"{group}/recording/{key}"] for key in ("times", "states"))
-    kept = json.loads(file.attributes(f"{group}/recording")["methods"])
-    methods = [(first, METHODS[name]) for first, name in kept]
-    recording = _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
-    return Continuation(checkpoint, recording, samples)
-
-
-def _checkpoint(file: Results, group: str) -> _core.TreeCheckpoint:
-    about = {name: value.item() for name, value in file.attributes(group).items()}
-    memory: dict[str, Any] = {name: about[name] for name in ("time", "outputs", *TREE_MEMORY)}
-    memory |= {name: file[f"{group}/{name}"] for name in TREE_VECTORS}
-    steps = _core.StepHistory(**{name: about[name] for name in STEPS})
-    methods = _core.MethodHistory(**{name: about[name] for name in METHOD_HISTORY})
-    found: _core.TreeCheckpoint = _core.TreeCheckpoint(steps=steps, methods=methods, **memory)
-    return found
-
-
-def _samples(file: Results, group: str) -> _core.Samples | None:
-    """States between outputs; None of a run that has none."""
-    if not file.has(group):
-        return None
-    numbers = {key: value.item() for key, value in file.attributes(group).items()}
-    return _core.Samples(times=as_list(file[f"{group}/times"]), states=as_list(file[f"{group}/states"]), **numbers)
+def _continuation(file: Results, group: str) -> Continuation:
+    kept: dict[str, Any] = {
+        name: kind.of_bytes(file[f"{group}/{name}"].astype(np.uint8).tobytes())
+        for name, kind in KEPT.items()
+        if file.has(f"{group}/{name}")
+    }
+    return Continuation(**kept)
 
 
 def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Keep | None = None) -> Solution | None:

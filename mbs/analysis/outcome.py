@@ -117,23 +117,6 @@ class Statistics:
         return replace(whole, step_ends=ends if len(ends) == whole.steps else np.zeros(0))
 
 
-STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient", "without_look")
-"""Of the core's `StepHistory`, all."""
-
-METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "window", "trial")
-"""Of the core's `MethodHistory`, all."""
-
-TREE_MEMORY = ("inertial_peak", "accepted", "least_ratio", "singular_at", "watched_at", "determinant")
-"""Numbers of the core's `TreeCheckpoint` beside those of its steps and methods."""
-
-TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture", "ranges")
-"""Arrays of the core's `TreeCheckpoint`."""
-
-
-SAMPLED = ("longest", "most", "steps", "every")
-"""Numbers of the core's `Samples` beside its times and states."""
-
-
 @struct
 class Continuation:
     """Where an integration resumes, its steps where a later analysis replays them, and states between outputs."""

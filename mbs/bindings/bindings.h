@@ -12,7 +12,6 @@ void bind_time_function(nanobind::module_ &m);
 void bind_integrate(nanobind::module_ &m);
 void bind_allocation(nanobind::module_ &m);
 void bind_recursion(nanobind::module_ &m);
-void bind_for_tests(nanobind::module_ &m); // of no use to the program
 
 // `call`, which has to outlive it, from where the interpreter is released: holds it meanwhile.
 template <class R, class... A> auto locked(const std::function<R(A...)> &call) {

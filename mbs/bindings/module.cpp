@@ -12,5 +12,4 @@ NB_MODULE(_core, m) {
   bind_integrate(m);
   bind_allocation(m);
   bind_recursion(m);
-  bind_for_tests(m);
 }

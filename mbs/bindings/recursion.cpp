@@ -19,7 +19,6 @@ using namespace nb::literals;
 using namespace ffrobot;
 using namespace ffrobot::recursion;
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -60,28 +59,34 @@ std::tuple<VectorXd, VectorXd> constraint_values_of(Model<Space> &model, const V
 }
 
 template <class Space>
-Derivatives derivatives_at(Model<Space> &model, const VectorXd &q, const VectorXd &v, const VectorXd &target,
-                           const std::optional<VectorXd> &force, const std::optional<VectorXd> &wrench,
-                           const Scene *given, double t) {
-  const Scene none{}, &scene = given ? *given : none;
+Derivatives derivatives_at(Model<Space> &model, const Scene &scene, double t, const VectorXd &q, const VectorXd &v,
+                           const VectorXd &supplied) {
   model.check_state(q, v);
-  check_size("target", target.size(), model.rows());
-  if (given)
-    check_scene(model, scene);
-  const Forces<double> forces = checked_forces(model, force, wrench);
+  check_scene(model, scene);
+  check_size("supplied", supplied.size(), model.mechanism.n_v);
+  turn_markers(scene, t, model.w);
+  keep_independent_constraints(model.mechanism, q.data(), v.data(), model.w);
+  SceneForces<Space> acting(model.mechanism, scene, nullptr, nullptr);
+  acting.at(t, q.data(), v.data(), model.w);
+  VectorXd force = supplied;
+  if (const double *given = acting.generalized())
+    force += Eigen::Map<const VectorXd>(given, force.size());
+  VectorXd wrench = VectorXd::Zero(Space::dim * static_cast<Index>(model.mechanism.wrenches.size()));
+  for (const PointLoad &load : scene.point_loads)
+    wrench[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
   VectorXd along_cuts = VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()));
   for (const CutLoad &load : scene.cut_loads)
     along_cuts[load.joint] += load.share * load.magnitude(t).value;
+  std::vector<double> target;
+  for (const Jet &jet : targets_at(scene, t))
+    target.push_back(jet.acceleration);
   const AtSections at{scene.cut_joints, along_cuts.data(), scene.point_forces, t,
                       NaturalSizes<Space>(model.mechanism).length()};
-  return derivatives(model.mechanism, model.w, q.data(), v.data(), forces, at, target.data());
-}
-
-template <class Space> VectorXd answer_of(Model<Space> &model, const VectorXd &q, const VectorXd &residual) {
-  check_size("residual", residual.size(), model.rows());
-  VectorXd dq(model.mechanism.n_v);
-  response(model.mechanism, q.data(), residual.data(), model.w, dq.data());
-  return dq;
+  Derivatives found = derivatives(model.mechanism, model.w, q.data(), v.data(),
+                                  Forces<double>{force.data(), wrench.data()}, at, target.data());
+  for (const JointForce &joint : scene.joint_forces)
+    found.a_v.col(joint.v) -= joint.friction.slope(v[joint.v]) * found.a_f.col(joint.v);
+  return found;
 }
 
 template <class Space>
@@ -137,23 +142,10 @@ template <class Space> nb::class_<Model<Space>> bind_model(nb::module_ &m, const
             return keep_independent_constraints(model.mechanism, q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Indices of rows that do not depend on others at a state; the rest is left out from now on.")
-      .def(
-          "turn_marker",
-          [](Model<Space> &model, int marker, const Eigen::Matrix3d &A, const Eigen::Vector3d &omega,
-             const Eigen::Vector3d &alpha) {
-            if (marker < 0 || marker >= static_cast<int>(model.w.turning.size()))
-              throw nb::value_error("marker: expected one of the ground");
-            model.w.turning[static_cast<std::size_t>(marker)] = {A, omega, alpha};
-          },
-          "marker"_a, "A"_a, "omega"_a, "alpha"_a,
-          "How a marker of the ground that turns stands and turns in the evaluations that follow, global axes.")
       .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of rows.")
-      .def("response", &answer_of<Space>, "q"_a, "residual"_a,
-           "-M^-1 C^T (C M^-1 C^T)^-1 residual, at the state of the last evaluation.")
-      .def("derivatives", &derivatives_at<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
-           "scene"_a.none() = nb::none(), "t"_a = 0.0,
-           "At a state under given forces and what acts along the cut joints of a scene at time t, while rows follow "
-           "`target` (rows): exact.");
+      .def("derivatives", &derivatives_at<Space>, "scene"_a, "t"_a, "q"_a, "v"_a, "supplied"_a,
+           "At a state at time t, under a scene and forces supplied beside (n_v), exact; springs of joints and gears "
+           "are\nleft as they are, and rows that depend on others are left out.");
 }
 
 // At states that are known
@@ -166,13 +158,6 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
             return frame_motions(model.mechanism, q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Motion of all frames, accelerations those of the last evaluation.")
-      .def(
-          "totals",
-          [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
-            model.check_state(q, v);
-            return totals(model.mechanism, q.data(), v.data(), model.w);
-          },
-          "q"_a, "v"_a, "Energies and momentum.")
       .def("required_forces", &required_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "M a - Q (T, n_v) along v at states q (T, n_q), v and a (T, n_v): what gravity, elasticity, damping and the "
            "forces of the scene leave for others.")

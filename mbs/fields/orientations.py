@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError
-from ...common.rotations import (
-    about,
-    exponential,
-    left_jacobian,
-    left_jacobian_rate,
-    logarithm,
-    of_quaternion,
-    quaternions,
-)
+from ...common.rotations import exponential, logarithm, of_quaternion, quaternions
 from ...common.structs import struct
+from .. import _core
 from .._core import TimeFunction
 from .waypoints import Waypoints
 
@@ -38,56 +32,20 @@ class OrientationLaw:
     functions: tuple[TimeFunction, ...]  # three functions of time, rad
     reference: Reference = (0.0, 0.0, 0.0)  # rotation vector (3,), rad
 
+    @cached_property
+    def in_core(self) -> _core.TurningLaw:
+        """The same in the core, which says what it is at any time."""
+        kind, reference = getattr(_core.OrientationKind, self.kind), exponential(np.array(self.reference))
+        return _core.TurningLaw(kind, list(self.functions), reference)
+
     def sample(self, times: Array) -> Array:
         """A (T, 3, 3), columns its axes; of a direction z is along it, by the smallest turn."""
-        x = np.array([function.sample(times)[0] for function in self.functions]).T
-        if self.kind == "rotation_vector":
-            return exponential(x) @ exponential(np.array(self.reference))
-        if self.kind == "rpy":
-            return about(2, x[:, 2]) @ about(1, x[:, 1]) @ about(0, x[:, 0])
-        return turned_to(x)
+        return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
     def rates(self, times: Array) -> tuple[Array, Array]:
         """ω and α (T, 3) in global axes; of a direction, without spin about it."""
-        x, x_dot, x_2dot = np.moveaxis(np.array([function.sample(times) for function in self.functions]), 0, -1)
-        if self.kind == "rotation_vector":
-            return _rates_of_vector(x, x_dot, x_2dot)
-        if self.kind == "rpy":
-            return _rates_of_rpy(x, x_dot, x_2dot)
-        size = np.linalg.norm(x, axis=-1, keepdims=True)
-        z = x / size
-        slope = np.sum(x_dot * x, axis=-1, keepdims=True) / size**2
-        z_dot = x_dot / size - slope * z
-        return np.cross(z, z_dot), np.cross(z, x_2dot / size - 2 * slope * z_dot)
-
-
-def turned_to(directions: Array) -> Array:
-    """Triads (T, 3, 3) with z along `directions` (T, 3), each by the smallest turn from the z axis."""
-    z = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-    across = np.cross([0.0, 0.0, 1.0], z)
-    size = np.linalg.norm(across, axis=-1, keepdims=True)
-    angle = np.arctan2(size, z[:, 2:])
-    half_turn = np.array([np.pi, 0.0, 0.0])
-    vectors = np.divide(across * angle, size, out=np.where(z[:, 2:] < 0, half_turn, 0.0), where=size > 0)
-    return exponential(vectors)
-
-
-def _rates_of_vector(psi: Array, psi_dot: Array, psi_2dot: Array) -> tuple[Array, Array]:
-    """ω = J_l ψ̇, α = J_l ψ̈ + (dJ_l/dt) ψ̇, the last by the exact derivative of exp along ψ̇."""
-    J_l = left_jacobian(psi)
-    omega = np.einsum("tij,tj->ti", J_l, psi_dot)
-    return omega, np.einsum("tij,tj->ti", J_l, psi_2dot) + left_jacobian_rate(psi, psi_dot)
-
-
-def _rates_of_rpy(x: Array, x_dot: Array, x_2dot: Array) -> tuple[Array, Array]:
-    """ω = ẏ e_z + ṗ R_z e_y + ṙ R_z R_y e_x, and its rate."""
-    R_z = about(2, x[:, 2])
-    yaw, pitch, roll = np.broadcast_to(np.eye(3)[2], x.shape), R_z[:, :, 1], (R_z @ about(1, x[:, 1]))[:, :, 0]
-    by_yaw, by_pitch = x_dot[:, 2:] * yaw, x_dot[:, 1:2] * pitch
-    omega = by_yaw + by_pitch + x_dot[:, :1] * roll
-    alpha = x_2dot[:, 2:] * yaw + x_2dot[:, 1:2] * pitch + x_2dot[:, :1] * roll
-    turning = x_dot[:, 1:2] * np.cross(by_yaw, pitch) + x_dot[:, :1] * np.cross(by_yaw + by_pitch, roll)
-    return omega, alpha + turning
+        _, omega, alpha = self.in_core.sample(times)
+        return omega, alpha
 
 
 def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:

@@ -159,14 +159,3 @@ def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
         K += gear.spring.slope(gear.twist(q, np.zeros(tree.n_v))[0]) * np.outer(twist, twist)
         D += gear.damping * np.outer(twist, twist)
     return K, D
-
-
-def gear_forces(tree: KinematicTree, q: Array, v: Array) -> Array:
-    """Of compliant gears (T, n_v): k(δ) + c δ̇ on the second side of the joint, the opposite on the motor."""
-    found = np.zeros_like(v)
-    for gear in tree.gears:
-        way, rate = gear.twist(q, v)
-        moment = gear.spring.moment(way) + gear.damping * rate
-        found[:, gear.motor.v.start] -= moment
-        found[:, gear.joint.v.start] += gear.sign * moment
-    return found

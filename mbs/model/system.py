@@ -10,14 +10,12 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Integers
 from ...common.errors import InputError
-from ...common.rotations import exponential
 from .. import _core
 from ..fields.orientations import OrientationLaw
 from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .frame_motors import zero_order_hold
-from .gears import gear_forces, tree_resistance, tree_resistance_slope
 from .model import Model
 from .parts import CutPlace, ModelParts, Placed, carried_body, standing_marker
 from .plane import Plane, in_plane
@@ -192,48 +190,19 @@ class MultibodySystem:
                     " acts along a planar joint, found it second"
                 )
 
-    def turn_markers(self, t: float) -> None:
-        """Put the orientations that rows follow where they are at time t, for `core`'s next evaluations."""
-        for number, law in self._turning:
-            at = np.array([t])
-            omega, alpha = law.rates(at)
-            self.core.turn_marker(number, law.sample(at)[0], omega[0], alpha[0])
-
     @property
     def row_signs(self) -> Array:
         """(rows,) −1 where the core's row, target and multiplier count the tree's coordinate, not the joint's."""
         return np.array([row.sign for row in self.model.rows])
 
-    def target(self, t: float) -> Array:
-        """Second derivatives that the core's rows follow at time t (rows,)."""
-        return self.row_signs * [0.0 if row.target is None else row.target(t)[2] for row in self.model.rows]
-
-    def force(self, t: float) -> Array | None:
-        """Given forces along v (n_v,) at time t; None where there are none."""
-        if not self._along:
-            return None
-        return sum((function(t)[0] * direction for direction, function in self._along), np.zeros(self.model.tree.n_v))
-
     def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
         """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
 
-        `supplied` (n_v,) acts beside loads, friction and springs in gears; the core knows what acts along cut joints.
-        Rows that depend on others at q, v are left out.
+        `supplied` (n_v,) acts beside loads, friction and springs in gears. Rows that depend on others at q, v are left
+        out.
         """
-        self.turn_markers(t)
-        self.core.keep_independent_rows(q, v)
-        tree = self.model.tree
-        rest = gear_forces(tree, q[None], v[None])[0] - tree_resistance(tree, v[None])[0]
-        loads = self.force(t)
-        force = supplied + rest + (0.0 if loads is None else loads)
-        wrench = np.zeros((len(self._wrenches), len(OF_POINT)))
-        for number, components in self._at_points:
-            for name, magnitude in components.items():
-                wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
-        found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel(), self.scene, t)
-        signs = self.row_signs[:, None]
-        by_v = found.a_v - found.a_f * tree_resistance_slope(tree, v[None])[0]
-        return Derivatives(found.a_q, by_v, found.a_f, signs * found.value_q, signs * found.rate_q)
+        found, signs = self.core.derivatives(self.scene, t, q, v, supplied), self.row_signs[:, None]
+        return Derivatives(found.a_q, found.a_v, found.a_f, signs * found.value_q, signs * found.rate_q)
 
     def _follow(self, plane: Plane | None) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
@@ -261,8 +230,7 @@ class MultibodySystem:
         scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
         scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
         for number, law in self._turning:
-            kind, reference = getattr(_core.OrientationKind, law.kind), exponential(np.array(law.reference))
-            scene.turn_marker(number, _core.TurningLaw(kind, list(law.functions), reference))
+            scene.turn_marker(number, law.in_core)
         return scene
 
     def _act_along_cut(self, scene: _core.TreeScene, places: Sequence[CutPlace]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bench.growth import LINKS, MODES, MODES_IN_CHAINS, chain, evaluation_timer
-from bench.hand_written import start_at_rest
+from bench.hand_written import start_at_rest, targets
 from ffrobot.mbs.model.model import row_values
 
 pytestmark = pytest.mark.alone
@@ -41,7 +41,7 @@ def table(benchmark, what, sizes, models):
     cases = [start_at_rest(model) for model in models]
     for system, q, v in cases:
         core, _, rows = system.integrated
-        a, multipliers = core.evaluate(q, v, system.target(0.0)[rows], None, None)
+        a, multipliers = core.evaluate(q, v, targets(system, 0.0)[rows], None, None)
         assert np.all(np.isfinite(multipliers))
         C_v = row_values(system.model, q[None], np.zeros(1))[1][0]
         assert np.abs(C_v @ a).max() < 1e-6 * np.abs(C_v).max() * np.abs(a).max()  # at rest: Ċ_v v = 0, targets uniform

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.hand_written import STEPS, TIME, HandWritten, evaluation_seconds, general_state
+from bench.hand_written import STEPS, TIME, HandWritten, evaluation_seconds, general_state, targets
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.pcid import Pcid
@@ -49,7 +49,7 @@ def program(tmp_path_factory, two_link):
 def test_both_compute_the_same(two_link, program):
     system, q, v = general_state(two_link)
     core, _, rows = system.integrated
-    a, multipliers = core.evaluate(q, v, system.target(TIME)[rows], None, None)
+    a, multipliers = core.evaluate(q, v, targets(system, TIME)[rows], None, None)
     _, (force_x, force_y, alpha, _) = program(1, 0)
     # the program takes displacements of 1e-12 m at supports for zero; forces amplify that
     np.testing.assert_allclose(-multipliers, [force_x, force_y], rtol=1e-8)

@@ -81,10 +81,10 @@ def test_left_jacobian_of_any_angle(far):
 
 
 @pytest.mark.parametrize("size", [1e-9, 0.3, 0.9, 1.1, 3.0, 9.0, 40.0])
-def test_slope_and_rate_of_the_left_jacobian(size):
+def test_slope_of_the_left_jacobian(size):
     """Against differences of ∫ exp(s φ~) ds, found by eigenvectors of φ~."""
     rng = np.random.default_rng(6)
-    phi, x, phi_dot = rng.standard_normal((3, 3))
+    phi, x = rng.standard_normal((2, 3))
     phi *= size / np.linalg.norm(phi)
 
     def of(vector):
@@ -95,9 +95,7 @@ def test_slope_and_rate_of_the_left_jacobian(size):
     h = 1e-5 * max(size, 0.1)
     differences = [(s * h, w / (12 * h)) for s, w in ((-2, 1), (-1, -8), (1, 8), (2, -1))]
     slope = np.stack([sum(w * of(phi + s * e).real @ x for s, w in differences) for e in np.eye(3)], axis=1)
-    rate = sum(w * of(phi + s * phi_dot).real @ phi_dot for s, w in differences)
     np.testing.assert_allclose(rotations.left_jacobian_slope(phi, x), slope, atol=3e-9)
-    np.testing.assert_allclose(rotations.left_jacobian_rate(phi, phi_dot), rate, atol=3e-9)
 
 
 @pytest.mark.parametrize("axis", [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, -1], [1e-180, 0, -1]])

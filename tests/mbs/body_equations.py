@@ -12,7 +12,7 @@ from triad_measures import Ground, Joint, Section, Spinning
 
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.cut import measured
-from ffrobot.mbs.model.gears import gear_forces, resistance, rotor
+from ffrobot.mbs.model.gears import resistance, rotor
 from ffrobot.mbs.quantities.motion import Energies, Momentum
 
 
@@ -94,6 +94,17 @@ def absolute_accelerations(mechanism, state) -> Array:
         right[len(C) :] += gradients[len(C) :] @ at.B @ state.a[k]
         rows = np.vstack([gradients, np.eye(mechanism.size)[modes]])
         found[k] = np.linalg.solve(rows, np.concatenate([right, state.a[k, of_modes]]))
+    return found
+
+
+def gear_forces(tree, q, v):
+    """Of compliant gears (T, n_v): k(δ) + c δ̇ on the second side of the joint, the opposite on the motor."""
+    found = np.zeros_like(v)
+    for gear in tree.gears:
+        way, rate = gear.twist(q, v)
+        moment = gear.spring.moment(way) + gear.damping * rate
+        found[:, gear.motor.v.start] -= moment
+        found[:, gear.joint.v.start] += gear.sign * moment
     return found
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from equal_steps import states_of_equal_steps
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import pcid, relative
 from oracle_runs import run
@@ -22,19 +23,12 @@ def inverse(model, **keys):
     return outcome
 
 
-METHODS = _core.MethodKind
 TOLERANCES = {
     "dop853": (1e-4, 1e-6, 1e-8),
     "dopri5": (1e-3, 1e-5),
     "radau": (1e-2, 1e-5),
     "generalized-alpha": (1e-2, 3e-3),
 }
-
-
-def fixed(model, start, method, steps, spectral_radius=0.8):
-    """States of the tree after equal steps up to 0.5 s, and in their middle."""
-    core, scene, _ = MultibodySystem(model).integrated
-    return _core.tree_fixed_steps(core, scene, 0.5, steps, start.q, start.v, method, spectral_radius)
 
 
 @pytest.mark.parametrize("spectral_radius", [1.0, 0.8, 0.5])
@@ -46,9 +40,12 @@ def test_generalized_alpha_damps_what_steps_do_not_resolve_as_asked(spectral_rad
     path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}", "y": f"{TIP[1]!r}"}
     model = arm(arm_links(EI=3e7, modes=1), trajectory=[path]).model
     start = undeformed_posture(model)
-    states = fixed(model, start, METHODS.generalized_alpha, 100, spectral_radius)
+    core, scene, _ = MultibodySystem(model).integrated
+    states = states_of_equal_steps(
+        core, scene, _core.MethodKind.generalized_alpha, start.q, start.v, np.linspace(0.0, 0.5, 101), spectral_radius
+    )
     mode = model.tree.nodes[model.tree.index["link1"]].p_q.start
-    ringing = np.abs(states[::2, mode] - static_equilibrium(model, start).q[mode])
+    ringing = np.abs(states[:, mode] - static_equilibrium(model, start).q[mode])
     late, early = ringing[40:50].max(), ringing[30:40].max()
     assert 0.99 * spectral_radius < (late / early) ** 0.1 < 1.08 * spectral_radius
 

@@ -10,6 +10,7 @@ from random_mechanisms import TYPES
 
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import StateFunction
+from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.loads import Load
@@ -43,7 +44,10 @@ def test_derivatives_are_those_of_evaluations(joint, loops):
     tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
     target = rng.standard_normal(len(motion.model.rows))
     force = rng.standard_normal(tree.n_v)
-    found = system.core.derivatives(q, v, target, force, None)
+    scene = _core.TreeScene()
+    for of_row in target:
+        scene.add_target(parse_expression(f"{of_row / 2!r}*t**2"))
+    found = system.core.derivatives(scene, 0.0, q, v, force)
 
     def a(dq=0.0, dv=0.0, df=0.0):
         return system.core.evaluate(tree.integrate(q, np.zeros(tree.n_v) + dq), v + dv, target, force + df, None)[0]
@@ -105,8 +109,8 @@ def test_the_motion_itself_is_one_of_the_motions_beside_it(joint, loops):
     q, v, a = motion.q[0], motion.v[0], motion.a[0]
     linearisation = LinearEquations(motion.model, q)
     found = linearisation.at(0.0, q, v, a)
-    s, none = linearisation.independent, np.zeros(len(motion.model.rows))
-    core = system.core.derivatives(q, v, none, None, None)
+    s = linearisation.independent
+    core = system.derivatives(0.0, q, v, np.zeros(motion.model.tree.n_v))
     signs = found.transformation[s].diagonal()
     jerk = signs * (core.a_q @ v + core.a_v @ a)[s]
     terms = [found.M @ jerk, found.D @ (signs * a[s]), found.K @ (signs * v[s])]

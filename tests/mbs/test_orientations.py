@@ -5,6 +5,7 @@ I omega_dot = (I omega) x omega + r x (A^T f)
 
 import numpy as np
 import pytest
+from equal_steps import states_of_equal_steps
 
 from ffrobot.mbs import _core
 
@@ -27,7 +28,8 @@ def top():
 
 def steps_of_top(method, steps, end=1.0):
     """States after equal steps, and in their middle."""
-    states = _core.tree_fixed_steps(top(), _core.TreeScene(), end, steps, START, SPIN, method, 0.8)
+    times = np.linspace(0.0, end, 2 * steps + 1)
+    states = states_of_equal_steps(top(), _core.TreeScene(), method, START, SPIN, times, every=2)
     return states[::2], states[1::2]
 
 

@@ -42,8 +42,8 @@ def assert_same_derivatives(system, state):
     """Of accelerations by q, v and modal forces; those of space are compared with differences of its evaluations."""
     q, v = np.split(state, [system.model.tree.n_q])
     found, expected = (
-        core.derivatives(q, v, np.zeros(rows), np.zeros(len(v)), None)
-        for core, rows in ((system.integrated[0], len(system.integrated.rows)), (system.core, len(system.row_signs)))
+        core.derivatives(scene, 0.0, q, v, np.zeros(len(v)))
+        for core, scene in (system.integrated[:2], (system.core, system.scene))
     )
     modes = ~system.model.tree.joint_columns  # pins of the plane pass no moments on: none act there
     for key, columns in (("a_q", slice(None)), ("a_v", slice(None)), ("a_f", modes)):

@@ -98,18 +98,9 @@ void bind_constraints(nb::module_ &m) {
       .def_rw("coordinate", &ConstraintModel::coordinate);
   nb::class_<FrameMotion>(m, "FrameMotion", "Motion of a body's frame, global axes.")
       .def_ro("r", &FrameMotion::r)
-      .def_ro("v", &FrameMotion::v)
       .def_ro("a", &FrameMotion::a)
-      .def_ro("omega", &FrameMotion::omega)
       .def_ro("alpha", &FrameMotion::alpha)
-      .def_ro("R", &FrameMotion::R)
-      .def_ro("angle", &FrameMotion::angle);
-  nb::class_<Totals>(m, "Totals", "Energies (J), momentum (N s), angular momentum about the origin (N m s).")
-      .def_ro("kinetic", &Totals::kinetic)
-      .def_ro("strain", &Totals::strain)
-      .def_ro("gravitational", &Totals::gravitational)
-      .def_ro("momentum", &Totals::momentum)
-      .def_ro("angular_momentum", &Totals::angular_momentum);
+      .def_ro("R", &FrameMotion::R);
   nb::class_<MotionForces>(
       m, "MotionForces",
       "What bodies and joints do to each other, over states (T, …): forces with their moments "

@@ -33,8 +33,7 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
   Workspace<Space, double> w(model.mechanism);
   for (Eigen::Index i = 0; i < count; ++i) {
     const double t = times[static_cast<std::size_t>(i)];
-    for (const DrivenMarker &driven : scene.driven)
-      w.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
+    turn_markers(scene, t, w);
     const Forces<double> acting = motion.act(t, q.row(i).data(), v.row(i).data());
     forces.prepare(q.row(i).data(), v.row(i).data(), nullptr, w);
     forces.accelerate(q.row(i).data(), a.row(i).data(), w);

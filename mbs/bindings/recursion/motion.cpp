@@ -44,39 +44,15 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
                     samples, replay);
 }
 
-// The same of states (T, n_q + n_v) that are known
 template <class Space>
 TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                    const RowMajorMatrix &states, Replay *replay) {
-  check_scene(model, scene);
   if (replay)
     check_replay(model, *replay);
-  check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
-  check_size("times", static_cast<Index>(times.size()), states.rows());
-  TreeRun run(model, times.size());
-  if (times.empty())
-    return run;
-  const double *first = states.row(0).data();
-  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, nullptr,
-                                replay);
-  for (std::size_t i = 0; i < times.size(); ++i)
-    run.evaluate(i, times[i], states.row(static_cast<Index>(i)).data(), reader, model.mechanism.n_q, false, replay);
-  return run;
+  return outputs_at(model, scene, times, states, nullptr, replay, [](Index) {});
 }
 
 // (q, v, what is left) on the rows at time t
-template <class Space>
-std::tuple<VectorXd, VectorXd, double> projected(const Model<Space> &model, const Scene &scene, double t, VectorXd q,
-                                                 VectorXd v) {
-  model.check_state(q, v);
-  check_scene(model, scene);
-  RecursiveMotion<Space> motion(model.mechanism, scene, t, q.data(), v.data());
-  VectorXd a(v.size());
-  motion.evaluate(t, q.data(), v.data(), a.data());
-  const double left = motion.project(t, q.data(), v.data());
-  return {q, v, left};
-}
-
 // x (n_v) of N x + C_q^T nu = r, C_q x = c at (q, v); complex factors know no c
 template <class Space, class Scalar>
 Eigen::Matrix<Scalar, Eigen::Dynamic, 1>
@@ -123,67 +99,16 @@ template <class Space> void bind_motion(nb::module_ &m) {
       "motors of `judged`, the same mechanism, are bounded, too.");
   m.def("tree_outputs", &outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "replay"_a = nb::none(),
         "What a run reports of states (T, n_q + n_v) that are known.");
-  m.def("tree_projected", &projected<Space>, "model"_a, "scene"_a, "t"_a, "q"_a, "v"_a,
-        "(q, v, largest residual left) on the rows at time t, by Newton steps in the mass metric.");
-}
-
-VectorXd as_vector(const std::vector<double> &values) {
-  return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
-}
-
-// Four numbers each: least, largest, whether it has left its range, and when
-std::vector<double> numbers_of(const std::vector<RangeSeen> &ranges) {
-  std::vector<double> found;
-  for (const auto &[least, largest, left_at] : ranges)
-    for (const double number : {least, largest, left_at ? 1. : 0., left_at.value_or(0)})
-      found.push_back(number);
-  return found;
-}
-
-std::vector<RangeSeen> ranges_of(const std::vector<double> &numbers) {
-  if (numbers.size() % 4 != 0)
-    throw std::invalid_argument("ranges of coordinates: expected four numbers each");
-  std::vector<RangeSeen> found;
-  for (auto x = numbers.begin(); x != numbers.end(); x += 4)
-    found.push_back({x[0], x[1], x[2] != 0 ? std::optional(x[3]) : std::nullopt});
-  return found;
-}
-
-void make_checkpoint(TreeCheckpoint *made, double time, VectorXd state, const StepHistory &steps, std::size_t outputs,
-                     const MethodHistory &methods, const std::vector<double> &state_peaks,
-                     const std::vector<double> &force_peaks, double inertial_peak, unsigned long accepted,
-                     double least_ratio, double singular_at, VectorXd singular_posture, double watched_at,
-                     double determinant, const std::vector<double> &ranges) {
-  new (made) TreeCheckpoint{{time, std::move(state), steps, outputs, methods},
-                            {{state_peaks, force_peaks, inertial_peak},
-                             accepted,
-                             {least_ratio, singular_at, std::move(singular_posture), watched_at, determinant}},
-                            ranges_of(ranges)};
 }
 
 void bind_checkpoint(nb::module_ &m) {
-  nb::class_<TreeCheckpoint>(m, "TreeCheckpoint", "Where a run has stopped, and all that its next step depends on.")
-      .def(nb::init<>())
-      .def("__init__", &make_checkpoint, nb::kw_only(), "time"_a, "state"_a, "steps"_a, "outputs"_a, "methods"_a,
-           "state_peaks"_a, "force_peaks"_a, "inertial_peak"_a, "accepted"_a, "least_ratio"_a, "singular_at"_a,
-           "singular_posture"_a, "watched_at"_a, "determinant"_a, "ranges"_a, "state (n_q + n_v,).")
+  auto checkpoint = nb::class_<TreeCheckpoint>(m, "TreeCheckpoint",
+                                               "Where a run has stopped, and all that its next step depends on.");
+  checkpoint.def(nb::init<>())
       .def_prop_ro("time", [](const TreeCheckpoint &c) { return c.integration.time; })
-      .def_prop_ro("state", [](const TreeCheckpoint &c) { return c.integration.state; })
-      .def_prop_ro("steps", [](const TreeCheckpoint &c) { return c.integration.steps; })
-      .def_prop_ro("outputs", [](const TreeCheckpoint &c) { return c.integration.outputs; })
-      .def_prop_ro("methods", [](const TreeCheckpoint &c) { return c.integration.methods; })
-      .def_prop_ro("state_peaks", [](const TreeCheckpoint &c) { return as_vector(c.history.peaks.state); })
-      .def_prop_ro("force_peaks", [](const TreeCheckpoint &c) { return as_vector(c.history.peaks.force); })
-      .def_prop_ro("inertial_peak", [](const TreeCheckpoint &c) { return c.history.peaks.inertial; })
-      .def_prop_ro("accepted", [](const TreeCheckpoint &c) { return c.history.accepted; })
-      .def_prop_ro("least_ratio", [](const TreeCheckpoint &c) { return c.history.postures.least_ratio; })
-      .def_prop_ro("singular_at", [](const TreeCheckpoint &c) { return c.history.postures.singular_at; })
-      .def_prop_ro("singular_posture", [](const TreeCheckpoint &c) { return c.history.postures.singular_posture; })
-      .def_prop_ro("watched_at", [](const TreeCheckpoint &c) { return c.history.postures.watched_at; })
-      .def_prop_ro("determinant", [](const TreeCheckpoint &c) { return c.history.postures.determinant; })
-      .def_prop_ro(
-          "ranges", [](const TreeCheckpoint &c) { return as_vector(numbers_of(c.ranges)); },
-          "(4 limits,) of each: least and largest value, whether it has left its range, and when.");
+      .def_prop_ro("state_peaks", [](const TreeCheckpoint &c) { return c.history.peaks.state; })
+      .def_prop_ro("force_peaks", [](const TreeCheckpoint &c) { return c.history.peaks.force; });
+  bind_bytes(checkpoint);
 }
 
 void bind_run(nb::module_ &m) {
@@ -249,12 +174,17 @@ void bind_orientation_laws(nb::module_ &m) {
           },
           "kind"_a, "functions"_a, "reference"_a)
       .def(
-          "__call__",
-          [](const OrientationLaw &law, double t) {
-            const Turning at = law(t);
-            return std::tuple(at.A, at.omega, at.alpha);
+          "sample",
+          [](const OrientationLaw &law, const VectorXd &times) {
+            RowMajorMatrix A(times.size(), 9), omega(times.size(), 3), alpha(times.size(), 3);
+            for (Index i = 0; i < times.size(); ++i) {
+              const Turning at = law(times[i]);
+              A.row(i) = at.A.reshaped<Eigen::RowMajor>().transpose();
+              omega.row(i) = at.omega.transpose(), alpha.row(i) = at.alpha.transpose();
+            }
+            return std::tuple(A, omega, alpha);
           },
-          "t"_a, "(A (3, 3), omega (3,), alpha (3,)) at time t, global axes.");
+          "times"_a, "(A (T, 9), row after row, omega (T, 3), alpha (T, 3)) at times (T,), global axes.");
 }
 
 void bind_scene(nb::module_ &m) {

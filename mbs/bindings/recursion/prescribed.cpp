@@ -150,8 +150,7 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
   w.keep({});
   for (Index i = 0; i < q.rows(); ++i) {
     if (!times.empty())
-      for (const DrivenMarker &marker : driven.scene.driven)
-        w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
+      turn_markers(driven.scene, times[static_cast<std::size_t>(i)], w);
     if (i == 0 || !times.empty() || q.row(i) != q.row(i - 1)) {
       const auto at = place_all(driven.mechanism, q.row(i).data(), v.data(), nullptr, w);
       // for the mass matrix of the modes of stiffened bodies, and their rows

@@ -71,7 +71,8 @@ Reader<Spatial> points_of(const DrivenMechanism<Spatial> &driven, const std::vec
 template <class Space>
 Source recorded(const DrivenMechanism<Space> &driven, const Recording &recording, Reader<Space> reader) {
   const auto size = static_cast<std::size_t>(driven.mechanism.n_q + driven.mechanism.n_v);
-  if (recording.times.size() < 2 || recording.states.size() != size * recording.times.size())
+  if (recording.times.size() < 2 || recording.states.size() != size * recording.times.size() ||
+      recording.methods.empty())
     throw nb::value_error("recording: expected one of this mechanism, with a step");
   return std::make_shared<RecordedForces<Space>>(driven.mechanism, driven.scene, recording, std::move(reader));
 }

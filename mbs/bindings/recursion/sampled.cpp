@@ -65,24 +65,11 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
 template <class Space>
 TreeRun outputs_under_hold(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                            const RowMajorMatrix &states, ZeroOrderHold held, const RowMajorMatrix &commands) {
-  check_scene(model, scene);
   check_hold(model, held);
-  check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
-  check_size("times", static_cast<Index>(times.size()), states.rows());
   check_size("commands", commands.rows(), states.rows());
   check_size("inputs", commands.cols(), held.direction().cols());
-  TreeRun run(model, times.size());
-  if (times.empty())
-    return run;
-  const double *first = states.row(0).data();
-  held.hold(commands.row(0).transpose());
-  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, &held);
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    const auto row = static_cast<Index>(i);
-    held.hold(commands.row(row).transpose());
-    run.evaluate(i, times[i], states.row(row).data(), reader, model.mechanism.n_q, false, nullptr);
-  }
-  return run;
+  return outputs_at(model, scene, times, states, &held, nullptr,
+                    [&](Index i) { held.hold(commands.row(i).transpose()); });
 }
 
 template <class Space> void bind_sampled_motion(nb::module_ &m) {

@@ -1,6 +1,7 @@
 // What a motion in joint coordinates is at outputs, and what its scene has to be like.
 #pragma once
 
+#include "bindings/archived.h"
 #include "bindings/recursion/recursion.h"
 #include "core/analysis/replay.h"
 #include "core/check_index.h"
@@ -85,6 +86,9 @@ struct TreeCheckpoint {
   MotionHistory history;
   std::vector<RangeSeen> ranges; // of the scene's limits
 };
+template <class Archive> void fields(Archive &a, TreeCheckpoint &x) {
+  archived_all(a, x.integration, x.history, x.ranges);
+}
 
 // As far as it got.
 struct TreeRun {
@@ -134,6 +138,28 @@ struct TreeRun {
       x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
   }
 };
+
+// What a run reports of states (T, n_q + n_v) that are known; act(i) before each, has `held` act as it does there.
+template <class Space, class Act>
+TreeRun outputs_at(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                   const RowMajorMatrix &states, const ZeroOrderHold *held, Replay *replay, const Act &act) {
+  check_scene(model, scene);
+  check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
+  check_size("times", static_cast<Eigen::Index>(times.size()), states.rows());
+  TreeRun run(model, times.size());
+  if (times.empty())
+    return run;
+  const double *first = states.row(0).data();
+  act(0);
+  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, held,
+                                replay);
+  for (Eigen::Index i = 0; i < states.rows(); ++i) {
+    act(i);
+    const auto output = static_cast<std::size_t>(i);
+    run.evaluate(output, times[output], states.row(i).data(), reader, model.mechanism.n_q, false, replay);
+  }
+  return run;
+}
 
 // The motion from (q, v) at the first of `times`, or on from a checkpoint, with outputs at all of them, which `reader`
 // evaluates. Pointers may be null.

@@ -1,6 +1,6 @@
 #include "core/forward/forward_motion.h"
 
-#include "core/forward/archive.h"
+#include "core/archive.h"
 
 #include <algorithm>
 #include <utility>
@@ -65,24 +65,12 @@ void check(bool holds, const char *expected) {
 
 } // namespace
 
-std::string bytes_of(const ForwardModel &model) {
-  Writer writer;
-  ForwardModel copy = model; // one description serves both ways
-  writer.bytes = head;
-  archived(writer, copy);
-  return writer.bytes;
-}
+std::string bytes_of(const ForwardModel &model) { return head + to_bytes(model); }
 
 ForwardModel forward_model_of(const std::string &bytes) {
   if (bytes.compare(0, head.size(), head) != 0)
     throw std::runtime_error("expected a model of this version of ffrobot, found another file");
-  const std::string content = bytes.substr(head.size());
-  Reader reader(content);
-  ForwardModel model;
-  archived(reader, model);
-  if (reader.left() != 0)
-    throw std::runtime_error("expected the end of the file, found more data");
-  return model;
+  return of_bytes<ForwardModel>(bytes.substr(head.size()));
 }
 
 ForwardMotion::ForwardMotion(ForwardModel model)

@@ -153,15 +153,15 @@ private:
   }
 
   void repeat_steps() {
-    if (breaks_ || method_->lands_on_outputs())
-      throw std::invalid_argument("repeated steps: expected an explicit method and no breaks, found others");
+    if (breaks_)
+      throw std::invalid_argument("repeated steps: expected no breaks, found some");
     const std::vector<double> &ends = controls_.repeated_steps;
     for (auto end = std::upper_bound(ends.begin(), ends.end(), t_); end != ends.end(); ++end) {
       const Attempt attempt{*end, *end - t_, *end, false};
       steps_.next_step = report_.last_step = attempt.step;
       if (!may_go_on())
         return;
-      if (!method_->step(t_, z_.data(), attempt.step, rounding_of_errors) || !method_->finish(attempt.end)) {
+      if (!method_->step(t_, z_.data(), attempt.step, controls_.tolerance) || !method_->finish(attempt.end)) {
         report_.last_error = NAN;
         report_.status = IntegrationStatus::step_underflow;
         return;

@@ -19,6 +19,8 @@ from random_bodies import (
     with_rows,
 )
 
+from ffrobot.mbs import _core
+
 curved_or_not = pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 FAR = {False: 0.1, True: 0.3}  # modal coordinates
 
@@ -135,10 +137,10 @@ def test_energy_and_momentum_of_points(curved):
         gravitational -= body.mass @ place @ GRAVITY
         momentum += body.mass @ velocity
         angular += body.mass @ np.cross(place, velocity)
-    found = model.totals(q, v)
-    np.testing.assert_allclose([found.kinetic, found.gravitational], [kinetic, gravitational], rtol=1e-12)
-    np.testing.assert_allclose(found.momentum, momentum, rtol=1e-11)
-    np.testing.assert_allclose(found.angular_momentum, angular, rtol=1e-11)
+    found = model.states_totals(_core.TreeScene(), q[None], v[None])[0]
+    np.testing.assert_allclose(found[[0, 2]], [kinetic, gravitational], rtol=1e-12)
+    np.testing.assert_allclose(found[4:7], momentum, rtol=1e-11)
+    np.testing.assert_allclose(found[7:], angular, rtol=1e-11)
 
 
 def test_derivatives_of_stiffened_bodies_by_differences():
@@ -154,7 +156,9 @@ def test_derivatives_of_stiffened_bodies_by_differences():
     model = mechanism.model()
     q, v = random_state(rng, mechanism, model, deflection=0.3)
     target, force, h = np.zeros(1), rng.standard_normal(model.n_v), 1e-6
-    found = model.derivatives(q, v, target, force, None)
+    scene = _core.TreeScene()
+    scene.add_target(_core.TimeFunction.constant(0.0))
+    found = model.derivatives(scene, 0.0, q, v, force)
 
     def slope(of):
         return np.array([(of(h * e) - of(-h * e)) / (2 * h) for e in np.eye(model.n_v)]).T

@@ -112,6 +112,11 @@ std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *
 
 namespace {
 
+struct Totals {
+  double kinetic = 0, strain = 0, gravitational = 0, dissipated = 0;
+  Vector3d momentum = Vector3d::Zero(), angular_momentum = Vector3d::Zero();
+};
+
 template <class Space> Totals totals(const Placed<Space, double> &at) {
   const auto &[m, w, q, v, generalized] = at;
   Totals sum;
@@ -143,13 +148,6 @@ template <class Space> Totals totals(const Placed<Space, double> &at) {
   return sum;
 }
 
-} // namespace
-
-template <class Space>
-Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w) {
-  return totals(place_all(m, q, v, nullptr, w));
-}
-
 template <class Space>
 Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
               Workspace<Space, double> &w) {
@@ -172,6 +170,8 @@ Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, co
   return sum;
 }
 
+} // namespace
+
 template <class Space>
 RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v) {
   Workspace<Space, double> w(m);
@@ -188,8 +188,6 @@ template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const
                                                 Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,
                                                 Workspace<Spatial, double> &);
-template Totals totals(const Mechanism<Planar> &, const double *, const double *, Workspace<Planar, double> &);
-template Totals totals(const Mechanism<Spatial> &, const double *, const double *, Workspace<Spatial, double> &);
 template RowMajor totals_of_states(const Mechanism<Planar> &, const Scene &, const RowMajor &, const RowMajor &);
 template RowMajor totals_of_states(const Mechanism<Spatial> &, const Scene &, const RowMajor &, const RowMajor &);
 

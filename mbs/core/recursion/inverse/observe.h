@@ -19,22 +19,9 @@ template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w);
 
-// Kinetic, strain and gravitational energy (J), the power (W) that is dissipated, and momentum: linear, angular about
-// the origin (3 each).
-struct Totals {
-  double kinetic = 0, strain = 0, gravitational = 0, dissipated = 0;
-  Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
-};
-template <class Space>
-Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w);
-
-// With what springs and friction of a scene store and dissipate
-template <class Space>
-Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
-              Workspace<Space, double> &w);
-
-// The same of states q (T, n_q), v (T, n_v): (T, 10) kinetic, strain, gravitational, dissipated; momentum, linear and
-// angular
+// Of states q (T, n_q), v (T, n_v), with what springs and friction of a scene store and dissipate: (T, 10) kinetic,
+// strain and gravitational energy (J), the power (W) that is dissipated, and momentum: linear, angular about the origin
+// (3 each).
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 template <class Space>
 RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v);

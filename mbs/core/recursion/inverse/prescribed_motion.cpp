@@ -79,11 +79,6 @@ template <class Space> void PrescribedMotion<Space>::set_modes(const ModalMotion
   a_(driven_.of_modes) = modes.p_ddot;
 }
 
-template <class Space> void PrescribedMotion<Space>::turn_markers(double t) {
-  for (const DrivenMarker &driven : driven_.scene.driven)
-    w_.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
-}
-
 template <class Space> void PrescribedMotion<Space>::measure() {
   recursion::measure(driven_.mechanism, q(), v(), w_, value_.data(), rate_.data());
   for (std::size_t r = 0; r < targets_.size(); ++r) {
@@ -135,7 +130,7 @@ bool PrescribedMotion<Space>::follow(double t, const ModalMotion &modes, std::ve
     go(t - time_, v_all(driven_.of_joints));
   v_all(driven_.of_joints).setZero(), a_(driven_.of_joints).setZero();
   set_modes(modes);
-  turn_markers(t);
+  turn_markers(driven_.scene, t, w_);
   goes_on_ = true;
   time_ = t;
   if (!find_position())
@@ -161,7 +156,7 @@ void PrescribedMotion<Space>::take_joints(double t, const ModalMotion &modes, co
   targets_ = other.targets_;
   state_ = other.state_, a_ = other.a_;
   set_modes(modes);
-  turn_markers(t);
+  turn_markers(driven_.scene, t, w_);
   time_ = t;
   measure();
   factorise();

@@ -86,7 +86,6 @@ private:
   Derivatives derivatives_under(const Eigen::VectorXd &forces, const std::vector<int> &active);
   void set_modes(const ModalMotion &modes);
   void act(double t); // at the state that was measured
-  void turn_markers(double t);
   bool find_position();
   void measure();
   void factorise();

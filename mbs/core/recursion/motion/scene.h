@@ -127,6 +127,12 @@ struct Scene {
       modal_amplitude_limits; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
 
+// Puts the markers of the ground that turn where they are at time t.
+template <class Workspace> void turn_markers(const Scene &scene, double t, Workspace &w) {
+  for (const DrivenMarker &driven : scene.driven)
+    w.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
+}
+
 std::vector<Jet> targets_at(const Scene &scene, double t); // of all constraint equations
 
 } // namespace ffrobot::recursion

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace ffrobot {
@@ -75,6 +77,16 @@ template <class Archive, class Matrix> void archived_matrix(Archive &archive, Ma
   archive.raw(x.data(), static_cast<std::size_t>(x.size()) * sizeof(double));
 }
 
+template <class Archive, class T> void fields(Archive &archive, std::optional<T> &x) {
+  bool is_there = x.has_value();
+  T value = x.value_or(T());
+  archived(archive, is_there), archived(archive, value);
+  x = is_there ? std::optional(value) : std::nullopt;
+}
+template <class Archive, class A, class B> void fields(Archive &archive, std::pair<A, B> &x) {
+  archived(archive, x.first), archived(archive, x.second);
+}
+
 template <class Archive, class T> void archived(Archive &archive, T &x) {
   if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>)
     archive.raw(&x, sizeof x);
@@ -87,5 +99,21 @@ template <class Archive, class T> void archived(Archive &archive, T &x) {
 }
 
 template <class Archive, class... T> void archived_all(Archive &archive, T &...x) { (archived(archive, x), ...); }
+
+template <class T> std::string to_bytes(T x) { // a copy: one description serves both ways
+  Writer writer;
+  archived(writer, x);
+  return writer.bytes;
+}
+
+// Throws std::runtime_error for bytes that are none of to_bytes().
+template <class T> T of_bytes(const std::string &bytes) {
+  Reader reader(bytes);
+  T x{};
+  archived(reader, x);
+  if (reader.left() != 0)
+    throw std::runtime_error("expected the end of the file, found more data");
+  return x;
+}
 
 } // namespace ffrobot
