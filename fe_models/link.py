@@ -2,7 +2,8 @@
 
 | part | depends on |
 |---|---|
-| modes, invariants, prestress | geometry, mesh, interfaces, outlined patches, material, `[reference]`, `[modes]` |
+| mesh (solids that gmsh meshes: `mesh.kept_parts`) | geometry, mesh, places of interfaces, outlined patches |
+| modes, invariants, prestress | the mesh; material, theory, reference condition, attached masses, `[modes]` |
 | damping ratios, modal stresses, name, what was measured | the modes; `[damping]`, `[stress]`, `name`, `[measured]` |
 
 Importing this loads no finite element library; they are loaded where a link must be computed.
@@ -16,6 +17,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,7 @@ from ..common.parallel import on_first, processes, without_daemon
 from ..common.structs import struct
 from ..common.validation import plain
 from ..common.version import digest_of_code
-from ..mesh.included import geometry_content
+from ..mesh.kept_parts import digest_of_mesh_code, geometry_content, kept_path
 from .link_file import read_link
 from .link_records.families import FAMILIES
 from .link_records.link import BeamLink, Link, SolidLink
@@ -52,7 +54,7 @@ class LinkOutcome:
         path: the modal body file.
         body: its content.
         computed: False if the file was up to date.
-        reused: "modes" of an earlier run, or empty.
+        reused: "modes" or "mesh" of an earlier run, or empty.
         seconds: wall time, reading and writing included.
     """
 
@@ -131,7 +133,7 @@ def computed_modal_body(source: LinkSource) -> ModalBody:
     Raises `InputError` for a wrong link file, `SolveError` where the modes cannot be computed.
     """
     link, path = read_link(source), link_path(source)
-    compute = _computation(link, path)
+    compute = _computation(link, path, remesh=False)
     with of_file(path), ending_at_once():
         body: ModalBody = compute(link, path, _silent)
     return body
@@ -174,7 +176,8 @@ def _compute(
 
     if on_first(from_same_modes):
         return LinkOutcome(path, read_modal_body(path), True, time.perf_counter() - start, "modes")
-    compute = _computation(link, source_path)  # on all processes: the libraries start together
+    meshed = on_first(lambda: not force and isinstance(link, SolidLink) and kept_path(link.part(source_path)).is_file())
+    compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
         with of_file(source_path), ending_at_once():
@@ -187,7 +190,7 @@ def _compute(
     else:
         body = make()
         on_first(lambda: write(body))
-    return LinkOutcome(path, body, True, time.perf_counter() - start)
+    return LinkOutcome(path, body, True, time.perf_counter() - start, "mesh" if meshed else "")
 
 
 def _with_same_modes(link: Link, earlier: Sequence[Path]) -> ModalBody | None:
@@ -201,7 +204,7 @@ def _with_same_modes(link: Link, earlier: Sequence[Path]) -> ModalBody | None:
     return None
 
 
-def _computation(link: Link, source_path: Path) -> Callable[..., ModalBody]:
+def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
     if isinstance(link, BeamLink):
         from .beam.link import beam_modal_body  # loads SciPy
 
@@ -217,7 +220,7 @@ def _computation(link: Link, source_path: Path) -> Callable[..., ModalBody]:
                 return beam_modal_body
             from .solid.link import solid_modal_body
 
-            return solid_modal_body
+            return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:
         raise SolveError(
             f"{source_path}: computing this link needs the finite element libraries, and {error.name} is not installed:"
@@ -273,8 +276,7 @@ def _content(link: Link) -> dict[str, Any]:
 
 
 def _digest(record: Mapping[str, Any]) -> str:
-    code = {folder: digest_of_code(Path(__file__).parents[1] / folder) for folder in ("fe_models", "mesh")}
-    content = {"link": record, **code}
+    content = {"link": record, "fe_models": digest_of_code(Path(__file__).parent), "mesh": digest_of_mesh_code()}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

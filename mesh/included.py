@@ -1,23 +1,19 @@
 """Files of meshes that consist of several, as Abaqus and Nastran decks do: their lines, and which files these are.
 
-NumPy is not needed: input hashes are made of `geometry_content`.
+NumPy is not needed: input hashes are made of `files_of`.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
 import re
 from collections.abc import Callable, Iterator
 from glob import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from ..common.errors import InputError
 from ..common.tables import shown
-
-if TYPE_CHECKING:
-    from .records import SolidGeometry
 
 _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
     r"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINPUT[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
@@ -132,14 +128,3 @@ def whole_of(token: str, place: str) -> int:
         return int(token)
     except ValueError:
         raise InputError(f'{place}: expected a whole number, found "{token}"') from None
-
-
-def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
-    """The keys of `[geometry]`, the content of a part's file, and of files that it includes, in place of its name."""
-    record = geometry.model_dump(mode="json")
-    if geometry.file is not None:
-        first, *others = (hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(geometry.file))
-        record["file"] = first
-        if others:
-            record["included"] = others
-    return record

@@ -27,6 +27,7 @@ from .checks import (
     straightened,
 )
 from .faces import named_faces
+from .kept_parts import keep_part, kept_part, kept_path
 from .mesh_files import read_mesh
 from .part_mesh import PartMesh
 from .part_reader import read_apart
@@ -37,6 +38,18 @@ from .structured import Divisions, structured_box
 Progress = Callable[[str], None]
 
 _STEP = (".step", ".stp")
+
+
+def kept_or_new(tables: PartTables, progress: Progress, *, remesh: bool) -> PartMesh:
+    """`part_mesh`, or what it made of the same part before, where gmsh would have to make it and not `remesh`."""
+    if not _is_meshed(tables):
+        return part_mesh(tables, progress)
+    kept = kept_path(tables)
+    part = None if remesh else kept_part(kept)
+    if part is None:
+        part = part_mesh(tables, progress)
+        keep_part(kept, part)
+    return part
 
 
 def part_mesh(tables: PartTables, progress: Progress) -> PartMesh:
@@ -63,6 +76,13 @@ def part_mesh(tables: PartTables, progress: Progress) -> PartMesh:
     return named_faces(replace(source, part=part), tables)
 
 
+def _is_meshed(tables: PartTables) -> bool:
+    """Whether gmsh makes the mesh: of a shape drawn here, or a STEP file."""
+    if tables.geometry.file is not None:
+        return is_step(tables.geometry.file)
+    return tables.mesh.divisions is None and tables.mesh.cell != "hexahedron"
+
+
 def is_step(file: Path) -> bool:
     """Whether the ending says so."""
     return file.suffix.lower() in _STEP
@@ -71,7 +91,7 @@ def is_step(file: Path) -> bool:
 def _source(tables: PartTables, where: str) -> Source:
     file, record = tables.geometry.file, tables.mesh
     if file is None:
-        if record.divisions is not None or record.cell == "hexahedron":
+        if not _is_meshed(tables):
             return Source(_box(tables.geometry, record, where), {}, {})
         from .shapes import mesh_shape
 

@@ -22,7 +22,7 @@ from ..common.errors import FfrobotError, InputError
 from ..common.structs import struct
 from .cells import CellName
 from .compat import coordinate_element, create_solid_mesh, geometry_nodes
-from .part import part_mesh
+from .part import kept_or_new
 from .part_mesh import PartMesh, Tags, facet_keys
 from .records import PartTables
 
@@ -168,15 +168,17 @@ class SolidMesh:
         return self.regions[region], *self.overlaps.get(region, ())
 
 
-def solid_mesh(tables: PartTables, comm: MPI.Comm = MPI.COMM_WORLD, progress: Progress = lambda _: None) -> SolidMesh:
+def solid_mesh(
+    tables: PartTables, comm: MPI.Comm = MPI.COMM_WORLD, progress: Progress = lambda _: None, *, remesh: bool = False
+) -> SolidMesh:
     """Mesh of a solid link, distributed over `comm`, all of whose processes call; see `part_mesh`.
 
-    Raises `InputError` on every process.
+    Unless `remesh` a mesh of the same part kept from an earlier run counts. Raises `InputError` on every process.
     """
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:
         try:
-            outcome = part_mesh(tables, progress)
+            outcome = kept_or_new(tables, progress, remesh=remesh)
         except FfrobotError as error:
             outcome = error
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)

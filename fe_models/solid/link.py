@@ -61,14 +61,16 @@ class Places(NamedTuple):
         return found
 
 
-def solid_modal_body(link: SolidLink, path: Path, progress: Progress, comm: MPI.Comm = MPI.COMM_WORLD) -> ModalBody:
+def solid_modal_body(
+    link: SolidLink, path: Path, progress: Progress, comm: MPI.Comm = MPI.COMM_WORLD, *, remesh: bool = False
+) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; collective over `comm`, the same on all its processes.
 
-    The hashes are left empty. Raises `InputError` where the part cannot be meshed, a face is missing, or more modes are
-    asked for than the mesh has; `SolveError` where the stiffness cannot be factorised, or the eigensolver did not
-    converge.
+    A mesh kept from an earlier run is used unless `remesh`. The hashes are left empty. Raises `InputError` where the
+    part cannot be meshed, a face is missing, or more modes are asked for than the mesh has; `SolveError` where the
+    stiffness cannot be factorised, or the eigensolver did not converge.
     """
-    solid = solid_mesh(link.part(path), comm, progress)
+    solid = solid_mesh(link.part(path), comm, progress, remesh=remesh)
     progress(f"{link.name}: assembling")
     model = solid_model(solid.mesh, link.mesh.order or default_order(solid.cell), _materials(link, solid, path))
     places = _places(link, model, solid)

@@ -306,6 +306,8 @@ class Solution:
                 )
 
 
+_STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
+
 OFF_AXIS = 0.01  # of the extent: less is that of a mesh
 RIGID = 1e-9  # of the motion across: less along the axis is rounding
 
@@ -325,7 +327,7 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
         if not body.computed:
             yield f"{name}: stage 1, up to date"
         elif body.reused:
-            yield f"{name}: stage 1 but for damping, stresses and name"
+            yield f"{name}: {_STAGE_1[body.reused]}"
         yield from _modes(name, of[name], body.modal)
     flexible = [name for name, body in bodies.items() if body.modal is not None]
     rigid = [name for name in bodies if name not in flexible]

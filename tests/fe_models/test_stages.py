@@ -11,6 +11,7 @@ from ffrobot.common.checksum import seal
 from ffrobot.common.version import digest_of_code
 from ffrobot.fe_models.link import cached_modal_body, make_link, restated
 from ffrobot.fe_models.link_file import read_link
+from ffrobot.mesh.kept_parts import kept_part, kept_path
 
 FINITE_ELEMENTS = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl")
 
@@ -129,15 +130,16 @@ def test_what_another_state_of_the_program_made_is_not_up_to_date(link_file, cac
     assert (again.computed, again.reused) == (True, "")
 
 
-def test_solids_keep_their_modes(solid, cache):
+def test_solids_keep_their_mesh_and_their_modes(solid, cache):
     path, change = solid
     lines, first = told(path)
     assert "meshing" in lines
     assert first.reused == ""
     for old, new in (("count = 3", "count = 4"), ('"cantilever"', '"simply-supported"')):
         lines, outcome = told(change(old, new))
+        assert "meshing" not in lines
         assert "bar: solving for the modes" in lines
-        assert outcome.reused == ""
+        assert outcome.reused == "mesh"
     before = outcome.body
     lines, outcome = told(change("root = [", "low = ["))
     assert lines == []
@@ -153,3 +155,19 @@ def test_solids_keep_their_modes(solid, cache):
     lines = []
     assert make_link(path, force=True, progress=lines.append).reused == ""
     assert "meshing" in lines
+
+
+def test_a_kept_mesh_gives_the_same_modal_body_and_a_damaged_one_is_made_again(solid, cache):
+    path, change = solid
+    make_link(path)
+    link = read_link(change("count = 3", "count = 2"))
+    kept = kept_path(link.part(path))
+    assert kept_part(kept).faces.keys() >= {"root", "tip"}
+    quick = told(path)[1].path.read_bytes()
+    kept.write_bytes(kept.read_bytes()[:999])
+    assert kept_part(kept) is None
+    path.with_suffix(".h5").unlink()
+    lines, outcome = told(path)
+    assert "meshing" in lines
+    assert kept_part(kept) is not None
+    assert outcome.path.read_bytes() == quick

@@ -11,7 +11,7 @@ from solid_parts import VOLUME, bar, face_area, integrate, two_bars
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.gmsh_session import gmsh_session
-from ffrobot.mesh.included import geometry_content
+from ffrobot.mesh.kept_parts import geometry_content
 from ffrobot.mesh.mesh_files import read_foreign
 from ffrobot.mesh.records import PlaceRecord
 from ffrobot.mesh.structured import structured_box
