@@ -39,6 +39,8 @@ Progress = Callable[[str], None]
 
 # Cubic elements of the stations: as many as there are cells along the axis, within these bounds.
 ELEMENTS = (20, 40)
+# Of the extents: by less the middle between faces is on the axis.
+ROUNDING = 1e-9
 
 # Components (translation 0 … 2, rotation 3 … 5) that each reference condition holds at root and tip.
 _CLAMPED: dict[str, tuple[int, ...]] = {"root": (0, 1, 2, 3, 4, 5), "tip": ()}
@@ -225,9 +227,11 @@ def _stations(link: SolidLink, sections: Averages, x: Array, element: Integers, 
     modulus = np.ravel(link.material.youngs_modulus)[0]  # of an orthotropic one E_x
     rigidity = None if link.region else modulus * np.stack([area, I_yy], axis=1)
     lateral = None if link.region else modulus * I_zz
+    middle, extents = _onward(sections.middle), np.stack([height, width], axis=1)
+    is_off = np.any(np.abs(middle) > ROUNDING * extents)
     return Stations(
         centroid, u, turn, height, element, rigidity=rigidity, width=width, out_of_plane_rigidity=lateral,
-        middle=_onward(sections.middle),
+        middle=middle if is_off else None,
     )  # fmt: skip
 
 

@@ -33,8 +33,9 @@ def summary_lines(
     """
     of_analyses = [_analysis(one) for one in verdict.analyses]
     remarks: list[str] = []
-    if max(map(len, _aligned([ANALYSES, *of_analyses]))) > width:  # the last column moves below
-        remarks = list(_labelled("remark", ["; ".join(alike((row[0], row[-1]) for row in of_analyses if row[-1]))]))
+    beside = [(row[0], row[-1]) for row in of_analyses if row[-1]]
+    if beside and max(map(len, _aligned([ANALYSES, *of_analyses]))) > width:  # the last column moves below
+        remarks = list(_labelled("remark", ["; ".join(alike(beside))]))
         of_analyses = [(*row[:-1], "") for row in of_analyses]
     texts = [*remarks, *_texts(verdict), *_labelled("note", notes)]
     motors, worst = list(_motors(verdict.analyses)), list(_worst_motors(verdict.analyses))

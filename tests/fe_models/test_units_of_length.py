@@ -19,7 +19,7 @@ SYSTEMS = {
 }
 # Powers of length, mass and time of each dataset.
 DIMENSIONS = {
-    r"length|stations/(height|width|outline)|.*position|mesh/points": (1, 0, 0),
+    r"length|stations/(height|width|middle|outline)|.*position|mesh/points": (1, 0, 0),
     r"mass": (0, 1, 0),
     r"first_moment": (1, 1, 0),
     r"second_moment|invariants/J_spin": (2, 1, 0),
