@@ -1,6 +1,6 @@
 """Stage 1 of a solid, phase by phase: CPU seconds of each, and the peak memory.
 
-    .venv/bin/python tools/bench/solids/phases.py h112 t105 h377 t384 h1026
+    .venv/bin/python tools/bench/solids/phases.py h112 t105 h377 t384 h1026 t1024
 
 h: a bar of 0.5 × 0.06 × 0.06 m in 27-node hexahedra; t: a plate of 0.4 × 0.2 × 0.03 m with six bores in ten-node
 tetrahedra by gmsh; the number is that of unknowns in thousands. Each is clamped by its mean at the root and has 20
@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 DIVISIONS = {"h12": (20, 4, 4), "h112": (42, 10, 10), "h377": (65, 15, 15), "h1026": (92, 21, 21)}
-SIZES = {"t20": 0.016, "t105": 0.0081, "t384": 0.0050}
+SIZES = {"t20": 0.016, "t105": 0.0081, "t384": 0.0050, "t1024": 0.0035}
 LINK = """
 name = "{name}"
 [material]
