@@ -71,15 +71,15 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
 
     That is so of a component of a vector, whose length has a peak, and of files without peaks.
     """
-    values = dataset[()].reshape(len(time), -1)
     peaks, times = (np.atleast_1d(dataset.attrs.get(key, ())) for key in ("peak", "peak_time"))
-    if column is not None and len(peaks) < values.shape[1]:
+    if len(peaks) and (column is None or len(peaks) == np.prod(dataset.shape[1:])):
+        k = int(peaks.argmax()) if column is None else column
+        return float(peaks[k]), float(times[k])
+    values = dataset[()].reshape(len(time), -1)
+    if column is not None:
         return largest(time, values[:, column])
-    if not len(peaks):
-        is_vector = _is_vector(dataset.name.split("/", 2)[2])
-        return largest(time, np.linalg.norm(values, axis=1) if is_vector else np.abs(values).max(axis=1))
-    k = int(peaks.argmax()) if column is None else column
-    return float(peaks[k]), float(times[k])
+    is_vector = _is_vector(dataset.name.split("/", 2)[2])
+    return largest(time, np.linalg.norm(values, axis=1) if is_vector else np.abs(values).max(axis=1))
 
 
 def write_peaks(group: h5py.Group, time: Array, found: Mapping[str, Array], outputs: Indices) -> None:

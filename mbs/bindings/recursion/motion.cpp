@@ -52,7 +52,6 @@ TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vec
   return outputs_at(model, scene, times, states, nullptr, replay, [](Index) {});
 }
 
-// (q, v, what is left) on the rows at time t
 // x (n_v) of N x + C_q^T nu = r, C_q x = c at (q, v); complex factors know no c
 template <class Space, class Scalar>
 Eigen::Matrix<Scalar, Eigen::Dynamic, 1>
