@@ -127,8 +127,8 @@ def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: Indices | slice
     for name, r in modal.items():
         node = motion.node(name)
         shift[:, node.p_v] = -(r[rows] @ node.body.modal_transform) / node.body.stiffness
-    shift[:, joints] = np.einsum("tjn,tn->tj", split.left.reshape(T, count, -1), shift)
-    R[:, joints] = moments.reshape(T, count, -1)
+    shift[:, joints] = np.einsum("tjn,tn->tj", split.left.reshape(T, count, tree.n_v), shift)
+    R[:, joints] = moments.reshape(T, count, moments.shape[1])
     return _Held(shift, R)
 
 

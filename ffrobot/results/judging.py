@@ -205,7 +205,7 @@ def _advice(
         carried = "" if is_compliant else f'kind = "tracking"{"" if at_rest else " on a path from rest to rest"}, or '
         other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'
         yield f"{carried}{other}: no realistic patch can supply the voltages of {', '.join(far)}"
-    if asked and read_unsupplied(group["feasibility"]) is not None:
+    if asked and "trajectories" in group and read_unsupplied(group["feasibility"]) is not None:
         inversion = 'kind = "motors-only", or ' if at_rest else ""
         tracked = "" if is_compliant else ' with kind = "tracking"'
         yield f"{inversion}patches ([[pzt]]) on the links{tracked}"

@@ -199,6 +199,8 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
 
 def _unmet_needs(scene: SceneKeys, analysis: Analysis) -> Iterator[str]:
     for need in analysis.needs():
+        if need.table == "trajectory" and analysis.allocates_patches and not scene.motor_joints:
+            continue  # patches alone act, as on a beam that is welded to the ground
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
     # Linear models of 3D scenes may have no inputs.

@@ -370,6 +370,24 @@ def test_patches_add_the_damping_that_is_asked_for(sensor):
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize(
+    "inverse", [{"kind": "pcid"}, {"kind": "fcid", "shape": "static"}, {"kind": "fcid", "shape": "zero"}]
+)
+def test_a_beam_that_is_welded_needs_no_trajectory(space, inverse):
+    """Its tip is hit, and patches damp it as is asked for: nothing moves but the link."""
+    control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": "ideal"}
+    hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
+    solution = solve_scene(make_scene(
+        name="welded", space=space, gravity=[0.0, 0.0] if space == "planar" else [0.0, 0.0, 0.0],
+        body=[{"name": "link", "link": paper_link(count=3)}], pzt=[PATCHES],
+        joint=[{"name": "O", "type": "weld", "between": ["ground", "link.root"]}],
+        analysis=[{"name": "inverse", "end": 0.3, "output_step": 5e-4} | inverse,
+                  loop(sample_time=1e-4, controller=[control], disturbance=hit)],
+    ))  # fmt: skip
+    assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
+
+
 def test_all_integrators_go_from_sample_to_sample_alike():
     """Loads jump at every sample: methods that look back must not look across."""
     control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
