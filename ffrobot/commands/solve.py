@@ -49,7 +49,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
     from ..present.console import summary_console, summary_width
-    from ..present.lines import error_budget
+    from ..present.lines import error_budget, folded
     from ..present.progress import Display
     from ..present.start_postures import chosen_posture
     from ..present.summary import summary_lines
@@ -61,7 +61,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     from ..scene.plausibility import remarks
 
     scene = load_scene(scene_file)
-    remarked = list(remarks(scene))
+    remarked = list(folded(remarks(scene)))
     for remark in remarked:  # first: they may be why the run fails
         click.echo(f"note       {remark}")
     writing, kept = 0.0, []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, TextIO
@@ -13,8 +14,8 @@ PLAIN_WIDTH = 120  # columns where the output is no terminal
 
 
 def summary_width() -> int:
-    """Columns of the standard output; what goes to a file is not squeezed into 80."""
-    return get_terminal_size().columns if sys.stdout.isatty() else PLAIN_WIDTH
+    """Columns of the terminal, or those of the variable COLUMNS; output to a file is not squeezed into 80."""
+    return get_terminal_size().columns if sys.stdout.isatty() or "COLUMNS" in os.environ else PLAIN_WIDTH
 
 
 def plain_console(file: TextIO, width: int) -> Console:

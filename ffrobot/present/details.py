@@ -19,7 +19,7 @@ from ..results.tables import Cells, analysis_cells, voltage_cells
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
 from .control import control_lines, control_tables
-from .lines import alike, error_budget, integrated, named_tables, warning_lines
+from .lines import alike, error_budget, folded, integrated, named_tables, warning_lines
 
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 
@@ -69,7 +69,7 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
 
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     runs = {result.analysis.name: result.run for result in integrated(solution)}
-    yield from (("path", note) for note in solution.path_notes)
+    yield from (("path", note) for note in folded(solution.path_notes))
     chosen = ((name, run.statistics.integrator) for name, run in runs.items())
     said = alike((name, f"{one.in_words}; {one.reason}") for name, one in chosen if one.is_automatic)
     yield from (("integrator", line) for line in said)

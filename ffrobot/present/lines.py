@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,18 @@ def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
         names.setdefault(text, []).append(name)
     for text, of in names.items():
         yield f"{', '.join(of)}: {text}"
+
+
+NAMED = re.compile(r'((?:.*?(?:trajectory|joint|body|link|motor) )?)("[^"]+"|[^:]+)(.*)', re.DOTALL)
+
+
+def folded(lines: Iterable[str]) -> Iterator[str]:
+    """One line for those that differ in a name only: `trajectory "a", "b" ends at 1 s`."""
+    names: dict[tuple[str, str], dict[str, None]] = {}
+    for line in lines:
+        before, name, after = NAMED.fullmatch(line).groups()  # type: ignore[union-attr]
+        names.setdefault((before, after), {})[name] = None
+    yield from (f"{before}{', '.join(of)}{after}" for (before, after), of in names.items())
 
 
 def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:

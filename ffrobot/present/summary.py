@@ -7,15 +7,16 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, number, of_limit
-from .lines import alike
+from .lines import alike, folded
 
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
 
 LINES = 15  # that a summary has at most
 MOTORS = 6  # rows of motors for which analyses make room
-TEXTS = 2  # lines of warnings and advice, likewise
+TEXTS, MOST_TEXTS = 2, 5  # lines of warnings and advice for which analyses, and motors, make room
 REST = "--verbose"
+LABEL = 11  # columns of "warning", "to try" and the like
 
 ANALYSES = ("analysis", "kind", "answer", "tip error, controlled", "tip error, open loop", "deflection", "remark")
 MOTOR = ("motor", "peak", "RMS", "speed", "power", "of limits", "in")
@@ -37,17 +38,17 @@ def summary_lines(
     if beside and max(map(len, _aligned([ANALYSES, *of_analyses]))) > width:  # the last column moves below
         remarks = list(_labelled("remark", ["; ".join(alike(beside))]))
         of_analyses = [(*row[:-1], "") for row in of_analyses]
-    texts = [*remarks, *_texts(verdict), *_labelled("note", notes)]
+    texts = [*_texts(verdict, remarks), *_labelled("note", folded(notes))]
+    wanted = min(sum(len(_wrapped(text, width)) for text in texts), MOST_TEXTS)
     motors, worst = list(_motors(verdict.analyses)), list(_worst_motors(verdict.analyses))
     room = LINES - printed - 3 - bool(motors)  # without both headers, accuracy, results
     for_motors = min(len(worst), MOTORS, (room + 1) // 2)
     analyses = _at_most(of_analyses, room - for_motors - min(len(texts), TEXTS))
     room -= len(analyses)
-    rows = motors if len(motors) + min(len(texts), TEXTS) <= room else worst
-    rows = _at_most(rows, max(for_motors, room - len(texts)))
+    rows = _at_most(motors if len(motors) + wanted <= room else worst, max(for_motors, room - wanted))
     lines = _aligned([ANALYSES, *analyses]) + (_aligned([MOTOR, *rows]) if rows else [])
-    lines += _fitted(texts, room - len(rows), width)
-    lines += _fitted([f"accuracy   {accuracy}"], LINES - printed - 1 - len(lines), width)
+    lines += fitted(texts, room - len(rows), width)
+    lines += fitted([f"accuracy   {accuracy}"], LINES - printed - 1 - len(lines), width)
     return [_cut(line.rstrip(), width) for line in lines] + [f"results    {results}"]
 
 
@@ -114,34 +115,61 @@ def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
     )
 
 
-def _texts(verdict: Verdict) -> Iterator[str]:
-    """Warnings, what robots at rest do, what to try, notes, once for all analyses of which they are said."""
+def _texts(verdict: Verdict, remarks: Sequence[str]) -> Iterator[str]:
+    """Warnings, `remarks`, advice, robots at rest and notes, once for all analyses that have them."""
     warnings = ((one.name, text) for one in verdict.analyses for text in one.warnings)
     advice = ((one.name, text) for one in verdict.analyses for text in one.advice)
     yield from _labelled("warning", alike(warnings))
-    yield from _labelled("at rest", alike((one.name, one.held) for one in verdict.analyses if one.held))
     yield from _labelled("to try", alike(advice))
+    yield from remarks
+    yield from _labelled("at rest", alike((one.name, one.held) for one in verdict.analyses if one.held))
     yield from _labelled("note", alike((one.name, text) for one in verdict.analyses for text in one.notes))
 
 
 def _labelled(label: str, texts: Iterable[str]) -> Iterator[str]:
-    yield from (f"{label:<9}  {text}" for text in texts)
+    yield from (f"{label:<{LABEL}}{text}" for text in texts)
 
 
-def _fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
-    """A line each, the first ones in full as long as there is room; the last line counts those without a line."""
+def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
+    """Whole texts, wrapped, as far as there is room: the first with each label before others; the last counts the rest.
+
+    The first of all ends early where it has more lines than the first of another label leaves.
+    """
     if not texts or room < 1:
         return []
-    shown = texts[:room]
-    lines: list[str] = []
-    for k, text in enumerate(shown):
-        free = room - len(lines) - (len(shown) - k - 1)
-        whole = wrap(text, width, subsequent_indent=" " * 11, break_long_words=False)
-        if len(whole) > free:
-            whole = [*whole[: free - 1], _cut(" ".join([whole[free - 1], whole[free].strip()]), width)]
-        lines += whole
-    more = f" (+{len(texts) - room} more: {REST})" if len(texts) > room else ""
-    return [*lines[:-1], _cut(lines[-1], width - len(more)) + more]
+    labels = [text[:LABEL] for text in texts]
+    order = sorted(range(len(texts)), key=lambda k: labels[k] in labels[:k])
+    beside = len(_wrapped(texts[order[1]], width)) if len(texts) > 1 else 0
+    free = room - beside if beside <= room - 2 else room
+    ends_early = len(_wrapped(_counted(texts[0], len(texts) - 1), width)) > free
+
+    def laid_out(shown: Sequence[int]) -> list[str]:
+        left = len(texts) - len(shown)
+        blocks = [_wrapped(texts[k] if k < shown[-1] else _counted(texts[k], left), width) for k in shown]
+        if ends_early:
+            blocks[0] = _shortened(texts[0], free, width)
+        return [line for block in blocks for line in block]
+
+    shown = [0]
+    for k in order[1:]:
+        if len(laid_out(tried := sorted([*shown, k]))) <= room:
+            shown = tried
+    return laid_out(shown)
+
+
+def _counted(text: str, left: int) -> str:
+    return f"{text} (+{left} more: {REST})" if left else text
+
+
+def _shortened(text: str, room: int, width: int) -> list[str]:
+    """Up to the end of a word."""
+    *whole, last = _wrapped(text, width)[:room]
+    ending = f" (in full: {REST})"
+    return [*whole, wrap(last, width - len(ending))[0] + ending]
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    return wrap(text, width, subsequent_indent=" " * LABEL, break_long_words=False)
 
 
 def _at_most(rows: Sequence[Row], room: int) -> list[Row]:

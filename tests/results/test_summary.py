@@ -10,7 +10,8 @@ from reference_scenes import NIGHTLY
 from rich.console import Console
 
 from ffrobot.present.details import print_details
-from ffrobot.present.summary import LINES, summary_lines
+from ffrobot.present.lines import folded
+from ffrobot.present.summary import LINES, fitted, summary_lines
 from ffrobot.results.file import Results
 from ffrobot.results.judging import end_of
 from ffrobot.results.write import results_image
@@ -74,6 +75,7 @@ def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
     assert any(line.startswith("wall time") and "links and files" in line for line in lines)
 
 
+TEXTS = ("warning ", "to try ", "remark ", "note ", "accuracy ")
 CASES = sorted(path.parent.name for path in (Path(__file__).parents[2] / "cases").glob("*/scene.toml"))
 
 
@@ -87,6 +89,7 @@ def test_every_case_has_a_summary_of_one_screen(case, solved):
         assert len(lines) <= LINES == 15
         assert max(map(len, lines)) <= width
         cut = [line for line in lines if line.endswith("…")]
+        assert not [line for line in cut if line.startswith((*TEXTS, " "))]  # advice and warnings are whole, or counted
         assert width < 120 or not any(line.startswith(f"{one.name} ") for line in cut for one in verdict.analyses)
     shown = sum(line.startswith(one.name) for one in verdict.analyses for line in lines[1 : 1 + len(verdict.analyses)])
     left_out = sum(int(line.split()[0]) for line in lines if line.endswith("more: --verbose"))
@@ -96,6 +99,36 @@ def test_every_case_has_a_summary_of_one_screen(case, solved):
         assert any(line.startswith(f"{motor} ") for line in lines)
     if any(one.warnings for one in verdict.analyses):
         assert any(line.startswith("warning") for line in lines)
+
+
+@pytest.mark.parametrize("room", [1, 2, 3, 5, 9])
+def test_texts_are_whole_or_counted(room):
+    """The first warning and the first advice go before other warnings; a text alone that has no room says so."""
+    label = [f"warning    {'many words ' * 12}no. {k}" for k in range(3)]
+    texts = [*label, "to try     a remedy", "note       a fact"]
+    lines = fitted(texts, room, 60)
+    assert 0 < len(lines) <= room
+    assert max(map(len, lines)) <= 60
+    printed = " ".join(" ".join(lines).split())
+    whole = [text for text in texts if " ".join(text.split()) in printed]
+    left = re.search(r"\(\+(\d) more: --verbose\)$", printed)
+    assert lines[0].startswith("warning")
+    assert "(in full: --verbose)" in printed or len(whole) + int(left[1] if left else 0) == len(texts)
+    assert room < 3 or texts[3] in whole
+    assert room < 5 or texts[0] in whole
+
+
+def test_lines_that_differ_in_a_name_are_one():
+    lines = [
+        'trajectory "a" ends at 1 s',
+        "a: zv shaper for 5 Hz",
+        'trajectory "b" ends at 1 s',
+        "b: zv shaper for 5 Hz",
+    ]
+    lines += ['analysis "x": trajectory "c" ends at 2 s', "gravity of 1000 m/s²: is it in mm/s²?"]
+    assert list(folded(lines)) == [
+        'trajectory "a", "b" ends at 1 s', "a, b: zv shaper for 5 Hz", lines[4], lines[5]
+    ]  # fmt: skip
 
 
 def many(count, motors):
