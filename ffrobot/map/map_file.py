@@ -82,12 +82,24 @@ def _columns(found: PoseMap, name: str, values: Array) -> dict[str, Array]:
 CONDITIONS = {"compliant": "compliant gears", "locked": "joints locked"}
 
 
+ROUND_OFF = 1e-13  # of the reach: smaller deflections are round-off
+CONSTANT = 1e-9  # of the largest value: differences of less are round-off
+
+
 class Quantity(NamedTuple):
     """Values (P,) in the unit of the title, nan where there is no pose; whether more of it is better."""
 
     title: str
     values: Array
     more_is_better: bool
+
+    @property
+    def everywhere(self) -> str:
+        """The one value of all poses, "rigid" if it is infinite; empty where values differ, or none is known."""
+        known = self.values[~np.isnan(self.values)]
+        if not known.size or not np.isfinite(known).any():
+            return "rigid" if known.size else ""
+        return f"{known[0]:.4g}" if np.ptp(known) <= CONSTANT * np.abs(known).max() else ""
 
     @property
     def worst(self) -> int:
@@ -109,7 +121,8 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
             least = values[f"joints_{condition}/least_stiffness"] / 1e3
             table[f"frequency_{condition}"] = Quantity(f"lowest frequency, {words} (Hz)", frequency, True)
             table[f"stiffness_{condition}"] = Quantity(f"least stiffness, {words} (N/mm)", least, True)
-    deflection = 1e3 * np.linalg.norm(values["sag"], axis=1)
+    deflection, reach = (np.linalg.norm(values[name], axis=1) for name in ("sag", "place"))
+    deflection = 1e3 * np.where(deflection <= ROUND_OFF * np.nanmax(reach), 0.0, deflection)
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)
     share = torque_share(found)
     if np.isfinite(share).any():
@@ -117,7 +130,13 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
     elif share.shape[1]:
         table["torque"] = Quantity("largest static torque (N·m)", _largest(np.abs(values["torque"])), False)
     table["manipulability"] = Quantity("manipulability", values["manipulability"], True)
-    return table
+    return {name: one._replace(values=_without_round_off(one.values)) for name, one in table.items()}
+
+
+def _without_round_off(values: Array) -> Array:
+    """Values with 0 for those that are next to nothing of the largest."""
+    largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    return as_floats(np.where(np.abs(values) <= CONSTANT * largest, 0.0, values))
 
 
 def _largest(values: Array) -> Array:

@@ -22,7 +22,9 @@ def print_map(found: PoseMap, console: Console) -> None:
 
 def _rows(found: PoseMap) -> Iterator[tuple[str, ...]]:
     for quantity in quantities(found).values():
-        if np.isfinite(quantity.values).any():
+        if quantity.everywhere:
+            yield quantity.title, quantity.everywhere, "everywhere", "", ""
+        elif np.isfinite(quantity.values).any():
             ends = ((f"{quantity.values[k]:.4g}", _place(found, k)) for k in (quantity.worst, quantity.best))
             yield quantity.title, *(cell for end in ends for cell in end)
 

@@ -18,6 +18,7 @@ from ...common.structs import struct
 from .linearisation import LinearMechanism
 
 RIGID = 1e-6  # of the highest frequency, below which a mode counts as without stiffness: round-off of a double zero
+RIGID_POINT = 1e-15  # m/N, compliance of a kilometer of diamond: below it is round-off
 LOCKED, COMPLIANT = "locked", "compliant"
 DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows from others
 
@@ -117,15 +118,17 @@ class Stiffness(NamedTuple):
 def translational_stiffness(compliance: Array) -> Stiffness | None:
     """Of a point with this compliance (3, 3) in the plane or (6, 6); None where it is not fixed.
 
-    Rows of the compliance that are zero have infinite stiffness.
+    Directions whose compliance is round-off have infinite stiffness.
     """
     d = {3: 2, 6: 3}[len(compliance)]
     C = compliance[:d, :d]
     if not np.isfinite(C).all():
         return None
     values, directions = np.linalg.eigh(C)
-    with np.errstate(divide="ignore"):
-        return Stiffness(1 / np.diag(C), float(1 / values[-1]), directions[:, -1])
+    diagonal = np.append(np.diag(C), values[-1])
+    stiffness = 1 / np.where(diagonal > RIGID_POINT, diagonal, np.nan)
+    *along, least = np.where(np.isnan(stiffness), np.inf, stiffness)
+    return Stiffness(np.array(along), float(least), directions[:, -1])
 
 
 def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:

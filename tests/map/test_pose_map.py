@@ -1,16 +1,19 @@
 """Maps over the workspace: closed forms, single runs of the same poses, branches, limits, resuming."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from io import StringIO
 
 import h5py
 import numpy as np
 import pytest
 import tomli_w
 from beam_links import beam_link, rectangle
+from rich.console import Console
 
 from ffrobot import solve
 from ffrobot.common.errors import InputError, SolveError
@@ -18,6 +21,7 @@ from ffrobot.map import pose_map
 from ffrobot.map.map_file import quantities, torque_share, write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.pictures.studies.pose_map import draw_map
+from ffrobot.present.pose_map import print_map
 from ffrobot.run.watcher import Watcher
 
 ARM = """name = "arm"
@@ -131,6 +135,25 @@ def test_files_and_pictures(arm, tmp_path):
     files = draw_map(found)
     assert {file.stem for file in files} == set(quantities(found))
     assert all(file.stat().st_size > 5000 for file in files)
+
+
+def test_round_off_is_no_result(arm, tmp_path):
+    """A rigid robot has no stiffness, torques at a vertical arm are 0, and what no pose changes has no worst pose."""
+    rigid = "{ mass = 1.0, inertia = 0.1, center = [0.1, 0.0], points = { root = [0.0, 0.0], tip = [0.3, 0.0] } }"
+    scene = arm.with_name("rigid.toml")
+    text = ARM.replace("stiffness = 3000.0", "").replace('link = "upper.toml"', f"rigid = {rigid}")
+    scene.write_text(text)  # the forearm is flexible, and the point is where it begins
+    console = StringIO()
+    for point in ("upper.tip", "fore.tip"):
+        found = mapped(scene, tmp_path / point, "shoulder=0:90*deg:10", "elbow=0", point=point)
+        print_map(found, Console(file=console, width=120))
+        tested = quantities(found)
+        if point == "upper.tip":
+            assert tested["stiffness_locked"].everywhere == "rigid"
+            assert {path.stem for path in draw_map(found)} == {"torque"}
+        assert tested["torque"].values[-1] == 0.0
+        assert tested["frequency_locked"].everywhere
+    assert not re.search(r"e[+-]\d\d", console.getvalue())
 
 
 def test_a_killed_map_goes_on_and_is_the_same(arm, tmp_path):

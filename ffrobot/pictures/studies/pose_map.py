@@ -26,11 +26,11 @@ FLAT = 1e-9  # of the largest extent: no extent
 
 
 def draw_map(found: PoseMap) -> list[Path]:
-    """A picture of each quantity in the folder of the map; their files."""
+    """A picture of each quantity that differs from pose to pose, in the folder of the map; their files."""
     files = []
     with style():
         for name, quantity in quantities(found).items():
-            if not np.isfinite(quantity.values).any():
+            if not np.isfinite(quantity.values).any() or quantity.everywhere:
                 continue
             content, path = io.BytesIO(), found.plan.folder / f"{name}.png"
             _draw(found, quantity).savefig(content, format="png")
