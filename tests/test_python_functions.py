@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import ffrobot
+from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.fields.functions import check_derivatives, user_function
 
 SINE = "void sine(double t, double *out) { out[0] = 0.5 * sin(t); out[1] = 0.5 * cos(t); out[2] = -out[0]; }"
@@ -108,6 +109,13 @@ WRONG = {
 @pytest.mark.parametrize("end", [0.1, 1.0, 7.3])
 def test_honest_derivatives_are_taken(function, end):
     check_derivatives(user_function(function), end, "path")
+
+
+@pytest.mark.parametrize("value", ["pi/2+1.5*t**4", "100+1.5*t**4", "pi/2+0.1*t**5", "1e3+sin(t)**4"])
+@pytest.mark.parametrize("end", [2e-5, 2e-3, 1e-2, 5e-2])
+def test_small_changes_of_large_values_are_round_off(value, end):
+    """Differences cannot see them: eps |value| / step is more than the rate."""
+    check_derivatives(parse_expression(value), end, "path")
 
 
 @pytest.mark.parametrize(("function", "said"), WRONG.values(), ids=WRONG)

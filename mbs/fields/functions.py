@@ -92,7 +92,7 @@ INSTANTS = 13  # at which is looked
 STEPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of differences, relative to the time that the function is needed for
 AGREED = 1e-5  # two differences that differ by less know the derivative; relative to its largest value
 WRONG = 1e-3  # what a derivative may be off by, likewise
-ROUNDING = 1e-9  # of the largest value over the time: differences of less are rounding
+ROUNDING = 1e-8  # of the largest value over the time: differences of less are round-off
 GOLDEN = 0.6180339887498949  # its multiples fall on no grid, so on no instant at which accelerations jump
 
 
@@ -131,7 +131,7 @@ def _judged(once: Array, twice: Array, given: Array, rounding: float) -> tuple[B
     with np.errstate(all="ignore"):
         size = max(np.abs(given).max(), np.abs(twice).min(axis=0).max()) + rounding
         known = np.abs(once - twice) <= AGREED * size
-        wrong = known.any(axis=0) & np.all(~known | (np.abs(twice - given) > WRONG * size), axis=0)
+        wrong = known.any(axis=0) & np.all(~known | (np.abs(twice - given) > WRONG * size + rounding), axis=0)
     return known, wrong
 
 
