@@ -63,12 +63,21 @@ def of_file(name: object) -> Iterator[None]:
         raise SolveError(f"{name}: {error}: numbers that differ too much in size, or are too large or small") from error
 
 
+ELSEWHERE = {
+    "inverse": "pcid", "inverse-dynamics": "pcid", "dynamics": "forward", "simulate": "forward",
+    "simulation": "forward", "modal": "linear", "eigenvalue": "linear", "equilibrium": "static",
+    "control": "closed-loop",
+}  # fmt: skip
+"""Names that other programs and books use, and those of this program."""
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """` (did you mean "…"?)`, or nothing when no known word is close, or begins with this one and an underscore."""
     from difflib import get_close_matches
 
     words = list(known)
-    close = get_close_matches(word, words, n=1) or [one for one in words if one.startswith(f"{word}_")]
+    close = [one for one in (ELSEWHERE.get(word.lower().replace("_", "-")),) if one in words]
+    close = close or get_close_matches(word, words, n=1) or [one for one in words if one.startswith(f"{word}_")]
     return f' (did you mean "{close[0]}"?)' if close else ""
 
 

@@ -121,3 +121,22 @@ def test_beginning_of_a_key_is_enough_for_a_suggestion():
     assert did_you_mean("gear", known) == ' (did you mean "gear_ratio"?)'
     assert did_you_mean("gear_ratoi", known) == ' (did you mean "gear_ratio"?)'
     assert did_you_mean("ger", known) == did_you_mean("spring", known) == ""
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("inverse", "pcid"), ("inverse_dynamics", "pcid"), ("simulation", "forward"), ("modal", "linear"),
+     ("Control", "closed-loop"), ("trackin", "tracking")],
+)  # fmt: skip
+def test_kinds_of_analysis_by_the_names_of_other_programs(word, meant):
+    from ffrobot.scene.kinds import KINDS
+
+    assert did_you_mean(word, KINDS.modules) == f' (did you mean "{meant}"?)'
+
+
+def test_least_torque_is_spelled_as_redundancy_has_it():
+    from ffrobot.mbs.analysis.tracking import Tracking
+
+    keys = {"name": "a", "kind": "tracking", "end": 1.0, "output_step": 0.1}
+    for objective in ("least-torque", "least-moment"):
+        assert validate(Tracking, keys | {"objective": objective}, Path("scene.toml")).objective == objective

@@ -70,12 +70,12 @@ class Tracking(TimedAnalysis):
 
     Limits are those of [[pzt]] (`limit`) and [[joint]] (`moment_limit`). Without pre- and post-actuation nothing acts
     before the path begins and after it ends. `least-voltage` finds the smallest share of the limits with which patches
-    can do it, `least-moment` the smallest torques, and `effort` makes torques beyond the quasi-static ones, voltages
-    and their rates small.
+    can do it, `least-torque` (`least-moment` is another spelling) the smallest torques, and `effort` makes torques
+    beyond the quasi-static ones, voltages and their rates small.
     """
 
     kind: Literal["tracking"]
-    objective: Literal["effort", "least-voltage", "least-moment"] = "effort"
+    objective: Literal["effort", "least-voltage", "least-torque", "least-moment"] = "effort"
     """Objective of the optimal control problem."""
     pre_actuation: Around = 0.0
     """Duration of actuation before the path begins, s; "auto" takes it from the zero dynamics."""
