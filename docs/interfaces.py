@@ -5,11 +5,13 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import is_dataclass
+from functools import cached_property
 from pathlib import Path
 
 import click
 
 import ffrobot
+from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.cli import cli
 from ffrobot.design.front import Front
 from ffrobot.design.optimum_record import Optimum
@@ -18,13 +20,16 @@ from ffrobot.design.sensitivity import Sensitivity
 from ffrobot.design.uncertainty_record import Uncertainty
 from ffrobot.fe_models.link import LinkOutcome
 from ffrobot.fit.fitting import Fit
+from ffrobot.results.verdict import AnalysisVerdict, Verdict
 
 FUNCTIONS = (
     "solve", "load_scene", "make_scene", "make_link", "read_modal_body", "fit_measured", "sensitivity", "optimise",
     "trade_off", "uncertainty", "screening", "write_study", "plot_results", "write_report", "view_file", "write_movie",
 )  # fmt: skip
 CLASSES = ("Results", "ModalBody", "Watcher")
-RETURNED = (LinkOutcome, Fit, Sensitivity, Optimum, Front, Uncertainty, Screening)
+RETURNED = (
+    LinkOutcome, Verdict, AnalysisVerdict, LinearModel, Fit, Sensitivity, Optimum, Front, Uncertainty, Screening,
+)  # fmt: skip
 ERRORS = ("InputError", "SolveError", "FfrobotWarning")
 
 COMMANDS = """# Commands
@@ -80,23 +85,30 @@ def python_page() -> str:
     parts.append("## Classes\n")
     parts += [_class(getattr(ffrobot, name)) for name in CLASSES]
     parts.append("## Returned objects\n")
-    parts += [f"### {one.__name__}\n\n{_markdown(one)}\n" for one in RETURNED]
+    parts += map(_class, RETURNED)
     parts.append("## Errors\n")
     parts += [f"### {name}\n\n{_markdown(getattr(ffrobot, name))}\n" for name in ERRORS]
     return "\n".join(parts)
 
 
-def _class(one: type) -> str:
-    members = []
-    for name, value in sorted(vars(one).items()):
+def members(one: type) -> dict[str, str]:
+    """Docstrings of public methods and properties by name, inherited ones too."""
+    found = {}
+    for name in dir(one):
+        value = inspect.getattr_static(one, name)
         is_method = inspect.isfunction(value) or isinstance(value, classmethod | staticmethod)
-        if (name.startswith("_") and name != "__getitem__") or not (is_method or isinstance(value, property)):
+        if (name.startswith("_") and name != "__getitem__") or not (
+            is_method or isinstance(value, property | cached_property)
+        ):
             continue
-        text = inspect.getdoc(value)
-        if text:
-            members.append(f"* `{name}`: {' '.join(text.split())}")
+        found[name] = " ".join((inspect.getdoc(value) or "").split())
+    return found
+
+
+def _class(one: type) -> str:
     own = "\n\n".join(_markdown(base) for base in one.__mro__ if base is one or is_dataclass(base))
-    return f"### {one.__name__}\n\n{own}\n\n" + "\n".join(members) + "\n"
+    listed = (f"* `{name}`: {text}" for name, text in members(one).items() if text)
+    return "\n".join([f"### {one.__name__}\n\n{own}\n", *listed]).rstrip("\n") + "\n"
 
 
 def _call(name: str, function: object) -> str:

@@ -26,19 +26,28 @@ SHOWN = 4  # names in the line that a model prints
 
 @struct
 class LinearModel:
-    """x = (δs, δṡ) about a configuration or one instant of a motion, frozen there; f coordinates s."""
+    """Equations of motion, linear about a configuration or one instant of a motion: x = (δs, δṡ), f coordinates s.
 
-    # A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D = 0, since u accelerates
+    Attributes:
+        A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D = 0, since inputs accelerate.
+        state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
+        input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
+        output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k".
+        time: s.
+        mass: (f, f) mass matrix of s: the metric that compares coordinates of different kinds.
+        transformation: (coordinates, f) ∂q/∂s, which takes mode shapes to the robot.
+    """
+
     A: Array
     B: Array
     C: Array
     D: Array
-    state_names: tuple[str, ...]  # "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
-    input_names: tuple[str, ...]  # "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1
-    output_names: tuple[str, ...]  # "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k"
-    time: float  # s
-    mass: Array  # (f, f) of s: the metric in which coordinates of different kinds are compared
-    transformation: Array  # ∂q/∂s (coordinates, f), which takes mode shapes to the robot
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    time: float
+    mass: Array
+    transformation: Array
 
     def __repr__(self) -> str:
         inputs, outputs = len(self.input_names), len(self.output_names)

@@ -54,7 +54,7 @@ class Finding(ABC):
 
     @property
     def shortfall(self) -> str | None:
-        """Why it is not what was asked for; empty where it is, None where that is no question."""
+        """Reason why the result is not the requested one; empty if it is, None if that cannot be judged."""
         return None
 
     @abstractmethod

@@ -31,12 +31,12 @@ from .variables import Place, Space, read_space
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """The best design with one limit of the second goal.
+    """The best design with one limit of the second response.
 
     Attributes:
         point: values of the keys.
-        goal, against: of both goals there, in the `units` of the front.
-        price: ∂goal/∂against along the front; NaN at its ends.
+        goal, against: of both responses there, in the `units` of the front.
+        price: ∂response/∂against along the front; NaN at its ends.
         converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
         message: why the search ended where it is not.
         design: itself.
@@ -76,7 +76,7 @@ class Front(Finding):
 
     @property
     def values(self) -> Array:
-        """(N, 2) of both goals."""
+        """(N, 2) of both responses."""
         return np.array([(one.goal, one.against) for one in self.points])
 
     @property
@@ -86,11 +86,11 @@ class Front(Finding):
         return "" if good else "not all designs of the curve keep the limits: see the table"
 
     def headline(self) -> str:
-        """How many designs, of which goals."""
+        """How many designs, of which responses."""
         return f"{self.goals[0]} against {self.goals[1]}: {len(self.points)} designs"
 
     def sections(self) -> Iterator[Section]:
-        """A line for each design: both goals, what the second one costs, the keys."""
+        """A line for each design: both responses, what the second one costs, the keys."""
         price = " per ".join(unit or "1" for unit in self.units)
         heading = (*map(with_unit, self.goals, self.units), f"price ({price})", *self.keys, "")
         yield Section(heading, self._rows())
@@ -110,7 +110,7 @@ class Front(Finding):
                 yield f"note       {self.goals[1]} {one.against:.6g}: {one.message}"
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each design; `price` is ∂goal/∂against along the front."""
+        """One line for each design; `price` is ∂response/∂against along the front."""
         columns = [*self.goals, "price", *self.keys, "converged", "feasible", "message"]
         yield CsvFile("front.csv", "table of the front", columns, self._numbers())
 

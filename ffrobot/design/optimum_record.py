@@ -21,7 +21,7 @@ from .variables import Space, Variable
 
 
 def states_of(problem: Problem, designs: Sequence[Evaluated], best: Sequence[Evaluated]) -> tuple[State, ...]:
-    """Of each design, whose readings begin with those of the goals of `problem`."""
+    """Of each design, whose readings begin with those of the responses of `problem`."""
     chosen = {one.design.folder for one in best}
 
     def state(one: Evaluated) -> State:
@@ -60,7 +60,7 @@ def parallel(
 
 
 def progress(problem: Problem, designs: Sequence[Evaluated], states: tuple[State, ...]) -> Progress:
-    """The goal of each design in the order of the search."""
+    """The response of each design in the order of the search."""
     values = [one.values[0] if one.completed else np.nan for one in designs]
     unit = next((one.readings[0].unit for one in designs if one.completed), "")
     return Progress(
@@ -150,12 +150,12 @@ class Optimum(Finding):
 
     @property
     def value(self) -> float:
-        """Of the goal that is least or largest."""
+        """Value of the minimized or maximized response."""
         return self.best.readings[0].value
 
     @property
     def limits(self) -> Array:
-        """(m) values of the goals that are limited."""
+        """(m) values of the responses that are limited."""
         return np.array([reading.value for reading in self.best.readings[1:]])
 
     @property
@@ -175,7 +175,7 @@ class Optimum(Finding):
 
     @property
     def prices(self) -> Array:
-        """(m) ∂goal/∂limit: the change of the best value for one unit more of each limit; NaN of those not reached."""
+        """(m) ∂response/∂limit: change of the best value per unit of each limit; NaN of those not reached."""
         if self.optimality is None:
             return np.full(len(self.problem.limits), np.nan)
         room = np.array([limit.sense / limit.scale for limit in self.problem.limits])
@@ -183,7 +183,7 @@ class Optimum(Finding):
 
     @property
     def bound_prices(self) -> Array:
-        """(n) ∂goal/∂bound likewise, of the bounds that numbers are at."""
+        """(n) ∂response/∂bound likewise, of the bounds that numbers are at."""
         if self.optimality is None:
             return np.full(len(self.space.variables), np.nan)
         found = -self.optimality.bounds / self.problem.factors(self.best.values)[0]
@@ -202,7 +202,7 @@ class Optimum(Finding):
             yield Section(("limit", "start", "best", ""), [row[:4] for row in self._limit_rows()])
 
     def report_tables(self) -> Iterator[StudyTable]:
-        """With prices of limits."""
+        """With shadow prices of limits."""
         keys, *limits = self.sections()
         yield keys.for_report()
         if limits:
@@ -220,7 +220,7 @@ class Optimum(Finding):
         return text if self.feasible else f"no design found that keeps all limits; nearest is one with {text}"
 
     def remarks(self) -> Iterator[str]:
-        """Prices of limits and bounds in words, what to mind, and how the design was found."""
+        """Shadow prices of limits and bounds in words, what to mind, and how the design was found."""
         for variable, u in zip(self.space.variables, self.best.place, strict=True):
             if variable.motors:
                 yield f"motor      {variable.keys[0][1]}: {variable.motors[round(u)].name}, 1:{variable.values(u)[0]:g}"
@@ -261,7 +261,7 @@ class Optimum(Finding):
         yield from super().write_tables(folder)
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """Goal, keys and limits with their prices, one line each."""
+        """Response, keys and limits with their shadow prices, one line each."""
         yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:

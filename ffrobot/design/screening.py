@@ -58,12 +58,12 @@ class Screening(Finding):
     table: Path | None
 
     def headline(self) -> str:
-        """The key that matters most for each goal."""
+        """The key with the largest influence on each response."""
         first = [".".join(self.spreads[self.ranked(g)[0]].key) for g in range(len(self.goals))]
         return "; ".join(f"{goal}: {key} matters most" for goal, key in zip(self.goals, first, strict=True))
 
     def sections(self) -> Iterator[Section]:
-        """A table for each goal, the key that matters most first."""
+        """A table for each response, the most influential key first."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             yield Section(HEADINGS, self._rows(g), line=goal_line(goal, reading), of=goal)
 
@@ -85,7 +85,7 @@ class Screening(Finding):
         )
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each goal and key."""
+        """One line for each response and key."""
         yield CsvFile("screening.csv", "table of elementary effects", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
@@ -96,11 +96,11 @@ class Screening(Finding):
                 yield [goal, reading.unit, reading.value, ".".join(one.key), *values, int(e.count[g, k])]
 
     def diagrams(self) -> list[Points]:
-        """μ* against σ for each goal."""
+        """μ* against σ for each response."""
         return [self._points(g) for g in range(len(self.goals))]
 
     def ranked(self, g: int) -> list[int]:
-        """Keys by number, the largest μ* of goal g first."""
+        """Keys by number, the largest μ* of response g first."""
         return [int(k) for k in np.argsort(-np.nan_to_num(self.effects.mu_star[g]), kind="stable")]
 
     def _rows(self, g: int) -> list[tuple[str, ...]]:
@@ -140,7 +140,7 @@ class Trajectories:
 
 @dataclass(frozen=True)
 class Effects:
-    """Of g goals by k keys, in units of the goals: `mu`, `mu_star`, its standard error and `sigma`, all (g, k).
+    """Of g responses by k keys, in units of the responses: `mu`, `mu_star`, its standard error and `sigma`, all (g, k).
 
     `count` (g, k) of effects that they are made from; NaN where there is none, of σ and errors where there is one.
     """
@@ -166,7 +166,7 @@ def draw_trajectories(keys: int, count: int, seed: int) -> Trajectories:
 
 
 def elementary_effects(taken: Trajectories, values: Array) -> Effects:
-    """By the goals at all points, `values` (r, k + 1, g); a NaN, of a run that failed, costs the effects beside it."""
+    """Effects from `values` (r, k + 1, g) at all points; a failed run, NaN, costs the effects on both sides."""
     rows = np.arange(len(taken.order))[:, None]
     steps = np.diff(taken.points, axis=1)[rows, np.arange(taken.order.shape[1]), taken.order]  # (r, k) in turn
     effects = np.empty_like(values[:, 1:])  # (r, k, g)

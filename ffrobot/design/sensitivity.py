@@ -71,12 +71,12 @@ class Sensitivity(Finding):
 
     @property
     def value(self) -> Array:
-        """(g,) the goals."""
+        """(g,) the responses."""
         return np.array([reading.value for reading in self.readings])
 
     @property
     def derivative(self) -> Array:
-        """(g, k) ∂goal/∂key, SI units; NaN where there is none."""
+        """(g, k) ∂response/∂key, SI units; NaN where there is none."""
         return np.array([[entry.derivative for entry in row] for row in self.entries])
 
     @property
@@ -86,23 +86,23 @@ class Sensitivity(Finding):
 
     @property
     def logarithmic(self) -> Array:
-        """(g, k) percent of the goal per percent of the key, θ/F ∂F/∂θ; NaN where F is 0."""
+        """(g, k) percent of the response per percent of the key, θ/F ∂F/∂θ; NaN where F is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return as_floats(
                 np.where(self.value[:, None] == 0.0, np.nan, self.derivative * (self.values / self.value[:, None]))
             )
 
     def ranked(self, g: int) -> list[int]:
-        """Keys by number, the largest percent per percent of goal g first; those without one by their derivative."""
+        """Key numbers, the largest percent per percent of response g first; those without one by their derivative."""
         sizes = [np.nan_to_num(np.abs(of[g])) for of in (self.logarithmic, self.derivative)]
         return sorted(range(len(self.keys)), key=lambda k: (-sizes[0][k], -sizes[1][k]))
 
     def headline(self) -> str:
-        """The key that matters most for each goal."""
+        """The key with the largest influence on each response."""
         return "; ".join(f"{goal}: {self.keys[self.ranked(g)[0]]} matters most" for g, goal in enumerate(self.goals))
 
     def sections(self) -> Iterator[Section]:
-        """A table for each goal, the key that matters most first."""
+        """A table for each response, the most influential key first."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             rows = [self._row(g, k) for k in self.ranked(g)]
             when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
@@ -116,7 +116,7 @@ class Sensitivity(Finding):
         )  # fmt: skip
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each goal and key."""
+        """One line for each response and key."""
         yield CsvFile("sensitivity.csv", "table of sensitivities", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
@@ -130,7 +130,7 @@ class Sensitivity(Finding):
                 ]  # fmt: skip
 
     def diagrams(self) -> list[Bars]:
-        """A tornado for each goal."""
+        """A tornado for each response."""
         return [self._tornado(g) for g in range(len(self.goals))]
 
     def _tornado(self, g: int) -> Bars:

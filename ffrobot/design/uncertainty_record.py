@@ -73,7 +73,7 @@ class Uncertainty(Finding):
     table: Path | None
 
     def headline(self) -> str:
-        """Between what goals are, most of the time."""
+        """Between what responses are, most of the time."""
         texts = []
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             low, _, high = self.statistics.quantiles[:, g]
@@ -81,7 +81,7 @@ class Uncertainty(Finding):
         return "; ".join([*texts, *(f"band of {band.name}" for band in self.bands)])
 
     def sections(self) -> Iterator[Section]:
-        """Each goal with what the keys do to it, then the bands."""
+        """Each response with what the keys do to it, then the bands."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             heading = (*self.statistics.named, "worst case")
             yield Section(heading, [self._statistics_row(g)], line=goal_line(goal, reading))
@@ -90,7 +90,7 @@ class Uncertainty(Finding):
             yield Section(BAND_HEADINGS, self._band_rows())
 
     def report_tables(self) -> Iterator[StudyTable]:
-        """The statistics of all goals in one table."""
+        """The statistics of all responses in one table."""
         if self.goals:
             rows = [
                 (goal, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
@@ -122,7 +122,7 @@ class Uncertainty(Finding):
         return Section(("key", "spread", *parts), rows, of=self.goals[g])
 
     def ranked(self, g: int) -> list[int]:
-        """Keys by number, the one that matters most for goal g first."""
+        """Keys by number, the most influential for response g first."""
         by = self.indices.total[g] if self.indices else self.shares[g]
         return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
 
@@ -163,7 +163,7 @@ class Uncertainty(Finding):
         yield f"how        {self.runs} runs; {how}"
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each goal, and of each history one for each time."""
+        """One line for each response, and of each history one for each time."""
         if self.goals:
             yield CsvFile("uncertainty.csv", "table of uncertainties", self._goal_columns(), self._goal_rows())
         for band in self.bands:
@@ -186,7 +186,7 @@ class Uncertainty(Finding):
             yield [goal, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
 
     def diagrams(self) -> list[Diagram]:
-        """The ranking of keys for each goal, and the bands."""
+        """The ranking of keys for each response, and the bands."""
         return [*(self._ranking(g) for g in range(len(self.goals))), *map(self._band, self.bands)]
 
     def _ranking(self, g: int) -> Bars:

@@ -31,10 +31,10 @@ class AnalysisAccess(Datasets):
 
     @property
     def verdict(self) -> Verdict:
-        """Of every analysis: can it be done, peaks and RMS of motors, deflection, stress, warnings, what to try next.
+        """Answer of each analysis: feasibility, peaks and RMS of motors, deflection, stress, warnings and advice.
 
-        `print(results.verdict)` is what `ffrobot solve --verbose` prints of them; `results.verdict["inverse"]` that of
-        one analysis.
+        `print(results.verdict)` prints the text of `ffrobot solve --verbose`; `results.verdict["inverse"]` is one
+        analysis.
         """
         from .judging import judge
 
@@ -92,7 +92,7 @@ class AnalysisAccess(Datasets):
     def to_xarray(self, analysis: str) -> Dataset:
         """All histories of an analysis as a Dataset of xarray, named as in the file: dimensions, units, coordinates.
 
-        Dimension `time` (s), of what is in `control/` of a closed loop `control/time`; further dimensions have the
+        Dimension `time` (s), for `control/` of closed-loop runs `control/time`; further dimensions have the
         axes, modes, patches or components as coordinates. Attributes: `units`, `long_name`; of the Dataset those of the
         analysis. Raises `SolveError` where xarray is not installed.
         """

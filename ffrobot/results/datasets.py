@@ -109,7 +109,7 @@ class Datasets:
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.
 
-        Raises `InputError` where there is no such group, and when an attribute is asked for that it does not have.
+        Raises `InputError` where there is no such group, or no such attribute.
         """
         if group not in self._file:
             raise InputError(f'{self.path}: expected the group "{group}", found none{self._near(group)}')
@@ -140,7 +140,7 @@ class Datasets:
     def time(self, dataset: str) -> Array:
         """Output times (T,), in s, of the analysis that `dataset` belongs to; the analysis' own name does, too.
 
-        Of what is in `control/` of a closed loop, the times of its samples.
+        For `control/` of closed-loop runs, the times of its samples.
         """
         analysis, *inside = dataset.strip("/").split("/")
         return self[f"{analysis}/control/time" if inside[:1] == ["control"] else f"{analysis}/time"]
@@ -159,7 +159,7 @@ class Datasets:
         return values[:, k : k + 1]
 
     def peak(self, name: str) -> tuple[float, float]:
-        """The largest size of a history and when it has that, s, between outputs too where the file says so.
+        """The largest size of a history and when it has that, s, between outputs if the file has that.
 
         Of all columns, of one of them, `name[k]`, or of the length of a deflection or a reaction.
         """

@@ -45,7 +45,7 @@ class LinkAccess(Datasets):
     def modal_body(self, name: str) -> ModalBody:
         """The modal body that body `name` was solved with.
 
-        Its file is looked for where it was, then beside the results; its hash tells whether it is the same.
+        Sought at its path, then in the folder of the results; its hash has to be the same.
         Raises `InputError` where `name` is no flexible body, or its file cannot be found.
         """
         return read_modal_body(self._modal_path(name))

@@ -113,18 +113,18 @@ class AnalysisVerdict:
 
     Attributes:
         name, kind, status: of the analysis; `cause` why it ended early.
-        reached: s, the last output, and the end that was asked for.
-        answer: whether motors and patches can do it, how a closed loop went, or how far a replay is off the path, in
-            words; empty where nothing is asked.
+        reached: s, the last output, and the requested end.
+        answer: in words, whether motors and patches suffice, the verdict of closed-loop control, or the distance from
+            the path under computed inputs; empty where nothing is asked.
         feasible: whether they can; None where that is not asked.
         motors: by joint, in the order of the scene: peaks, RMS and limits at the joint.
         units: of the force along each of these joints, "N·m" or "N".
         patches: by body, of an inverse analysis.
         tool_error: how far the point of a path is off it, under control and open loop.
         deflection: largest of a point, m, which, and when.
-        stress: largest von Mises, Pa, the body, and when; None where none was asked for.
-        margins: of a closed loop by its linear model, in words; empty where not known.
-        held: natural frequencies and least stiffness with motors at rest, in words; empty where not asked for.
+        stress: largest von Mises, Pa, the body, and when; None if not requested.
+        margins: gain and delay margins of closed-loop runs by their linear model, in words; empty where not known.
+        held: natural frequencies and least stiffness with motors at rest, in words; empty if not requested.
         warnings: why results may be wrong, or not mean what they seem to.
         notes: what is worth knowing of results that are right.
         advice: what to try next, a text each.
@@ -198,7 +198,7 @@ class Verdict:
     analyses: tuple[AnalysisVerdict, ...]
 
     def __getitem__(self, name: str) -> AnalysisVerdict:
-        """Of one analysis. Raises `KeyError` where there is none of that name."""
+        """Verdict of one analysis. Raises `KeyError` where there is none of that name."""
         for one in self.analyses:
             if one.name == name:
                 return one
@@ -210,7 +210,7 @@ class Verdict:
     __repr__ = __str__
 
     def lines(self) -> Iterator[str]:
-        """Of all analyses."""
+        """Text of all analyses."""
         for one in self.analyses:
             yield from one.lines()
 
