@@ -40,7 +40,7 @@ def with_compliance(model: Model) -> Model:
     """The robot with compliant gears where the scene says so; motors and moments on joints act before these gears.
 
     The output of such a gear is a body of the tree without inertia. It turns on the first side of the joint by θ_m, the
-    rotor N times as fast (J. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
+    rotor N times as fast (M. W. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
     Coordinates of the outputs stand after all others.
     """
     elastic = elastic_joints(model)

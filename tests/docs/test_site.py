@@ -144,6 +144,43 @@ def test_every_public_name_is_documented(site):
     assert not missing
 
 
+def test_every_public_member_is_documented(monkeypatch):
+    """Of classes on the page, also what they inherit: dir() has all."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    from interfaces import CLASSES, RETURNED, python_page
+
+    for one in (*(getattr(package, name) for name in CLASSES), *RETURNED):
+        section = python_page().partition(f"### {one.__name__}\n")[2].partition("\n### ")[0]
+        for name in dir(one):
+            member, of_package = getattr(one, name), one.__module__.split(".")[0]
+            home = getattr(getattr(member, "fget", getattr(member, "func", member)), "__module__", "")
+            if not name.startswith("_") and str(home).startswith(of_package) and not isinstance(member, type):
+                assert f"* `{name}`: " in section, f"{one.__name__}.{name} has no docstring, or the page leaves it out"
+
+
+WORDS = [
+    *sorted(DOCS.rglob("*.md")),
+    *sorted(CASES.glob("*/README.md")),
+    DOCS.parent / "README.md",
+    DOCS.parent / "CONTRIBUTING.md",
+]
+
+
+@pytest.mark.parametrize("page", WORDS, ids=lambda page: f"{page.parent.name}/{page.stem}")
+def test_pages_are_whole(page):
+    """No path of the repository that is not there, no line that a reflow has cut out of its code block or paragraph."""
+    text, root = page.read_text(encoding="utf-8"), DOCS.parent
+    tops = {path.name for path in root.iterdir() if path.is_dir() and path.name != "build"}
+    named = re.findall(r"`([\w.-]+(?:/[\w.*-]+)*/[\w*-]+\.\w+)`", text)
+    of_page = (root / name for name in named if name.split("/")[0] in tops)
+    assert not [path for path in of_page if not list(root.glob(str(path.relative_to(root)))) and ".h5" not in path.name]
+    prose = re.sub(r"^```.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
+    assert not re.search(r"[ \t]$|^ (?! )(?!\*)", prose, re.MULTILINE), "blanks at the beginning or the end of a line"
+    for line in re.findall(r"^ {4}(\S+)", prose, re.MULTILINE):
+        first = root / line
+        assert not first.is_file() or first.stat().st_mode & 0o100, f"{line} is no command: has its line been wrapped?"
+
+
 def test_pages_are_reached_from_the_first(site):
     pages = {path.relative_to(site).as_posix() for path in site.rglob("*.html")} - {"genindex.html", "search.html"}
     start = (site / "index.html").read_text(encoding="utf-8")
