@@ -82,7 +82,7 @@ def _columns(found: PoseMap, name: str, values: Array) -> dict[str, Array]:
 CONDITIONS = {"compliant": "compliant gears", "locked": "joints locked"}
 
 
-ROUND_OFF = 1e-13  # of the reach: smaller deflections are round-off
+ROUND_OFF = 1e-13  # of the reach: smaller deflections are round-off, of its power a smaller manipulability
 CONSTANT = 1e-9  # of the largest value: differences of less are round-off
 
 
@@ -121,22 +121,26 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
             least = values[f"joints_{condition}/least_stiffness"] / 1e3
             table[f"frequency_{condition}"] = Quantity(f"lowest frequency, {words} (Hz)", frequency, True)
             table[f"stiffness_{condition}"] = Quantity(f"least stiffness, {words} (N/mm)", least, True)
-    deflection, reach = (np.linalg.norm(values[name], axis=1) for name in ("sag", "place"))
-    deflection = 1e3 * np.where(deflection <= ROUND_OFF * np.nanmax(reach), 0.0, deflection)
+    reach = np.nanmax(np.linalg.norm(values["place"], axis=1))
+    deflection = 1e3 * _beyond(ROUND_OFF * reach, np.linalg.norm(values["sag"], axis=1))
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)
     share = torque_share(found)
     if np.isfinite(share).any():
         table["torque"] = Quantity("largest static torque (% of limit)", 100 * _largest(share), False)
     elif share.shape[1]:
         table["torque"] = Quantity("largest static torque (N·m)", _largest(np.abs(values["torque"])), False)
-    table["manipulability"] = Quantity("manipulability", values["manipulability"], True)
-    return {name: one._replace(values=_without_round_off(one.values)) for name, one in table.items()}
+    manipulability = _beyond(ROUND_OFF * reach ** values["place"].shape[1], values["manipulability"])
+    table["manipulability"] = Quantity("manipulability", manipulability, True)
+    return {name: one._replace(values=_beyond(CONSTANT * _size(one.values), one.values)) for name, one in table.items()}
 
 
-def _without_round_off(values: Array) -> Array:
-    """Values with 0 for those that are next to nothing of the largest."""
-    largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    return as_floats(np.where(np.abs(values) <= CONSTANT * largest, 0.0, values))
+def _size(values: Array) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _beyond(round_off: float, values: Array) -> Array:
+    """Values, 0 if they are round-off."""
+    return as_floats(np.where(np.abs(values) <= round_off, 0.0, values))
 
 
 def _largest(values: Array) -> Array:
