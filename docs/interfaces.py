@@ -15,7 +15,6 @@ from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.cli import cli
 from ffrobot.design.front import Front
 from ffrobot.design.optimum_record import Optimum
-from ffrobot.design.screening import Screening
 from ffrobot.design.sensitivity import Sensitivity
 from ffrobot.design.uncertainty_record import Uncertainty
 from ffrobot.fe_models.link import LinkOutcome
@@ -24,12 +23,10 @@ from ffrobot.results.verdict import AnalysisVerdict, Verdict
 
 FUNCTIONS = (
     "solve", "load_scene", "make_scene", "make_link", "read_modal_body", "fit_measured", "sensitivity", "optimise",
-    "trade_off", "uncertainty", "screening", "write_study", "plot_results", "write_report", "view_file", "write_movie",
+    "trade_off", "uncertainty", "write_study", "plot_results", "write_report", "view_file", "write_movie",
 )  # fmt: skip
 CLASSES = ("Results", "ModalBody", "Watcher")
-RETURNED = (
-    LinkOutcome, Verdict, AnalysisVerdict, LinearModel, Fit, Sensitivity, Optimum, Front, Uncertainty, Screening,
-)  # fmt: skip
+RETURNED = (LinkOutcome, Verdict, AnalysisVerdict, LinearModel, Fit, Sensitivity, Optimum, Front, Uncertainty)
 ERRORS = ("InputError", "SolveError", "FfrobotWarning")
 
 COMMANDS = """# Commands

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .api import plot_results, solve, view_file, write_movie, write_report, write_study
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
-    from .design.studies import optimise, screening, sensitivity, trade_off, uncertainty
+    from .design.studies import optimise, sensitivity, trade_off, uncertainty
     from .fe_models.link import make_link
     from .fe_models.modal_body import ModalBody
     from .fe_models.modal_body_file import read_modal_body
@@ -44,13 +44,13 @@ _NAMES = {
     ".run.watcher": ("Watcher",),
     ".scene.load": ("load_scene", "make_scene"),
     ".scene.scene": ("Scene",),
-    ".design.studies": ("optimise", "screening", "sensitivity", "trade_off", "uncertainty"),
+    ".design.studies": ("optimise", "sensitivity", "trade_off", "uncertainty"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "FfrobotError", "FfrobotWarning", "InputError", "ModalBody", "Results", "Scene", "SolveError", "Watcher",
-    "fit_measured", "load_scene", "make_link", "make_scene", "optimise", "plot_results", "read_modal_body", "screening",
+    "fit_measured", "load_scene", "make_link", "make_scene", "optimise", "plot_results", "read_modal_body",
     "sensitivity", "solve", "trade_off", "uncertainty", "view_file", "write_movie", "write_report", "write_study",
 ]  # fmt: skip
 

@@ -99,7 +99,7 @@ def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> lis
     """Write the result of a design function as files for `write_report`, and as figures.
 
     Args:
-        found: what `sensitivity`, `optimise`, `trade_off`, `uncertainty` or `screening` returned.
+        found: what `sensitivity`, `optimise`, `trade_off` or `uncertainty` returned.
         folder: where to write.
         figures: whether to draw figures.
 
@@ -151,8 +151,8 @@ def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path:
     """Write one HTML page about results, or several side by side: `ffrobot report`.
 
     Args:
-        results: a results file, results, or a sequence of them. Folders of `sensitivity`, `optimise`, `trade_off`,
-            `uncertainty` and `screening` may be among them.
+        results: a results file, results, or a sequence of them. Folders of `sensitivity`, `optimise`, `trade_off`
+            and `uncertainty` may be among them.
         path: the page, `.html`.
 
     Raises:

@@ -117,16 +117,10 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
 
 
 @click.command()
-@options_of(studies.uncertainty, "of", "spread", "samples", "seed")
-@click.option(
-    "--by", type=click.Choice(["samples", "gradients", "screening"]), default="samples", show_default=True,
-    help="Method: samples, two runs per parameter, or elementary effects of many parameters (Morris).",
-)  # fmt: skip
-@options_of(studies.uncertainty, "indices")
-@options_of(studies.screening, "trajectories")
+@options_of(studies.uncertainty, "of", "spread", "samples", "seed", "by", "indices")
 @study_options("SCENE.uncertainty", "Diagrams of bands and rankings.")
 def uncertainty(
-    scene_file: Path, of: tuple[str, ...], spread: tuple[str, ...], output: Path | None, trajectories: int, **how: Any
+    scene_file: Path, of: tuple[str, ...], spread: tuple[str, ...], output: Path | None, **how: Any
 ) -> None:
     """Uncertainty quantification: propagate distributions of scene and link parameters to the results.
 
@@ -138,14 +132,7 @@ def uncertainty(
     --spread links.arm.material.youngs_modulus=normal:3%     a normal distribution, its deviation
     --spread gravity.1=uniform:-9.83:-9.78     between two values
 
-    --by screening finds the influential ones of many parameters with R runs for each and R more. Every number has an
-    error estimate. The same command resumes a stopped study; failed runs are listed and omitted.
+    --by gradients ranks many parameters with two runs for each. Every number has an error estimate. The same command
+    resumes a stopped study; failed runs are listed and omitted.
     """  # noqa: D301 (click wants the backspace itself)
-    folder = output or scene_file.with_suffix(".uncertainty")
-    if how["by"] == "screening":
-        if how["indices"]:
-            raise InputError("uncertainty: --indices: expected --by samples next to it, found --by screening")
-        rest = {key: value for key, value in how.items() if key not in ("samples", "by", "indices")}
-        _study(studies.screening, scene_file, of, spread, folder=folder, trajectories=trajectories, **rest)
-        return
-    _study(studies.uncertainty, scene_file, of, spread, folder=folder, **how)
+    _study(studies.uncertainty, scene_file, of, spread, folder=output or scene_file.with_suffix(".uncertainty"), **how)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..run.watcher import Watcher
     from .front import Front
     from .optimum_record import Optimum
-    from .screening import Screening
     from .sensitivity import Sensitivity
     from .uncertainty_record import Uncertainty
 
@@ -256,36 +255,3 @@ def uncertainty(
 
     with runs_of("uncertainty", scene, output, **how) as runs:
         return find_uncertainty(runs, of, spread, samples, seed, by, indices=indices)
-
-
-@_checked
-def screening(
-    scene: AnyPath, of: Responses, spread: Spreads, output: AnyPath | None = None, *,
-    trajectories: Annotated[int, "R"] = 10, seed: int = 0, **how: Unpack[RunOptions],
-) -> "Screening":  # fmt: skip
-    """Elementary effects of many uncertain keys (Morris): `ffrobot uncertainty --by screening`.
-
-    Args:
-        scene: the scene file.
-        of: responses.
-        spread: keys with their distributions, as in `uncertainty`.
-        output: folder of the runs, which a later call reuses; None: they are not kept.
-        trajectories: number of trajectories of --by screening, each with one run per parameter and one more.
-        seed: of the trajectories.
-        how: as in `sensitivity`.
-
-    Returns:
-        μ*, σ and μ of each key and response.
-
-    Raises:
-        InputError: responses, keys or distributions are wrong; a whole history.
-        SolveError: the scene with nominal values, or all others, cannot be solved.
-
-    Example:
-        found = ffrobot.screening("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], trajectories=10)
-    """
-    from .designs import runs_of
-    from .screening import find_effects
-
-    with runs_of("uncertainty", scene, output, **how) as runs:
-        return find_effects(runs, of, spread, trajectories, seed)

@@ -12,7 +12,6 @@ from ffrobot.pictures.studies.study import (
     Band,
     Bars,
     Parallel,
-    Points,
     Progress,
     read_study,
     study_files,
@@ -90,7 +89,7 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
     assert (tmp_path / "found.html").stat().st_size > 1_000_000
 
 
-def test_tornado_bands_and_screening(scene, tmp_path):
+def test_tornado_and_bands(scene, tmp_path):
     """From Python: `write_study` writes what the commands do."""
     matters = ffrobot.sensitivity(scene, ["mass"], [OUTER, INNER])
     (tornado,) = matters.study().diagrams
@@ -109,15 +108,11 @@ def test_tornado_bands_and_screening(scene, tmp_path):
         assert low < inner_low < middle < inner_high < high
     deviations = np.array(sure.bands[0].statistics.deviation)
     assert np.all(np.array(band.highest) - band.nominal <= 2.0 * np.sqrt(2.0) * deviations)
-    screened = ffrobot.screening(scene, ["mass"], [f"{OUTER}=±1%", f"{INNER}=±1%"], trajectories=2)
-    (points,) = screened.study().diagrams
-    assert isinstance(points, Points)
-    assert points.labels[0] == OUTER
-    written = [path.name for found in (matters, sure, screened) for path in ffrobot.write_study(found, tmp_path)]
-    for name in ("sensitivity.json", "tornado_mass.png", "uncertainty.json", "ranking_mass.pdf", "screening.json"):
+    written = [path.name for found in (matters, sure) for path in ffrobot.write_study(found, tmp_path)]
+    for name in ("sensitivity.json", "tornado_mass.png", "uncertainty.json", "ranking_mass.pdf"):
         assert name in written
         assert (tmp_path / name).stat().st_size > 500
-    assert [file.name for file in study_files(tmp_path)] == ["sensitivity.json", "uncertainty.json", "screening.json"]
+    assert [file.name for file in study_files(tmp_path)] == ["sensitivity.json", "uncertainty.json"]
     assert read_study(tmp_path / "uncertainty.json") == study
 
 

@@ -139,6 +139,15 @@ def test_sobol_indices_of_a_scene(write):
     assert np.all(np.abs(i.total[0] - expected) < 4.0 * i.total_error[0])
 
 
+@pytest.mark.parametrize("by", [("gradients",), ("samples", "--samples", 8, "--indices")])
+def test_keys_that_change_nothing(write, ffrobot, by):
+    """Payloads are not counted in the mass: no division by a variance of 0."""
+    spread = ("--spread", f"{PAYLOAD}=±5%")
+    done = ffrobot.ok("uncertainty", write(ARM), "--of", "mass", *spread, "--no-figures", "--by", *by)
+    assert "note       mass: none of the keys changes it" in done.stdout
+    assert "nan" not in done.stdout
+
+
 def test_failed_samples_are_told_and_left_out(write, ffrobot, tmp_path):
     """Of 46 masses 2 ± 0.995 the lowest is below 0 in a Latin hypercube: 1 of 46 is below 2.02 deviations."""
     command = ["uncertainty", write(ARM), "--of", "mass", "--spread", f"{MASS}=normal:0.995", "--samples", 46, "-j", 2]

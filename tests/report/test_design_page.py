@@ -71,11 +71,11 @@ def folder(tmp_path_factory):
         worst_label="lowest and highest sample",
     )  # fmt: skip
     write_study(study("uncertainty", indices, band), folder)
-    effects = Points(
-        name="screening_mass", title="mass", x_label="μ*", y_label="σ", labels=("a", "b"), x=(1.0, 0.1), y=(0.2, 0.1),
-        x_errors=(0.1, 0.01), named=True,
+    curve = Points(
+        name="front", title="mass against deflection", x_label="deflection (m)", y_label="mass (kg)",
+        labels=("", "price 2"), x=(1e-3, 2e-3), y=(2.0, 1.5), joined=True, sure=(True, False),
     )  # fmt: skip
-    write_study(study("screening", effects), folder)
+    write_study(study("front", curve), folder)
     return folder
 
 

@@ -202,23 +202,15 @@ def _band(band: Band) -> Iterator[Trace]:
 
 def _points(diagram: Points) -> Trace:
     sure = diagram.sure or (True,) * len(diagram.x)
-    mode = "+".join(["lines"] * diagram.joined + ["markers"] + ["text"] * diagram.named)
+    mode = "+".join(["lines"] * diagram.joined + ["markers"])
     trace: Trace = {
         "type": "scatter", "mode": mode, "x": list(diagram.x), "y": list(diagram.y),
-        "text": [_broken(label, NAME) for label in diagram.labels], "textposition": _sides(diagram),
+        "text": [_broken(label, NAME) for label in diagram.labels],
         "hovertemplate": "%{text}<br>%{x:.6g}, %{y:.6g}<extra></extra>", "cliponaxis": False,
         "line": {"color": COLORS[0]},
         "marker": {"size": 8, "color": COLORS[0], "symbol": ["circle" if one else "circle-open" for one in sure]},
     }  # fmt: skip
-    if diagram.x_errors:
-        trace["error_x"] = {"type": "data", "array": list(diagram.x_errors), "thickness": 1}
     return trace
-
-
-def _sides(diagram: Points) -> list[str]:
-    """Names stay within the chart: to the left of points in its right half."""
-    middle = 0.5 * max(diagram.x, default=0.0)
-    return [f"middle {'left' if x > middle else 'right'}" for x in diagram.x]
 
 
 @dataclass(frozen=True)

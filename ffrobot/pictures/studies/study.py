@@ -171,7 +171,7 @@ class Band(Drawing):
 
 
 class Points(Drawing):
-    """Named points with the errors of both coordinates; `joined` along a curve, hollow where not `sure`."""
+    """Named points; `joined` along a curve, hollow where not `sure`."""
 
     kind: Literal["points"] = "points"
     x_label: str
@@ -179,10 +179,8 @@ class Points(Drawing):
     labels: tuple[str, ...]
     x: tuple[float, ...]
     y: tuple[float, ...]
-    x_errors: tuple[float, ...] = ()
     sure: tuple[bool, ...] = ()
     joined: bool = False
-    named: bool = False
 
 
 Diagram = Annotated[Bars | Parallel | Progress | Band | Points, Field(discriminator="kind")]
@@ -214,7 +212,7 @@ def _round_logarithms(low: float, high: float) -> Array:
 
 FORMAT = "ffrobot-study"
 VERSION = 1
-StudyName = Literal["sensitivity", "optimum", "front", "uncertainty", "screening"]
+StudyName = Literal["sensitivity", "optimum", "front", "uncertainty"]
 """Of a file, without `.json`, as the folder of a command has it beside its tables."""
 
 NAMES: tuple[StudyName, ...] = get_args(StudyName)
