@@ -1,10 +1,4 @@
-"""Designs at places of the unit cube, each run once, with their goals; and all of them in one table.
-
-A problem whose peaks are divided into local ones, each of them smooth, as searches along gradients take it.
-
-"peak ≤ bound" is: every local peak ≤ bound. The least peak is the least s with every local peak ≤ s (the epigraph of a
-minimax problem: Nocedal & Wright, Numerical Optimization, 2006, section 17.2, likewise for limits that are exceeded).
-"""
+"""Designs at places of the unit cube, each run once, with their goals; and all of them in one table."""
 
 from __future__ import annotations
 
@@ -16,45 +10,11 @@ from typing import Any
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.tables import as_csv
-from ..results.file import Results
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point, in_words, repeated_steps
 from .goals import Problem
-from .readings import Followed, Goal, Peak, Reading, parts
+from .readings import Followed, Reading
 from .variables import Place, Space
-
-
-@dataclass(frozen=True)
-class Split(Problem):
-    """The problem of a search, with local peaks in place of peaks: rows are those of its `goals`.
-
-    `owners`: of each of the limits the number of the problem's own limit.
-    """
-
-    owners: tuple[int, ...] = ()
-
-    @property
-    def objective_rows(self) -> list[int]:
-        """By number."""
-        return list(range(len(self.objectives)))
-
-    @property
-    def limit_rows(self) -> list[int]:
-        """By number."""
-        return list(range(len(self.objectives), len(self.goals)))
-
-
-def split(problem: Problem, results: Results) -> Split:
-    """By the local peaks of a design. Peaks that are to be large have no parts: one of them is enough."""
-
-    def parts_of(goal: Goal, sense: float) -> tuple[Goal, ...]:
-        return parts(goal, results) if sense > 0 and isinstance(goal, Peak) else (goal,)
-
-    pairs = [(k, limit, goal) for k, limit in enumerate(problem.limits) for goal in parts_of(limit.goal, limit.sense)]
-    return Split(
-        problem.objective, problem.sense, tuple(replace(limit, goal=goal) for _, limit, goal in pairs), problem.scale,
-        parts_of(problem.objective, problem.sense), tuple(k for k, _, _ in pairs),
-    )  # fmt: skip
 
 
 class SpentError(Exception):
@@ -92,9 +52,7 @@ class Evaluations:
         self.designs, self.space, self.problem, self.most = designs, space, problem, most
         self._searched: dict[Point, Evaluated] = {}
         self._designs: dict[Path, Design] = {}
-        self._rows: dict[Path, tuple[Reading, ...]] = {}
         self._followed: dict[tuple[Place, Path], tuple[Followed, ...]] = {}
-        self._split: Split | None = None
 
     @property
     def runs(self) -> int:
@@ -118,33 +76,6 @@ class Evaluations:
         unrun = {d.point: d.failure for d in self._designs.values() if not d.completed}
         return [f"{in_words(self.space.keys, point)}: {why}" for point, why in (unread | unrun).items()]
 
-    @property
-    def split(self) -> Split:
-        """The problem as searches along gradients take it."""
-        assert self._split is not None
-        return self._split
-
-    def split_at(self, design: Evaluated) -> bool:
-        """Divide peaks by the local ones of a design that completed; whether that changes anything."""
-        with design.design.results() as results:
-            found = split(self.problem, results)
-        if found == self._split:
-            return False
-        self._split = found
-        self._rows.clear()
-        self._followed.clear()
-        return True
-
-    def rows(self, one: Evaluated) -> tuple[Reading, ...]:
-        """Of all rows of `split`, in a design that completed."""
-        if one.design.folder not in self._rows:
-            self._rows[one.design.folder] = one.design.read(self.split.goals)
-        return self._rows[one.design.folder]
-
-    def row_values(self, one: Evaluated) -> tuple[float, ...]:
-        """Likewise, the numbers."""
-        return tuple(reading.value for reading in self.rows(one))
-
     def at(self, places: Sequence[Place]) -> list[Evaluated]:
         """The designs there. Raises `SpentError` where that would be too many."""
         points = [self.space.point(place) for place in places]
@@ -156,7 +87,7 @@ class Evaluations:
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
     ) -> list[tuple[Followed, ...]]:
-        """Rows of `split` at places beside `base`, peaks at their time there; nothing where the design failed.
+        """Goals at places beside `base`, peaks at their time there; nothing where the design failed.
 
         `again`: changes with which runs take the steps of the base.
         """
@@ -190,7 +121,7 @@ class Evaluations:
     def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:
         known = base.place, design.folder
         if known not in self._followed:
-            self._followed[known] = design.follow(self.split.goals, self.rows(base))
+            self._followed[known] = design.follow(self.problem.goals, base.readings)
         return self._followed[known]
 
 

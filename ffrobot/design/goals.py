@@ -276,29 +276,20 @@ class Limit:
 
 @dataclass(frozen=True)
 class Problem:
-    """The objective shall be least (`sense` 1) or largest (−1), within the `limits`; `scale` is its size.
-
-    `parts`: goals whose largest is the objective, which stand for it where there are any.
-    """
+    """The objective shall be least (`sense` 1) or largest (−1), within the `limits`; `scale` is its size."""
 
     objective: Goal
     sense: float
     limits: tuple[Limit, ...]
     scale: float = 1.0
-    parts: tuple[Goal, ...] = ()
-
-    @property
-    def objectives(self) -> tuple[Goal, ...]:
-        """The objective, or its k parts."""
-        return self.parts or (self.objective,)
 
     @property
     def goals(self) -> tuple[Goal, ...]:
-        """The objectives, then that of each limit."""
-        return (*self.objectives, *(limit.goal for limit in self.limits))
+        """The objective, then that of each limit."""
+        return (self.objective, *(limit.goal for limit in self.limits))
 
     def scaled(self, values: Sequence[float]) -> Array:
-        """(k + m) F to be least, and g ≤ 0, of the goals' values: logarithms of their ratios to size and bounds.
+        """(1 + m) F to be least, and g ≤ 0, of the goals' values: logarithms of their ratios to size and bounds.
 
         Powers of lengths, as masses and deflections are, become linear in the logarithms of these.
         """
@@ -306,29 +297,28 @@ class Problem:
         return as_floats(logarithms * self._senses)
 
     def factors(self, values: Sequence[float]) -> Array:
-        """(k + m) what turns slopes of goals with these values into those of `scaled`."""
+        """(1 + m) what turns slopes of goals with these values into those of `scaled`."""
         _, slopes = self._logarithms(values)
         return as_floats(slopes * self._senses / self._sizes)
 
     def excess(self, values: Sequence[float]) -> Array:
         """(m) how far goals are beyond their limits, of these; below 0 within."""
         bounds, senses = (np.array([getattr(limit, of) for limit in self.limits]) for of in ("bound", "sense"))
-        k = len(self.objectives)
-        return as_floats(senses * (np.array(values[k:]) - bounds) / np.abs(self._sizes[k:]))
+        return as_floats(senses * (np.array(values[1:]) - bounds) / np.abs(self._sizes[1:]))
 
     @property
     def _senses(self) -> Array:
         objective = self.sense * np.sign(self.scale)
         limits = (limit.sense * (np.sign(limit.bound) or 1.0) for limit in self.limits)
-        return np.array([*[objective] * len(self.objectives), *limits])
+        return np.array([objective, *limits])
 
     @property
     def _sizes(self) -> Array:
-        return np.array([*[self.scale] * len(self.objectives), *(limit.bound or 1.0 for limit in self.limits)])
+        return np.array([self.scale, *(limit.bound or 1.0 for limit in self.limits)])
 
     def _logarithms(self, values: Sequence[float]) -> tuple[Array, Array]:
         """Logarithms of ratios, and their derivatives; below `LINEAR`, and where a bound is 0, on a tangent."""
-        of_zero = np.array([*[False] * len(self.objectives), *(limit.bound == 0.0 for limit in self.limits)])
+        of_zero = np.array([False, *(limit.bound == 0.0 for limit in self.limits)])
         ratios = np.array(values) / self._sizes + of_zero
         place = np.where(of_zero, 1.0, np.maximum(ratios, LINEAR))
         return np.log(place) + (ratios - place) / place, 1.0 / place

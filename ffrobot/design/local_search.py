@@ -1,6 +1,6 @@
 """Searches along gradients from one start; all rows of catalogues; differential evolution.
 
-What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of the rows of `Split`.
+What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of the goals.
 
 A design that fails reads as far worse than the last one that did not, with its excesses: SLSQP's line search and
 trust-constr's radius then shorten the step towards that one.
@@ -19,7 +19,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, 
 from ..common.arrays import Array, as_floats
 from .evaluations import Evaluated, Evaluations, SpentError
 from .goals import KEPT
-from .optimality import Conflict, Differentiation, Optimality, Slopes, conflict, optimality
+from .optimality import Differentiation, Optimality, optimality
 from .variables import Place, Space
 
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum
@@ -47,14 +47,6 @@ class StalledError(Exception):
     """Steps are none, or limits are exceeded and have not come much nearer in the last ones."""
 
 
-class ConflictError(Exception):
-    """Limits are exceeded, and no design near exceeds them less."""
-
-    def __init__(self, design: Evaluated, found: Conflict) -> None:
-        super().__init__()
-        self.design, self.conflict = design, found
-
-
 def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
     """In which completed designs are sorted: those within limits first, by the objective, then by their violation."""
     if not one.completed:
@@ -77,10 +69,9 @@ class Steps:
     ) -> None:  # fmt: skip
         self._differentiation, self._tell, self._judged, self._excess = differentiation, tell, judged, excess
         self._evaluations = differentiation.evaluations
-        variables, split = self._evaluations.space.variables, self._evaluations.split
+        variables, count = self._evaluations.space.variables, len(self._evaluations.problem.goals)
         self._free = [j for j, variable in enumerate(variables) if not variable.is_catalogue]
-        self._tops = split.limit_rows if excess else split.objective_rows
-        self._limits = [] if excess else split.limit_rows
+        self._tops, self._limits = ([*range(1, count)], []) if excess else ([0], [*range(1, count)])
         self._place, self.best, self._good = np.array(start.place), start, start
         self._gradients: dict[Place, Array] = {}
         self._residual = np.inf  # where they were judged last
@@ -133,14 +124,14 @@ class Steps:
         return as_floats(np.column_stack([rows[chosen], level]))
 
     def _rows(self, x: Array) -> Array:
-        """(r) of `Split`, scaled."""
+        """(1 + m) goals, scaled."""
         evaluations = self._evaluations
         one = self._at(x)
         if not one.completed:
-            worse = np.isin(np.arange(len(evaluations.split.goals)), self._tops) * FAILED
-            return as_floats(evaluations.split.scaled(evaluations.row_values(self._good)) + worse)
+            worse = np.isin(np.arange(len(evaluations.problem.goals)), self._tops) * FAILED
+            return as_floats(evaluations.problem.scaled(self._good.values) + worse)
         self.best = best_of(evaluations, [self.best, one])
-        return evaluations.split.scaled(evaluations.row_values(one))
+        return evaluations.problem.scaled(one.values)
 
     def _row_gradients(self, x: Array) -> Array:
         """(r, n) of them."""
@@ -152,7 +143,7 @@ class Steps:
                 raise StalledError
             self._good = one
             self._report(one)
-            factors = self._evaluations.split.factors(self._evaluations.row_values(one))
+            factors = self._evaluations.problem.factors(one.values)
             self._gradients[one.place] = self._gradients_at(one) * factors[:, None]
         return self._gradients[one.place]
 
@@ -169,13 +160,11 @@ class Steps:
             if stands.residual > DOWN * self._residual:
                 break
             self._residual = stands.residual
-        self._watch(one, slopes)
+        self._watch(one)
         return slopes.gradient[:, self._free]
 
-    def _watch(self, one: Evaluated, slopes: Slopes) -> None:
-        """Whether limits that are exceeded come nearer. Raises `ConflictError` or `StalledError` where not."""
-        if found := conflict(self._evaluations, one, slopes, AIM):
-            raise ConflictError(one, found)
+    def _watch(self, one: Evaluated) -> None:
+        """Whether limits that are exceeded come nearer. Raises `StalledError` where not."""
         violation = self._evaluations.problem.violation(one.readings)
         if violation <= max(FAR, NEARER * self._violation):
             self._violation, self._waited = violation if violation > FAR else np.inf, 0
@@ -223,22 +212,21 @@ def _trust_constr(steps: Steps) -> str:
 OPTIMISERS = {"slsqp": _slsqp, "trust-constr": _trust_constr}
 
 
-KINK = "more peaks switch here than ffrobot separates: --method differential-evolution continues from any design"
+KINK = "peaks switch here as the largest: --method differential-evolution does without gradients"
+BEYOND = "no design near this one keeps all limits: --starts searches from others"
 
 
 @dataclass(frozen=True)
 class Local:
     """One search: where it began, the best of its designs, how that stands, and why it ended where not there.
 
-    `conflict`: limits that no design near the best one keeps together. `spent`: whether it wanted
-    more runs than there were.
+    `spent`: whether it wanted more runs than there were.
     """
 
     start: Evaluated
     best: Evaluated
     optimality: Optimality | None
     message: str = ""
-    conflict: Conflict | None = None
     spent: bool = False
 
 
@@ -246,8 +234,8 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
     """With a design at each step, and one beside it for each number; with judged gradients where these do not do.
 
     What SLSQP then leaves, whose line search may come to nothing where a limit trades for the goal almost linearly,
-    trust-constr goes on with. Each of them begins with the local peaks of the best design so far. Where one ends
-    beyond limits, the largest excess is made less until they are kept, or no design near exceeds them less.
+    trust-constr goes on with. Where one ends beyond limits, the largest excess is made less until they are kept; where
+    that fails with judged gradients, the search ends.
     """
     evaluations = differentiation.evaluations
     begun = len(evaluations.searched)
@@ -264,17 +252,14 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
             if found.violation > KEPT:
                 best, _ = _pass("slsqp", differentiation, best, tell, judged=judged, excess=True)
                 found = _stands(differentiation, best)
+                if judged and found.violation > KEPT:
+                    return Local(first, best, found, BEYOND)
         message = KINK if found is not None and found.kinks else message
     except (SpentError, StuckError) as error:
         spent = isinstance(error, SpentError)
         message = f"ended after {evaluations.runs} runs, as many as were allowed" if spent else str(error)
         last = best_of(evaluations, [best, *evaluations.searched[begun:]])
         return Local(first, last, found if last is best else None, message, spent=spent)
-    except ConflictError as error:
-        best = error.design
-        return Local(
-            first, best, _stands(differentiation, best), _conflict_in_words(evaluations, error.conflict), error.conflict
-        )
     return Local(first, best, found, message)
 
 
@@ -283,7 +268,6 @@ def _pass(
     judged: bool, excess: bool = False,
 ) -> tuple[Evaluated, str]:  # fmt: skip
     """The best design that an optimiser comes to from `best`, and why it ended where that is not at an optimum."""
-    differentiation.split_at(best)
     steps = Steps(differentiation, best, tell, judged=judged, excess=excess)
     message = ""
     with suppress(ReachedError, StalledError):
@@ -292,20 +276,8 @@ def _pass(
 
 
 def _stands(differentiation: Differentiation, best: Evaluated) -> Optimality:
-    """By the local peaks of the design itself."""
-    differentiation.split_at(best)
+    """By judged gradients."""
     return optimality(differentiation.evaluations, best, differentiation.slopes(best, judged=True))
-
-
-def _conflict_in_words(evaluations: Evaluations, found: Conflict) -> str:
-    limits = [f'"{evaluations.problem.limits[k].text}"' for k in found.limits]
-    bounds = [evaluations.space.variables[j].name for j in found.bounds]
-    together = " together" if len(limits) > 1 else ""
-    within = f", within the bounds of {' and '.join(bounds)}" if bounds else ""
-    return (
-        f"no design near this one keeps {' and '.join(limits)}{together}{within}: at the least violation that was found"
-        f" {'they are' if together else 'it is'} exceeded by {100 * found.violation:.4g} %; --starts looks elsewhere"
-    )
 
 
 def best_of(evaluations: Evaluations, designs: Sequence[Evaluated]) -> Evaluated:

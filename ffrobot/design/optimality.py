@@ -1,12 +1,9 @@
 """How near to an optimum a design is, and what limits and bounds cost there: multipliers of Karush, Kuhn and Tucker.
 
-With F_i whose largest is to be least, excesses g ≤ 0 and bounds of u: Σ ν_i ∇F_i + Σ λ_i ∇g_i + Σ μ_j ∇b_j = 0 with
-ν, λ, μ ≥ 0 and Σ ν = 1; ν is 0 where F_i is not the largest, λ and μ where a limit is not reached. Of the gradients
-there are, the multipliers that come nearest to it are taken (Lawson & Hanson's least squares without negative values,
-the sum as a heavy row: Solving Least Squares Problems, 1974, chapter 22). One unit more room in g_i lowers F by λ_i.
-
-The same of the limits that a design exceeds, as F, tells whether the largest excess can become less: where it cannot,
-those with ν > 0 are the ones that no design near keeps together.
+With the objective F to be least, excesses g ≤ 0 and bounds b of u: ∇F + Σ λ_i ∇g_i + Σ μ_j ∇b_j = 0 with λ, μ ≥ 0, and
+0 where a limit or bound is not reached. Of the gradients there are, the multipliers that come nearest to it are taken
+(Lawson & Hanson's least squares without negative values: Solving Least Squares Problems, 1974, chapter 23). One unit
+more room in g_i lowers F by λ_i.
 
 Gradients of all goals at a design, from few runs: one design beside it for each variable, or a central pair.
 
@@ -30,7 +27,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from ..common.arrays import Array, NDArray, as_floats
+from ..common.arrays import Array, as_floats
 from ..sweep.sweep import Key
 from .derivatives import weights
 from .evaluations import Evaluated, Evaluations
@@ -47,7 +44,7 @@ DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 
 @dataclass(frozen=True)
 class Slopes:
-    """At one design: `gradient` (r, n) of rows of `Split` by coordinates of the unit cube; its `error`, estimated.
+    """At one design: `gradient` (r, n) of goals by coordinates of the unit cube; its `error`, estimated.
 
     Coordinates of catalogues have NaN, and those without a design beside that completes. `kinks`: peaks that others
     overtake beside the design, in words.
@@ -72,14 +69,9 @@ class Differentiation:
     curvature: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.curvature = np.zeros((0, 0))
+        shape = len(self.evaluations.problem.goals), len(self.evaluations.space.variables)
+        self.curvature = np.full(shape, np.nan)
         self._tried = False
-
-    def split_at(self, design: Evaluated) -> None:
-        """Take the problem with the local peaks of a design from now on."""
-        if self.evaluations.split_at(design):
-            shape = len(self.evaluations.split.goals), len(self.evaluations.space.variables)
-            self.curvature = np.full(shape, np.nan)
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
         """At a design that completed; `judged`: with an estimate of the error by further runs."""
@@ -95,7 +87,7 @@ class Differentiation:
         """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
         step = {j: self._step(base, j, ROUNDING) for j in wanted}
         samples = self._samples(base, {j: [_side(base, j, h) * h] for j, h in step.items()}, base.again)
-        own = np.array(self.evaluations.row_values(base))
+        own = np.array(base.values)
         gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
         for j, beside in samples.items():
             _differentiate(own, j, beside, gradient, error, ROUNDING)
@@ -112,7 +104,7 @@ class Differentiation:
         back = {j: -x for j, beside in samples.items() for x in beside if 0.0 <= base.place[j] - x <= 1.0}
         place = tuple(u + back.get(j, 0.0) for j, u in enumerate(base.place))
         (whole,) = self.evaluations.beside(base, [place], base.again)
-        own = np.array(self.evaluations.row_values(base))
+        own = np.array(base.values)
         if not whole:
             return np.zeros_like(own)
         left = np.array([one.value for one in whole]) - own
@@ -125,7 +117,7 @@ class Differentiation:
         """With central `pairs`, or one design beside where curvatures are known."""
         offsets = {j: self._offsets(base, j, pairs=pairs) for j in wanted}
         samples = self._samples(base, offsets, None)
-        own = np.array(self.evaluations.row_values(base))
+        own = np.array(base.values)
         gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
         for j, beside in samples.items():
             bent = np.nan_to_num(self.curvature[:, j])
@@ -160,7 +152,7 @@ class Differentiation:
         return self.evaluations.space.variables[j].step(base.place[j], 2.0 * float(np.sqrt(noise)))
 
     def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:
-        goals = self.evaluations.split.goals
+        goals = self.evaluations.problem.goals
         found = [
             f"{goal.text}: close to this design another peak is the largest, {one.elsewhere}"
             for beside in samples.values()
@@ -208,10 +200,7 @@ def _moved(place: Place, j: int, offset: float) -> Place:
 
 
 ACTIVE = 1e-4  # of a limit, or of a number's range: what is nearer counts as reached
-TIED = 1e-5  # of the largest one: peaks that are equal
 CLOSED = 1e-2  # of the gradient that an optimum may have: room that limits may have there, in the objective
-HEAVY = 1e3  # row of the sum of multipliers, beside the largest gradient
-SHARE = 1e-3  # of the multipliers' sum: a limit that matters
 
 
 @dataclass(frozen=True)
@@ -242,88 +231,27 @@ class Optimality:
         return self.residual <= aim and self.gap <= CLOSED * aim and self.violation <= KEPT
 
 
-@dataclass(frozen=True)
-class Conflict:
-    """Numbers of `limits` that no design near keeps together, of variables at `bounds` beside, and the `violation`."""
-
-    limits: tuple[int, ...]
-    bounds: tuple[int, ...]
-    violation: float
-
-
 def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> Optimality:
     """Of a completed design, by the gradients there."""
-    split, count = evaluations.split, len(evaluations.problem.limits)
-    values = split.scaled(evaluations.row_values(design))
-    excess = values[split.limit_rows]
-    largest = values[split.objective_rows].max()
-    tops = [row for row in split.objective_rows if values[row] >= largest - TIED]
-    found = _multipliers(evaluations, design, slopes, tops, [row for row in split.limit_rows if values[row] > -ACTIVE])
-    limits = np.full(count, np.nan)
-    for owner, value, multiplier in zip(split.owners, excess, found.limits, strict=True):
-        if value > -ACTIVE:
-            limits[owner] = np.nan_to_num(limits[owner]) + multiplier
-    gap = float(found.tops[split.objective_rows] @ (largest - values[split.objective_rows]))
-    gap += float(found.limits @ np.maximum(-excess, 0.0))
-    error = _largest((slopes.error * np.abs(found.factors))[np.ix_(np.array(tops), found.free)])
-    violation = evaluations.problem.violation(design.readings)
-    return Optimality(limits, found.bounds, found.residual, gap, error, violation, slopes.kinks)
-
-
-def conflict(evaluations: Evaluations, design: Evaluated, slopes: Slopes, aim: float) -> Conflict | None:
-    """What keeps the largest excess from becoming less; None where the limits are kept, or it can."""
-    violation = evaluations.problem.violation(design.readings)
-    if violation <= KEPT:
-        return None
-    split = evaluations.split
-    values = split.scaled(evaluations.row_values(design))
-    largest = values[split.limit_rows].max()
-    found = _multipliers(
-        evaluations, design, slopes, [r for r in split.limit_rows if values[r] >= largest - ACTIVE], []
-    )
-    if found.residual > aim:
-        return None
-    owners = [owner for owner, share in zip(split.owners, found.tops[split.limit_rows], strict=True) if share > SHARE]
-    bounds = np.flatnonzero(np.abs(np.nan_to_num(found.bounds)) > aim)
-    return Conflict(tuple(dict.fromkeys(owners)), tuple(map(int, bounds)), violation)
-
-
-@dataclass(frozen=True)
-class _Multipliers:
-    """ν (r), λ (limits) and μ (n, NaN between bounds), with the `residual`; `free` coordinates, `factors` (r, 1)."""
-
-    tops: Array
-    limits: Array
-    bounds: Array
-    residual: float
-    free: NDArray[np.intp]
-    factors: Array
-
-
-def _multipliers(
-    evaluations: Evaluations, design: Evaluated, slopes: Slopes, tops: Sequence[int], limits: Sequence[int]
-) -> _Multipliers:
-    """With rows `tops` as F, rows `limits` as g."""
-    split, variables = evaluations.split, evaluations.space.variables
-    factors = split.factors(evaluations.row_values(design))[:, None]
-    scaled = slopes.gradient * factors
+    problem, variables = evaluations.problem, evaluations.space.variables
+    factors = problem.factors(design.values)[:, None]
+    scaled, excess = slopes.gradient * factors, problem.scaled(design.values)[1:]
     is_number = np.array([not variable.is_catalogue for variable in variables])
     free = np.flatnonzero(~np.isnan(scaled).any(axis=0) & is_number)
-    place = np.array(design.place)
+    place, unit = np.array(design.place), np.eye(len(variables))
+    reached = np.flatnonzero(excess > -ACTIVE)
     low, high = (np.intersect1d(free, np.flatnonzero(near)) for near in (place < ACTIVE, place > 1.0 - ACTIVE))
-    unit = np.eye(place.size)
-    rows = np.vstack([scaled[list(tops)], scaled[list(limits)], -unit[low], unit[high]])[:, free]
-    heavy = HEAVY * max(1.0, _largest(rows))
-    sum_row = np.where(np.arange(len(rows)) < len(tops), heavy, 0.0)
-    found = nnls(np.vstack([rows.T, sum_row]), np.append(np.zeros(free.size), heavy))[0]
-    found = found / found[: len(tops)].sum()
-    ends = np.cumsum([len(tops), len(limits), low.size])
-    of_tops, of_limits, of_low, of_high = np.split(found, ends)
-    bounds = np.full(place.size, np.nan)
-    bounds[low], bounds[high] = -of_low, of_high
-    all_tops, all_limits = np.zeros(len(scaled)), np.zeros(len(scaled))
-    all_tops[list(tops)], all_limits[list(limits)] = of_tops, of_limits
-    return _Multipliers(all_tops, all_limits[split.limit_rows], bounds, _largest(found @ rows), free, factors)
+    gradients = np.vstack([scaled[1 + reached], -unit[low], unit[high]])[:, free]
+    found = nnls(gradients.T, -scaled[0, free])[0] if len(gradients) and free.size else np.zeros(len(gradients))
+    of_limits, of_low, of_high = np.split(found, np.cumsum([reached.size, low.size]))
+    limits, bounds = np.full(len(problem.limits), np.nan), np.full(place.size, np.nan)
+    limits[reached], bounds[low], bounds[high] = of_limits, -of_low, of_high
+    return Optimality(
+        limits, bounds, _largest(scaled[0, free] + found @ gradients),
+        gap=float(of_limits @ np.maximum(-excess[reached], 0.0)),
+        gradient_error=_largest((slopes.error * np.abs(factors))[0, free]),
+        violation=problem.violation(design.readings), kinks=slopes.kinks,
+    )  # fmt: skip
 
 
 def _largest(values: Array) -> float:

@@ -122,7 +122,7 @@ def _search(
         return [Local(first, best, None, message)]
     found = search_from(best.place, "slsqp", differentiation, watcher.stage)
     words = "; ".join(text for text in (message, found.message) if text)
-    return [Local(first, found.best, found.optimality, words, found.conflict)]
+    return [Local(first, found.best, found.optimality, words)]
 
 
 def _from_starts(
@@ -152,7 +152,7 @@ def _optimum(
     folder = runs.folder / BEST
     scene = run_files(runs.path, changes, folder).write(folder)
     return Optimum(
-        runs.path, problem, space, method, best.start, best.best, best.optimality, best.conflict, best.message,
+        runs.path, problem, space, method, best.start, best.best, best.optimality, best.message,
         tuple(searches), evaluations.runs, tuple(evaluations.failures), tolerance, verdict,
         scene if runs.kept else None, designs=runs.folder / "designs.csv" if runs.kept else None,
         tried=tuple(evaluations.searched),

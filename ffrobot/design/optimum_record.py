@@ -16,7 +16,7 @@ from .evaluations import Evaluated
 from .finding import CsvFile, Finding, Section, failed_runs, numbers, with_unit
 from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
-from .optimality import Conflict, Optimality
+from .optimality import Optimality
 from .variables import Space, Variable
 
 
@@ -108,7 +108,6 @@ class Optimum(Finding):
         method, message: the optimiser; why it ended, if not at an optimum.
         start, best: designs of the best search; `searches` are all.
         optimality: conditions of optimality at `best`; None without gradients.
-        conflict: limits that no design near `best` satisfies together; None if it satisfies all, or if that is unknown.
         runs: their number; `failures` has failed ones in words.
         tolerance: largest tolerance of the runs.
         verdict: of `best`.
@@ -127,7 +126,6 @@ class Optimum(Finding):
     start: Evaluated
     best: Evaluated
     optimality: Optimality | None
-    conflict: Conflict | None
     message: str
     searches: tuple[Local, ...]
     runs: int

@@ -29,7 +29,6 @@ def differentiation(tmp_path, scene):
     evaluations = Evaluations(designs, space, problem, 100)
     (first,) = evaluations.at([space.start_place])
     found = Differentiation(evaluations, 1e-7)
-    found.split_at(first)
     return found, first
 
 
