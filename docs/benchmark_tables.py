@@ -1,4 +1,4 @@
-"""The page of what was measured, from the records that `ffrobot bench -o docs/benchmarks` wrote.
+"""The page of what was measured, from the records that `python -m bench -o docs/benchmarks` wrote.
 
 It is kept in the repository, so that it can be read there: `python docs/benchmark_tables.py` writes it anew.
 """

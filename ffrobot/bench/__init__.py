@@ -1,4 +1,4 @@
-"""Run time against error, measured: `ffrobot bench`. What needs the source tree is in its tools/bench.
+"""Run time against error of a scene, measured: `ffrobot bench`.
 
 measuring    one solve within a budget of time, its histories, and how far these are from a reference
 precision    a reference, and every integrator at every tolerance: the work-precision diagram
@@ -7,5 +7,3 @@ campaign     what runs in which order, what is written and printed
 """
 
 OF_A_SCENE = ("work-precision", "axes")
-PARTS = (*OF_A_SCENE, "growth", "evaluations", "aims", "replays")
-PEER = "peer"  # where asked for: it needs another program

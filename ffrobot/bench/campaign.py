@@ -215,10 +215,10 @@ def draw_work_precision(rows: Rows, peer: Rows, title: str, folder: Path) -> lis
     time, error = "least run time (s)", "error / peak"
     for kind in KINDS:
         key = f"error_{kind}"
-        curves = {name: _points(rows, "integrator", name, TIME, key) for name in _names(rows, "integrator")}
-        for gravity in _names(peer, "gravity"):
-            curves[f"EXUDYN, {gravity} gravity"] = _points(peer, "gravity", gravity, "seconds", key)
-        written += _draw(curves, f"{title}: {kind}", time, error, folder, f"work_precision_{kind}")
+        curves = {name: points_of(rows, "integrator", name, TIME, key) for name in names(rows, "integrator")}
+        for gravity in names(peer, "gravity"):
+            curves[f"EXUDYN, {gravity} gravity"] = points_of(peer, "gravity", gravity, "seconds", key)
+        written += draw(curves, f"{title}: {kind}", time, error, folder, f"work_precision_{kind}")
     return written
 
 
@@ -227,35 +227,25 @@ def draw_axes(rows: Rows, title: str, folder: Path) -> list[Path]:
     written: list[Path] = []
     for axis in ("mesh", "modes"):
         along = [row for row in rows if row["axis"] == axis]
-        curves = {kind: _points(along, "axis", axis, "times", f"error_{kind}") for kind in KINDS}
+        curves = {kind: points_of(along, "axis", axis, "times", f"error_{kind}") for kind in KINDS}
         label = "times the elements of the links" if axis == "mesh" else "times the modes of the links"
-        written += _draw(curves, f"{title}: {axis}", label, "error / peak", folder, f"error_{axis}")
+        written += draw(curves, f"{title}: {axis}", label, "error / peak", folder, f"error_{axis}")
     return written
 
 
-def draw_growth(rows: Rows, folder: Path) -> list[Path]:
-    """Time against size: of an evaluation with modes and links, and of a run with outputs."""
-    kinds = [kind for kind in _names(rows, "with") if kind != "outputs"]
-    curves = {kind: _points(rows, "with", kind, "size", TIME) for kind in kinds}
-    outputs = {"a run of 0.1 s": _points(rows, "with", "outputs", "size", TIME)}
-    return [
-        *_draw(curves, "accelerations and multipliers", "modes, links", "least time each (s)", folder, "growth"),
-        *_draw(outputs, "outputs of a run", "outputs", "least run time (s)", folder, "growth_outputs"),
-    ]
-
-
-def _names(rows: Rows, column: str) -> list[str]:
+def names(rows: Rows, column: str) -> list[str]:
+    """Values of a column, each once."""
     return list(dict.fromkeys(row[column] for row in rows))
 
 
-def _points(rows: Rows, column: str, name: str, x: str, y: str) -> tuple[list[float], list[float]]:
+def points_of(rows: Rows, column: str, name: str, x: str, y: str) -> tuple[list[float], list[float]]:
     """Values of x and y of the rows called `name` that have both."""
     pairs = [(row.get(x), row.get(y)) for row in rows if row[column] == name]
     found = [(float(a), float(b)) for a, b in pairs if a and b]
     return [a for a, _ in found], [b for _, b in found]
 
 
-def _draw(curves: Curves, title: str, x_label: str, y_label: str, folder: Path, name: str) -> list[Path]:
+def draw(curves: Curves, title: str, x_label: str, y_label: str, folder: Path, name: str) -> list[Path]:
     """Curves on logarithmic axes, PNG and PDF; nothing where all are empty."""
     shown = {label: points for label, points in curves.items() if points[0]}
     if not shown:

@@ -1,6 +1,9 @@
-"""What `ffrobot bench` measures, for tests of each part."""
+"""What `python -m bench` measures, for tests of each part."""
 
 import csv
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,12 +12,13 @@ REPOSITORY = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def bench(ffrobot, tmp_path_factory):
-    """Rows, dictionaries by column, of a part of `ffrobot bench`."""
+def bench(tmp_path_factory):
+    """Rows, dictionaries by column, of a part of `python -m bench`."""
 
     def rows(part, *options):
         folder = tmp_path_factory.mktemp(part)
-        ffrobot.ok("bench", "--part", part, *options, "--source", REPOSITORY, "-o", folder)
+        command = [sys.executable, "-m", "bench", "--part", part, *options, "-o", folder]
+        subprocess.run(command, env=os.environ | {"PYTHONPATH": str(REPOSITORY / "tools")}, check=True)
         with (folder / f"{part}.csv").open(encoding="utf-8", newline="") as stream:
             return list(csv.DictReader(stream))
 

@@ -1,4 +1,4 @@
-"""`ffrobot bench --part evaluations`: every mechanism has its row, measured beside the program written by hand."""
+"""`python -m bench --part evaluations`: every mechanism has its row, measured beside the program written by hand."""
 
 import pytest
 

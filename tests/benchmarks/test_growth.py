@@ -2,7 +2,7 @@
 
     .venv/bin/python -m pytest tests/benchmarks/test_growth.py --benchmark-enable -s
 
-prints a table of minima of interleaved repetitions; linear growth means that the last column settles; `ffrobot bench
+prints a table of minima of interleaved repetitions; linear growth means that the last column settles; `python -m bench
 --part growth` draws it. In the ordinary test run timings are short. Growth is asserted as an exponent: 1.1 with links,
 and 0.9 with modes from 50 on (what does not depend on their number still counts there), are measured.
 """

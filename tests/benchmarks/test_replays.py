@@ -1,4 +1,4 @@
-"""`ffrobot bench --part replays`: replays are measured beside the PCID that they follow."""
+"""`python -m bench --part replays`: replays are measured beside the PCID that they follow."""
 
 import pytest
 

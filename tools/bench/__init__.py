@@ -1,4 +1,4 @@
-"""The parts of `ffrobot bench` that need ffrobot's source tree: they compile and run programs next to it.
+"""Benchmarks of ffrobot itself, `python -m bench`: they compile and run programs next to it.
 
 evaluations  of several mechanisms in 2D and 3D, beside the two-link case written by hand
 growth       time per evaluation against modes and links, time of a run against outputs

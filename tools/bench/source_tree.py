@@ -1,4 +1,4 @@
-"""What `ffrobot bench` runs without a scene: the two cases of the paper, growth, and ratios to hand-written code."""
+"""What `python -m bench` runs: the two cases of the paper, growth, and ratios to hand-written code."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from ffrobot.bench import OF_A_SCENE, PEER
-from ffrobot.bench.campaign import Campaign, Swept, draw_growth, draw_work_precision, inputs_of
+from ffrobot.bench import OF_A_SCENE
+from ffrobot.bench.campaign import TIME, Campaign, Rows, Swept, draw, draw_work_precision, inputs_of, names, points_of
 from ffrobot.bench.measuring import find_analysis
 from ffrobot.common.errors import InputError
 from ffrobot.run.solve import prepare_scene
@@ -21,6 +21,8 @@ from .peer import Exudyn, measure_peer
 from .replays import measure_replays
 
 CASES = ("two_link", "slider_crank")  # of the paper
+PARTS = ("growth", "evaluations", "aims", "replays")
+PEER = "peer"  # where asked for: it needs another program
 REPLAYED = ("two_link", "arm_3r")  # in the plane and in 3D
 
 
@@ -82,3 +84,14 @@ class SourceTree(Campaign):
         self.keep("peer", rows, about, folder, "EXUDYN on the same modal bodies; force without its start")
         self.drawn(draw_work_precision([point.row() for point in points], rows, scene.name, folder))
         self.console.print(f"at the peer's best error: {verdict}")
+
+
+def draw_growth(rows: Rows, folder: Path) -> list[Path]:
+    """Time against size: of an evaluation with modes and links, and of a run with outputs."""
+    kinds = [kind for kind in names(rows, "with") if kind != "outputs"]
+    curves = {kind: points_of(rows, "with", kind, "size", TIME) for kind in kinds}
+    outputs = {"a run of 0.1 s": points_of(rows, "with", "outputs", "size", TIME)}
+    return [
+        *draw(curves, "accelerations and multipliers", "modes, links", "least time each (s)", folder, "growth"),
+        *draw(outputs, "outputs of a run", "outputs", "least run time (s)", folder, "growth_outputs"),
+    ]

@@ -4,7 +4,7 @@
     python exudyn_two_link.py link1.h5 link2.h5 --step 1e-4 -o run.csv
 
 writes time, force on the tip (N) and its deflection (m), and prints one line of JSON: seconds, versions, settings.
-`ffrobot bench --peer exudyn` runs it and compares. Needs no ffrobot: modal body files are self-contained.
+`python -m bench --peer` runs it and compares. Needs no ffrobot: modal body files are self-contained.
 
 Links are ObjectFFRFreducedOrder; its invariants are ours in other clothes (`reduced_order`). They move in 3D there,
 held to the plane by coordinate constraints. The tip is joined to a point without mass that follows the path.
