@@ -1,7 +1,7 @@
 """Files that carry a checksum of all their bytes: damage is reported before a library fails on it.
 
 The checksum stands behind the end of the HDF5 file, where HDF5 itself does not look: a line of text, zlib's CRC-32,
-which takes a few per cent of the time of reading. Libraries that change such a file cut the line off.
+which takes a few percent of the time of reading. Libraries that change such a file cut the line off.
 """
 
 from __future__ import annotations

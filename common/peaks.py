@@ -12,7 +12,7 @@ ALIKE = 4.0  # ratio of curvatures about a value within which it is the top of s
 def largest(time: Array, values: Array) -> tuple[float, float]:
     """The largest |value| of `values` (T,) over `time` (T,), s, and when that is; 0 and NaN of none.
 
-    Where neighbours show a smooth top, that of the polynomial of degree 4 through five values; next to jumps and ends
+    Where neighbors show a smooth top, that of the polynomial of degree 4 through five values; next to jumps and ends
     the largest value itself.
     """
     return top_at(time, values, int(np.abs(values).argmax())) if len(values) else (0.0, float("nan"))

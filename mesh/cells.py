@@ -49,7 +49,7 @@ HEXAHEDRON = Cell(
 CELLS: dict[CellName, Cell] = {"tetrahedron": TETRAHEDRON, "hexahedron": HEXAHEDRON}
 
 # Six tetrahedra around the diagonal 0–6 of a hexahedron (Kuhn): they fill it and meet those of equally numbered
-# neighbours face to face.
+# neighbors face to face.
 KUHN = np.array([[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]])
 
 # gmsh's numbers of element types: of volume elements, under the names that meshio uses, and the nodes of all of them.

@@ -22,7 +22,7 @@ _CURVED = 0.005
 _VOLUME = 0.005
 MOST_CELLS = 1e7  # far more than fit into the memory of the machines this runs on
 METRES = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
-_NAMES = {"m": "metres", "mm": "millimetres", "in": "inches"}
+_NAMES = {"m": "meters", "mm": "millimeters", "in": "inches"}
 # How far outside a free side the part must not be, relative to the side; and how far inside a cell is inside it.
 _OUTSIDE, _INSIDE = 1e-3, 1e-6
 # A point on a facet, by its corners, that lies on no plane through some of them.

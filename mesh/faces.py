@@ -26,7 +26,7 @@ Choice = Integers
 # A facet lies in a plane when its corners are closer to it than this, relative to the length of the link: files carry
 # as few as five digits.
 IN_PLANE = 1e-5
-# Neighbouring facets belong to one smooth face when their normals are closer than this; a circle may have 8 edges.
+# Neighboring facets belong to one smooth face when their normals are closer than this; a circle may have 8 edges.
 _SMOOTH = float(np.cos(np.radians(50)))
 _ALONG = float(np.cos(np.radians(30)))
 # How far from a face, relative to its size, the point may lie that is to pick it.
@@ -260,5 +260,5 @@ def _reject(where: str, expected: str, found: str, boundary: Boundary) -> NoRetu
 
 
 def _show(vector: Array) -> str:
-    # Below a micrometre, or in a unit vector, there is nothing to tell; adding zero turns −0 into 0.
+    # Below a micrometer, or in a unit vector, there is nothing to tell; adding zero turns −0 into 0.
     return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"

@@ -101,10 +101,10 @@ def _declared(file: Path) -> Unit | None:
     from .step import declared_unit
 
     found: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
-    millimetres = declared_unit(file.read_text(encoding="latin-1"))
-    if millimetres not in found:
-        raise InputError(f"{file}: expected a part drawn in m, mm or in, found a unit of {millimetres:g} mm")
-    return found[millimetres]
+    millimeters = declared_unit(file.read_text(encoding="latin-1"))
+    if millimeters not in found:
+        raise InputError(f"{file}: expected a part drawn in m, mm or in, found a unit of {millimeters:g} mm")
+    return found[millimeters]
 
 
 def _part_face(boundary: Boundary, face: SmoothFace) -> PartFace:

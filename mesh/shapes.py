@@ -1,6 +1,6 @@
 """Solid shapes drawn out along x, by gmsh's OpenCASCADE kernel: box, cylinder, tube, hollow rectangle, taper, holes.
 
-They are drawn about 1 long, in a power of ten of metres: gmsh and OpenCASCADE take points closer than 1e-7 for one.
+They are drawn about 1 long, in a power of ten of meters: gmsh and OpenCASCADE take points closer than 1e-7 for one.
 """
 
 from __future__ import annotations

@@ -192,7 +192,7 @@ def _with_mid_sides(cells: _Cells, triangles: _Triangles) -> Array:
     """(t, 6, 3): corners and mid-sides, in the order of basix's triangle of degree 2.
 
     The two corners of a side lie on two edges of one face of a tetrahedron (or on opposite edges): moving along the sum
-    of these edges stays in that face, so neighbours find the same point.
+    of these edges stays in that face, so neighbors find the same point.
     """
     directions = triangles.ends[:, :, 1] - triangles.ends[:, :, 0]
     pairs = np.array([[1, 2], [0, 2], [0, 1]])

@@ -18,7 +18,7 @@ from .part_reader import MESHING, MESHING_CELL, allow
 from .records import SolidMeshRecord, default_order, default_size
 from .source import Source, source_from
 
-# Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimetres.
+# Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimeters.
 _SI_PREFIXES = {"$": 1e3, ".MILLI.": 1.0, ".CENTI.": 10.0, ".DECI.": 100.0, ".MICRO.": 1e-3, ".KILO.": 1e6}
 _OTHER_UNITS = {"INCH": 25.4, "FOOT": 304.8, "MILE": 1609344.0}
 _SOLID = re.compile(r"=\s*(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
@@ -66,10 +66,10 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
 
 
 def declared_unit(content: str) -> float:
-    """The unit of length that the file declares, in mm; millimetres if none."""
+    """The unit of length that the file declares, in mm; millimeters if none."""
     text = re.sub(r"\s+", "", content).upper()
     units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]
-    # An inch is declared as so many millimetres: the conversion comes first.
+    # An inch is declared as so many millimeters: the conversion comes first.
     for entity in units:
         if (other := re.search(r"CONVERSION_BASED_UNIT\('(\w+)'", entity)) and other[1] in _OTHER_UNITS:
             return _OTHER_UNITS[other[1]]

@@ -16,7 +16,7 @@ Divisions = tuple[int, int, int]
 def structured_box(
     length: float, root: tuple[float, float], tip: tuple[float, float], divisions: Divisions, cell: CellName
 ) -> PartMesh:
-    """A box along x, 0 … `length` (m), centred on the axis, of hexahedra, or tetrahedra in their place.
+    """A box along x, 0 … `length` (m), centerd on the axis, of hexahedra, or tetrahedra in their place.
 
     `root` and `tip` are height (along y) and width (along z) at the ends, m, between which these change linearly;
     `divisions` the number of layers along x, y, z.

@@ -22,7 +22,7 @@ MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
 def gains(model: SampledModel, Q: Array, R: Array) -> Array:
     """K of u = −K x with least Σ xᵀQx + uᵀRu; Q of the states, commands on their way cost what they cost as inputs.
 
-    Raises `ValueError` where the Riccati equation has no stabilising solution.
+    Raises `ValueError` where the Riccati equation has no stabilizing solution.
     """
     from scipy.linalg import LinAlgError, solve_discrete_are
 
@@ -62,7 +62,7 @@ class LqrControl:
             self.K = gains(discrete, Q, R)
         except ValueError as error:
             raise InputError(
-                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilise,"
+                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilize,"
                 f" found none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}"
             ) from None
         self.bandwidth = _bandwidth(model.A, discrete.A - discrete.B @ self.K, setup.sample_time)

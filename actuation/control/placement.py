@@ -56,7 +56,7 @@ class PatchableLink:
 
 @struct
 class Candidates:
-    """Places (k,) m for the centre of one patch, `gap` of which two patches lie apart at least, and Φ_V there.
+    """Places (k,) m for the center of one patch, `gap` of which two patches lie apart at least, and Φ_V there.
 
     Phi_V (n, k) modal forces per volt, zero columns where the section has a step.
     """
@@ -68,7 +68,7 @@ class Candidates:
 
 @struct
 class Evaluation:
-    """A set of patches: centres (count,) m, reach (modes,) and the value of the criterion, to be as large as can be."""
+    """A set of patches: centers (count,) m, reach (modes,) and the value of the criterion, to be as large as can be."""
 
     centers: Array
     reach: Array
@@ -86,7 +86,7 @@ class Placed(Details):
     frequency: Array  # (modes,) Hz of the modes that count, and `share` (modes,) of their strain energy in the link
     share: Array
     largest_voltage: Array  # (2,) V of best and even over the path; nan without one
-    candidates: Array  # (k,) m centres that were allowed, and `candidate_reach` (modes, k) of a single patch there
+    candidates: Array  # (k,) m centers that were allowed, and `candidate_reach` (modes, k) of a single patch there
     candidate_reach: Array
     sets: int  # how many sets of patches were compared
     method: str  # "all sets" or "evolution"
@@ -129,7 +129,7 @@ def link_modes(link: PatchableLink, count: int) -> ModalReach:
 def place(
     scene_path: Path, wanted: Placement, link: PatchableLink, model: LinearModel | None, F_p: Array | None
 ) -> Placed:
-    """The best centres for the patches of a link; `model` for controllability, F_p (T, m) for voltages.
+    """The best centers for the patches of a link; `model` for controllability, F_p (T, m) for voltages.
 
     Controllability of a mode is what its gramian grows with under light damping, Σ (φᵀ b_k)² over the patches, b_k the
     modal forces of a patch per volt (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to what the

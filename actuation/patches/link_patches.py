@@ -1,7 +1,7 @@
 """Patches of a link: several layouts side by side, their reach, and voltages that they find together.
 
 The modes to be served are those of the link that moves in the families which some patch reaches, and in no other:
-in-plane bending by patches on ±y, out-of-plane bending by those on ±z, torsion by fibres at an angle, the axial family
+in-plane bending by patches on ±y, out-of-plane bending by those on ±z, torsion by fibers at an angle, the axial family
 by one named face. Modal forces on the other families are left as they are: voltages leave them unmet.
 """
 

@@ -50,7 +50,7 @@ def plain_lamina(modulus: float, d31: float, thickness: float) -> Lamina:
 
 @lru_cache
 def fibre_lamina(of: Fibres) -> Lamina:
-    """Of fibres at an angle: transformed compliances with σ_s = 0 (Jones, Mechanics of Composite Materials, 1999, 2.6).
+    """Of fibers at an angle: transformed compliances with σ_s = 0 (Jones, Mechanics of Composite Materials, 1999, 2.6).
 
         S̄_11 = S_11 c⁴ + (2 S_12 + S_66) s²c² + S_22 s⁴
         S̄_16 = (2 S_11 − 2 S_12 − S_66) s c³ − (2 S_22 − 2 S_12 − S_66) s³c
@@ -98,9 +98,9 @@ class PztLayout(Record):
     resulting deflections at points of the link. `structural` lists what the patches add to their link: by default
     stiffness, so that they bend it like a composite section; true adds mass, too; false adds nothing, as in the paper.
 
-    Plain ceramic has one modulus and d31. Macro fibre composites have `fibre_angle`, d33 and `modulus` along the
+    Plain ceramic has one modulus and d31. Macro fiber composites have `fibre_angle`, d33 and `modulus` along the
     fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`; a volt is a field of
-    1/`electrode_spacing`. Fibres at an angle wind around the link, that is, lie at the same angle on both faces seen
+    1/`electrode_spacing`. Fibers at an angle wind around the link, that is, lie at the same angle on both faces seen
     from outside.
     """
 

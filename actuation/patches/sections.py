@@ -168,7 +168,7 @@ def layer_section(layout: PztLayout, extent: float) -> LayerSection:
 
 
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
-    """Of all layers at a place of that extent (m) along their normal, on its strains; `lever`: β, 0 without fibres."""
+    """Of all layers at a place of that extent (m) along their normal, on its strains; `lever`: β, 0 without fibers."""
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign = np.sign(S)
     arm = A * (extent + layout.layers * layout.thickness) / 2  # ∫ |η| dA

@@ -11,7 +11,7 @@ By virtual work a unit load with the section forces n, m in the straight link mo
     pᵀK p = −∫ n·(Th × (Th × e1) + 2 Th × Γ) + m·(Th × Th') dx
 
 K of a moment belongs to the rotation vector. Sections are rigid and the axis keeps its length under twist: what solids
-have besides, N (I_p/A) φ'² of fibres that twist shortens, is left out, as in the rods of Kirchhoff and Reissner.
+have besides, N (I_p/A) φ'² of fibers that twist shortens, is left out, as in the rods of Kirchhoff and Reissner.
 """
 
 from __future__ import annotations

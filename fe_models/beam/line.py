@@ -17,7 +17,7 @@ GAUSS = 4
 
 @struct
 class Functions:
-    """Continuous functions on the elements between neighbouring nodes, from their degrees of freedom."""
+    """Continuous functions on the elements between neighboring nodes, from their degrees of freedom."""
 
     nodes: Array  # (e + 1,) ascending, in m
     x: Array  # (size,) where the degrees of freedom are, ascending, in m
@@ -56,7 +56,7 @@ class Functions:
 def gram(B: sp.csr_matrix) -> sp.csr_matrix:
     """BᵀB of a `root`, or of several one upon the other.
 
-    Gauss point after Gauss point: what neighbouring elements add to an entry is then rounded alike and cancels in rigid
+    Gauss point after Gauss point: what neighboring elements add to an entry is then rounded alike and cancels in rigid
     motions, where one sum over all leaves a soft elastic foundation.
     """
     return sum(B[g::GAUSS].T @ B[g::GAUSS] for g in range(GAUSS)).tocsr()

@@ -61,6 +61,6 @@ def _outline(section: SectionRecord, q: int) -> Array:
         sides = [a + s * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
         return np.asarray(np.concatenate(sides) * half)
     diameter = section.diameter if section.shape == "circle" else section.outer
-    # Corner k at the angle of the rectangle's corner k, so that neighbours of other shape join without a twist.
+    # Corner k at the angle of the rectangle's corner k, so that neighbors of other shape join without a twist.
     angle = 2 * np.pi * np.arange(q) / q - np.pi / 4
     return np.asarray(0.5 * diameter * np.stack([np.cos(angle), np.sin(angle)], axis=1))

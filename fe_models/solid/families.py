@@ -18,7 +18,7 @@ from ...common.structs import struct
 from ..link_records.families import FAMILIES, LOCAL
 from .functionals import Averages
 
-# Relative distance up to which neighbouring ω² are one repeated value.
+# Relative distance up to which neighboring ω² are one repeated value.
 REPEATED = 1e-9
 # Where one family is wanted, modes this near are taken apart into it and the others.
 NEARLY = 1e-3

@@ -70,7 +70,7 @@ def solid_modal_body(
 
     A mesh kept from an earlier run is used unless `remesh`. The hashes are left empty. Raises `InputError` where the
     part cannot be meshed, a face is missing, or more modes are asked for than the mesh has; `SolveError` where the
-    stiffness cannot be factorised, or the eigensolver did not converge.
+    stiffness cannot be factorized, or the eigensolver did not converge.
     """
     solid = solid_mesh(link.part(path), comm, progress, remesh=remesh)
     progress(f"{link.name}: assembling")
@@ -78,7 +78,7 @@ def solid_modal_body(
     places = _places(link, model, solid)
     x, element = _station_grid(link, solid)
     sections = section_averages(model, x)
-    progress(f"{link.name}: factorising {3 * model.V.dofmap.index_map.size_global} unknowns")
+    progress(f"{link.name}: factorizing {3 * model.V.dofmap.index_map.size_global} unknowns")
     flexibility = _supported(link, model, solid, places, path)
     weights = {record.name: lump_weights(record.mass, record.inertia) for record in link.interface}
     mass = Mass(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])

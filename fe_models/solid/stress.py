@@ -1,7 +1,7 @@
 """Strains and stresses of a solid at points and on its surface: of modes, and static ones of unit loads. Loads dolfinx.
 
 All functions are collective over the mesh's communicator and return the same on every process. At a point that several
-cells share, their strains and stresses are averaged: across elements they jump by the discretisation error, and a
+cells share, their strains and stresses are averaged: across elements they jump by the discretization error, and a
 point on the border of two materials takes the mean of both.
 """
 

@@ -1,6 +1,6 @@
 """How a solid is held, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
 
-Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorised matrix K_0
+Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorized matrix K_0
 and q comes back by static condensation (Craig and Bampton, 1968): with W the displacements under unit q and S = WᵀKW,
 
     G = K_0⁻¹ + W S⁻¹ Wᵀ
@@ -10,7 +10,7 @@ positive definite, and loads in equilibrium leave them unloaded. With R the rigi
 
     F = P G Pᵀ
 
-so that only sparse symmetric positive definite matrices are factorised and B never fills one.
+so that only sparse symmetric positive definite matrices are factorized and B never fills one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class RigidFace:
 
 
 class Flexibility:
-    """Factorised once, applied often; see the module. Vectors hold this rank's own degrees of freedom.
+    """Factorized once, applied often; see the module. Vectors hold this rank's own degrees of freedom.
 
     `faces` are rigid ones; B (6, 3 owned) rows of the mean supports, None where the rigid faces hold the body. Raises
     `SolveError` where the supported stiffness is not positive definite.

@@ -83,7 +83,7 @@ def sensitivity(scene_file: Path, of: tuple[str, ...], to: tuple[str, ...], outp
 @options_of(studies.optimise, "subject_to", "vary", "method", "starts", "seed", "runs", "tolerance")
 @study_options("SCENE.optimum", "Diagrams of the designs.")
 def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how: Any) -> None:
-    """Optimisation: parameters and discrete choices that minimize an objective within limits.
+    """Optimization: parameters and discrete choices that minimize an objective within limits.
 
     \b
     --minimise mass                                 responses as in "ffrobot sensitivity"
@@ -111,7 +111,7 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
         raise InputError("--against: expected --minimise RESPONSE with it: both responses are minimized")
     if method not in ("auto", "slsqp") or starts != 1:
         raise InputError(
-            "--against: expected --method slsqp and one start: each search begins at its neighbour's design"
+            "--against: expected --method slsqp and one start: each search begins at its neighbor's design"
         )
     _study(studies.trade_off, scene_file, vary, folder=folder, points=points, **how)
 

@@ -113,7 +113,7 @@ def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
 def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     """Write one self-contained HTML page: motion, histories, modes, tables.
 
-    Several results files are compared side by side. Folders of sensitivity, optimise and uncertainty add their
+    Several results files are compared side by side. Folders of sensitivity, optimize and uncertainty add their
     diagrams: tornado diagrams, designs of a search, bands, rankings. The page needs no network and no other file.
     """
     from ..common.hdf5 import reading

@@ -1,7 +1,7 @@
 """Two goals against each other: the least of one for each value that the other may have (Pareto front).
 
 By the ε-constraint method (Haimes, Lasdon & Wismer 1971): the ends are the best designs for each goal alone; between
-them the second goal is limited, in equal ratios where both ends have one sign. Each search begins at its neighbour's
+them the second goal is limited, in equal ratios where both ends have one sign. Each search begins at its neighbor's
 design. All designs are runs of one folder, so that the same command takes up what was stopped.
 """
 

@@ -1,4 +1,4 @@
-"""Searches along gradients from one start; all rows of catalogues; differential evolution.
+"""Searches along gradients from one start; all rows of catalogs; differential evolution.
 
 What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of the goals.
 
@@ -26,7 +26,7 @@ AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range
 FAILED = 1e3  # how much worse a design that fails reads than the last good one, of the objective's size
 ENOUGH = 0.5  # times that: where a search ends, before more runs judge it
 DOWN = 0.05  # of the gradient since it was judged last: is judged again
-FAR = 1e-2  # violation up to which an optimiser is left to itself: limits that it follows are always exceeded a little
+FAR = 1e-2  # violation up to which an optimizer is left to itself: limits that it follows are always exceeded a little
 NEARER = 0.9  # of the violation: much less
 PATIENCE = 4  # gradients without that: the violation itself is made less
 SHORTEST = 1e-6  # step of SLSQP, of a number's range: its line search refuses steps where a limit trades for the goal
@@ -57,7 +57,7 @@ def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
 
 
 class Steps:
-    """The functions that optimisers call, of the coordinates x that are no catalogue's.
+    """The functions that optimizers call, of the coordinates x that are no catalog's.
 
     Rows whose largest is to be least are those of the objective, or with `excess` those of the limits. Where there are
     several, x has one coordinate more, s: to be least, with rows − s ≤ 0.
@@ -244,8 +244,8 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
         return Local(first, first, None, first.failure)
     best, found, message = first, None, ""
     try:
-        for optimiser, judged in ((method, False), (method, True), ("trust-constr", True)):
-            best, message = _pass(optimiser, differentiation, best, tell, judged=judged)
+        for optimizer, judged in ((method, False), (method, True), ("trust-constr", True)):
+            best, message = _pass(optimizer, differentiation, best, tell, judged=judged)
             found = _stands(differentiation, best)
             if found.reached(AIM):
                 return Local(first, best, found)
@@ -264,14 +264,14 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
 
 
 def _pass(
-    optimiser: str, differentiation: Differentiation, best: Evaluated, tell: Callable[[str], None], *,
+    optimizer: str, differentiation: Differentiation, best: Evaluated, tell: Callable[[str], None], *,
     judged: bool, excess: bool = False,
 ) -> tuple[Evaluated, str]:  # fmt: skip
-    """The best design that an optimiser comes to from `best`, and why it ended where that is not at an optimum."""
+    """The best design that an optimizer comes to from `best`, and why it ended where that is not at an optimum."""
     steps = Steps(differentiation, best, tell, judged=judged, excess=excess)
     message = ""
     with suppress(ReachedError, StalledError):
-        message = OPTIMISERS[optimiser](steps)
+        message = OPTIMISERS[optimizer](steps)
     return steps.best, message
 
 

@@ -46,7 +46,7 @@ DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 class Slopes:
     """At one design: `gradient` (r, n) of goals by coordinates of the unit cube; its `error`, estimated.
 
-    Coordinates of catalogues have NaN, and those without a design beside that completes. `kinks`: peaks that others
+    Coordinates of catalogs have NaN, and those without a design beside that completes. `kinks`: peaks that others
     overtake beside the design, in words.
     """
 

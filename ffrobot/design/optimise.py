@@ -1,7 +1,7 @@
 """The best design of a scene: `ffrobot optimise`. Every design is a run that is kept, as those of sensitivities are.
 
 Numbers are sought by SLSQP or trust-constr with gradients, from the scene's own values and further starts of a Latin
-hypercube; catalogues, and goals that are rough, by differential evolution or by trying every row. What is found last
+hypercube; catalogs, and goals that are rough, by differential evolution or by trying every row. What is found last
 is judged by central differences: multipliers of limits and bounds, and how far the gradient is from theirs.
 """
 
@@ -97,7 +97,7 @@ def check_bounds(designs: Designs, space: Space) -> None:
 
 
 def _starts(space: Space, count: int, seed: int) -> list[Place]:
-    """The scene itself, where it is in all bounds and catalogues, and places of a Latin hypercube."""
+    """The scene itself, where it is in all bounds and catalogs, and places of a Latin hypercube."""
     found = [] if space.start_place is None else [space.start_place]
     if count > 1:
         sample = LatinHypercube(len(space.variables), seed=seed).random(count - 1)
@@ -108,7 +108,7 @@ def _starts(space: Space, count: int, seed: int) -> list[Place]:
 def _search(
     method: str, differentiation: Differentiation, starts: Sequence[Place], seed: int, watcher: Watcher
 ) -> list[Local]:
-    """The searches that `method` means; of catalogues one, which goes on along gradients of numbers."""
+    """The searches that `method` means; of catalogs one, which goes on along gradients of numbers."""
     evaluations = differentiation.evaluations
     if method in ("slsqp", "trust-constr"):
         return _from_starts(method, differentiation, starts, watcher)

@@ -81,7 +81,7 @@ def _best_so_far(problem: Problem, designs: Sequence[Evaluated], values: Sequenc
 
 
 def _axis(variable: Variable, k: int, values: Sequence[object]) -> Axis:
-    """Of a number between its bounds, or of column k of a catalogue."""
+    """Of a number between its bounds, or of column k of a catalog."""
     if not variable.is_catalogue:
         low, high = variable.low, variable.high
         numbers_of = tuple(float(value) for value in values)  # type: ignore[arg-type]
@@ -105,7 +105,7 @@ class Optimum(Finding):
     Attributes:
         scene: its file.
         problem, space: the objective with its limits, and the parameters.
-        method, message: the optimiser; why it ended, if not at an optimum.
+        method, message: the optimizer; why it ended, if not at an optimum.
         start, best: designs of the best search; `searches` are all.
         optimality: conditions of optimality at `best`; None without gradients.
         runs: their number; `failures` has failed ones in words.

@@ -86,7 +86,7 @@ def statistics(values: Array) -> Statistics:
 
 
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
-    """Squared standardised regression coefficients (g, k) of outputs (n, g) by inputs (n, k), and R² (g,).
+    """Squared standardized regression coefficients (g, k) of outputs (n, g) by inputs (n, k), and R² (g,).
 
     Where R² is near one, coefficients are shares of the variance; where it is not, the goals are not linear.
     """

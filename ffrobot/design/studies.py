@@ -151,7 +151,7 @@ def optimise(
         minimise: response to minimize, as in sensitivity.
         maximise: response to maximize.
         subject_to: limit, or with ">=". A sequence, such as ["peak joints.elbow.moment <= 20"].
-        method: the optimiser. "auto" is "slsqp", and with discrete sets "all" of them or "differential-evolution".
+        method: the optimizer. "auto" is "slsqp", and with discrete sets "all" of them or "differential-evolution".
         starts: searches along gradients. They begin at the scene and at points of a Latin hypercube.
         seed: seed of random numbers.
         runs: largest number of runs.

@@ -1,7 +1,7 @@
-"""What a search may change: numbers within bounds and rows of catalogues, and the unit cube that optimisers see.
+"""What a search may change: numbers within bounds and rows of catalogs, and the unit cube that optimizers see.
 
 A place u has a coordinate for each variable: of a number its way from the lower bound (0) to the upper one (1), of a
-catalogue the number of the row, from 0.
+catalog the number of the row, from 0.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Variable:
         return (float(np.clip(value, a, b)),) * len(self.keys)  # rounding goes past no bound
 
     def coordinate(self, values: tuple[Any, ...]) -> float | None:
-        """Of the keys' values; None where they are out of bounds, not all the same, or no row of the catalogue."""
+        """Of the keys' values; None where they are out of bounds, not all the same, or no row of the catalog."""
         if self.rows:
             return float(self.rows.index(values)) if values in self.rows else None
         x, (a, b) = values[0], (self.low, self.high)
@@ -112,7 +112,7 @@ class Space:
         return tuple(value for v, u in zip(self.variables, place, strict=True) for value in v.values(u))
 
     def start(self) -> tuple[float | None, ...]:
-        """Coordinates of the scene itself; None where it is out of bounds or in no catalogue."""
+        """Coordinates of the scene itself; None where it is out of bounds or in no catalog."""
         first, found = 0, []
         for variable in self.variables:
             found.append(variable.coordinate(self.own[first : first + len(variable.keys)]))
@@ -121,7 +121,7 @@ class Space:
 
     @property
     def start_place(self) -> Place | None:
-        """Where the scene itself is; None where it is out of bounds or in no catalogue."""
+        """Where the scene itself is; None where it is out of bounds or in no catalog."""
         own = [u for u in self.start() if u is not None]
         return tuple(own) if len(own) == len(self.variables) else None
 
@@ -188,7 +188,7 @@ def _keys(text: str) -> tuple[Key, ...]:
 
 
 def _rows(text: str, columns: int, whole: str) -> tuple[tuple[Any, ...], ...]:
-    """The rows of a catalogue; columns are parted by colons."""
+    """The rows of a catalog; columns are parted by colons."""
     listed = text if columns == 1 else ", ".join(f"[{row.replace(':', ',')}]" for row in text.split(","))
     try:
         values = tomllib.loads(f"values = [{listed}]")["values"]

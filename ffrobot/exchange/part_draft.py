@@ -24,7 +24,7 @@ DIGITS = 9
 
 
 def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
-    """The text of a link file in `folder`, of aluminium: root and tip are the faces that joints most likely take.
+    """The text of a link file in `folder`, of aluminum: root and tip are the faces that joints most likely take.
 
     These are two bores across the part, else its plane ends. All other plane faces and bores are there as comments.
     Concentrated masses of a file in m are on the nearest of all these faces.

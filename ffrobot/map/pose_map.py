@@ -1,4 +1,4 @@
-"""A map from its plan to its file: postures first, then their judgement in parallel, part by part, resumable."""
+"""A map from its plan to its file: postures first, then their judgment in parallel, part by part, resumable."""
 
 from __future__ import annotations
 

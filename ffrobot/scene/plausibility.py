@@ -79,7 +79,7 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
     """Of a link, which `label` names: its length, its material, its damping."""
     yield from _long(link.geometry.length, label)
     if (ratio := float(np.max(link.damping.ratio or 0.0))) >= OVERDAMPED:
-        yield f"{label}: a damping ratio of {ratio:g} is above critical damping, 1: is it in per cent?"
+        yield f"{label}: a damping ratio of {ratio:g} is above critical damping, 1: is it in percent?"
     density, modulus = link.material.density, float(np.max(link.material.youngs_modulus))
     if not LIGHTEST <= density <= HEAVIEST:
         yield f"{label}: density {density:g} kg/m³: units are SI; is it in g/cm³ or t/mm³?"

@@ -8,7 +8,7 @@ With it, what is missing is of third order in the rotations θ of sections, θ²
 
 Loads couple modes, bending with twist most of all, so that the change of each mode alone says nothing of buckling. The
 eigenvalues μ of K_ff^-½ S K_ff^-½ are the extreme relative changes of the stiffness of any shape; at −1 a shape has
-none left (Bathe, Finite Element Procedures, §6.8.2, linearised buckling).
+none left (Bathe, Finite Element Procedures, §6.8.2, linearized buckling).
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Numerical work on a system: positions, statics, vibration, linearisation, integrators, stable inversion."""
+"""Numerical work on a system: positions, statics, vibration, linearization, integrators, stable inversion."""

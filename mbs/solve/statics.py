@@ -23,7 +23,7 @@ UNSTABLE = -1e-5  # of the stiffness of single coordinates: closer to none is ro
 
 
 def forces_at_rest(model: Model, q: Array, t: float = 0.0) -> Array:
-    """Generalised forces (T, n_v) at rest, of q (T, n_q): gravity, elasticity, given loads."""
+    """Generalized forces (T, n_v) at rest, of q (T, n_q): gravity, elasticity, given loads."""
     still = np.zeros((len(q), model.tree.n_v))
     return -required_forces(model, KnownStates(q, still, still), np.full(len(q), t))
 

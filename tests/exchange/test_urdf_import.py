@@ -209,7 +209,7 @@ def test_wrong_files(text, expected, tmp_path):
 def test_units_in_a_wrong_scale_are_told(imported):
     """Millimetres in place of metres, kg·mm² in place of kg·m²."""
     _, out = imported(robot(BASE, ARM, joint("j", "base", "arm", at="0 0 425")))
-    assert 'joint "j" is 425 m from that of its parent: URDF is in metres; is this file in millimetres?' in out
+    assert 'joint "j" is 425 m from that of its parent: URDF is in meters; is this file in millimeters?' in out
     heavy = INERTIAL.replace("0.02", "20000").replace("0.01", "10000")
     _, out = imported(robot(BASE, link("arm", heavy), joint("j", "base", "arm")), "--force")
     assert 'link "arm": radius of gyration 100 m, in a robot whose joints span 0.3 m' in out

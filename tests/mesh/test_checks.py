@@ -112,9 +112,9 @@ def test_elements_that_reach_over_others_are_told():
 @pytest.mark.parametrize(
     ("scale", "unit", "says"),
     [
-        (1000, "m", 'found 1000 m along x: looks like millimetres: geometry.unit = "mm"'),
+        (1000, "m", 'found 1000 m along x: looks like millimeters: geometry.unit = "mm"'),
         (39.37, "m", 'looks like inches: geometry.unit = "in"'),
-        (0.001, "mm", 'looks like metres: geometry.unit = "m"'),
+        (0.001, "mm", 'looks like meters: geometry.unit = "m"'),
         (7.0, "m", "found 7 m along x$"),
     ],
 )

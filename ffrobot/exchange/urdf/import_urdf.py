@@ -104,15 +104,15 @@ def remarks_on_scale(robot: Robot) -> Iterator[str]:
     if ways and max(ways.values()) > LONGEST:
         name = max(ways, key=lambda key: ways[key])
         yield (
-            f'joint "{shown(name)}" is {ways[name]:g} m from that of its parent: URDF is in metres; is this file in'
-            " millimetres?"
+            f'joint "{shown(name)}" is {ways[name]:g} m from that of its parent: URDF is in meters; is this file in'
+            " millimeters?"
         )
     for joint in robot.joints.values():
         label, limits = f'joint "{shown(joint.name)}"', [joint.limits.get(key, 0.0) for key in ("lower", "upper")]
         if joint.type == "revolute" and max(map(abs, limits)) > TURNS:
             yield f"{label}: limits {limits[0]:g} … {limits[1]:g} rad are many turns: are they in degrees?"
     if 0 < reach < SHORTEST:
-        yield f"all joints are within {reach:g} m: URDF is in metres; is this file in kilometres?"
+        yield f"all joints are within {reach:g} m: URDF is in meters; is this file in kilometers?"
     for link in robot.links.values():
         if (part := link.inertial) is None or part.mass == 0 or reach == 0:
             continue

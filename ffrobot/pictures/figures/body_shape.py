@@ -69,7 +69,7 @@ def draw_part(part: Inspection, listed: int) -> Figure:
 
 
 def draw_modes(body: ModalBody) -> Figure:
-    """The lowest modes, each scaled to the same largest displacement, whose size is the colour."""
+    """The lowest modes, each scaled to the same largest displacement, whose size is the color."""
     mesh = body_surface(body)
     points, cells = mesh.points, mesh.cells
     count = min(body.mode_count, MODES)
@@ -104,7 +104,7 @@ def _view(figure: Figure, place: tuple[int, int, int], title: str) -> Axes:
 def _draw_cells(
     axes: Axes, points: Array, cells: Integers, colors: Array, edges: Integers | None = None, view: View = LINK
 ) -> None:
-    """Cells of two points as lines, larger ones as polygons; colours (c, 3). Far ones first: near ones hide them."""
+    """Cells of two points as lines, larger ones as polygons; colors (c, 3). Far ones first: near ones hide them."""
     if cells.shape[1] == 2:
         lines = list(projected(points[cells], view))
         axes.add_collection(LineCollection(lines, colors=colors if edges is None else COLORS[0], linewidths=2.0))

@@ -158,7 +158,7 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
 
 
 def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
-    """The lowest modes of the robot that vibrate, over its configuration (grey), in both directions."""
+    """The lowest modes of the robot that vibrate, over its configuration (gray), in both directions."""
     assert figure.analysis is not None
     k = _nearest(results, figure)
     frequency = results[f"{figure.analysis}/linear/frequency"][k]

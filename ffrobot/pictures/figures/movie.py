@@ -38,7 +38,7 @@ BAR = 0.008  # of the robot's size: radius of bars that stand for rigid bodies
 MARGIN = 0.06  # of the size of what is seen
 DIRECTIONS = 0.07  # of the robot's size: length of the arrows along x, y, z
 FACE, AXIS, GROUND, WANTED = "#8fb8d4", "#30465c", "#8b95a3", "black"
-TAKEN = COLORS[3]  # no colour of a tool
+TAKEN = COLORS[3]  # no color of a tool
 
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:

@@ -1,4 +1,4 @@
-"""How figures look: the width of a printed column, colours that everyone can tell apart.
+"""How figures look: the width of a printed column, colors that everyone can tell apart.
 
 Parallel projection on plain axes: where points are on the page, how bright surfaces are, which way the axes go.
 
@@ -98,7 +98,7 @@ def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
 
 
 def shades(count: int) -> list[Any]:
-    """Colours of `count` ordered series, dark to light."""
+    """Colors of `count` ordered series, dark to light."""
     colormap = matplotlib.colormaps[ORDERED]
     return [colormap(0.9 * k / max(1, count - 1)) for k in range(count)]
 
@@ -148,7 +148,7 @@ def normals(points: Array, cells: Integers) -> Array:
 
 
 def lit(points: Array, cells: Integers, colors: Array, view: View) -> Array:
-    """(c, 3) colours (c, 3) of cells in a light that comes from above the viewer.
+    """(c, 3) colors (c, 3) of cells in a light that comes from above the viewer.
 
     Which way the normals of the cells point is unknown, and hidden cells are painted over.
     """

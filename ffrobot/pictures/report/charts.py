@@ -40,7 +40,7 @@ class Chart:
         traces: in Plotly's terms.
         limits: horizontal lines; where curves would be flat beside them, they wait for a click on their name.
         includes: values that the range of y has at least.
-        equal_axes: one metre is as long on both.
+        equal_axes: one meter is as long on both.
     """
 
     name: str
@@ -114,9 +114,9 @@ def limit_style() -> dict[str, Any]:
 
 
 def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
-    """Of the k-th curve of a chart: its width, so that none hides another, its colour and its dashes.
+    """Of the k-th curve of a chart: its width, so that none hides another, its color and its dashes.
 
-    The k-th colour unless `color` is that of a run, which then has `part` curves before this one.
+    The k-th color unless `color` is that of a run, which then has `part` curves before this one.
     """
     color = k if color is None else color
     line = {"color": COLORS[color % len(COLORS)], "dash": DASHES[(color // len(COLORS) + part) % len(DASHES)]}
@@ -124,7 +124,7 @@ def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
 
 
 def shades(count: int) -> list[str]:
-    """Colours of `count` ordered series, dark to light."""
+    """Colors of `count` ordered series, dark to light."""
     where = np.linspace(0.0, len(SHADES) - 1.0, count)
     channels = [np.interp(where, np.arange(len(SHADES)), SHADES[:, k]) for k in range(3)]
     return [f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in zip(*channels, strict=True)]
@@ -200,7 +200,7 @@ PRESCRIBED = {"color": "#8b95a3", "width": 4}
 def _looks(
     record: FigureRecord, source: str, looks: dict[tuple[str, str], tuple[int, dict[str, str]]], before: int
 ) -> Iterator[tuple[Curve, dict[str, Any]]]:
-    """Every curve with its style: a run has the same colour in all charts that compare runs, as in the mechanism.
+    """Every curve with its style: a run has the same color in all charts that compare runs, as in the mechanism.
 
     `looks` are colors and visibility by (source, analysis); `before`: curves that the chart has already.
     """

@@ -55,7 +55,7 @@ def drawn(diagram: Diagram, name: str) -> DrawnDiagram:
 
 
 def _bars(diagram: Bars, name: str) -> DrawnDiagram:
-    """The first label on top, a colour for each series, of a signed one for each sign."""
+    """The first label on top, a color for each series, of a signed one for each sign."""
     traces, names = [], [_broken(label, NAME) for label in diagram.labels]
     form = "+.3g" if diagram.signed else ".3g"
     for k, series in enumerate(diagram.series):
@@ -228,7 +228,7 @@ class StudyPart:
 
     @property
     def mood(self) -> str:
-        """For the colour of its headline."""
+        """For the color of its headline."""
         return {True: "good", False: "bad", None: ""}[self.study.good]
 
     @property

@@ -39,7 +39,7 @@ SLOWEST = 1e-3  # the slider's end
 def mechanism(runs: Sequence[Run]) -> tuple[dict[str, Any], list[str]]:
     """What the script of the page draws of several runs, and notes on what could not be drawn as it is.
 
-    Each run has a colour of its own; planar scenes are seen along z.
+    Each run has a color of its own; planar scenes are seen along z.
     """
     notes: list[str] = []
     moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]

@@ -128,7 +128,7 @@ class RunVerdict:
 
     @property
     def mood(self) -> str:
-        """For its colour."""
+        """For its color."""
         failed = self.verdict.status != "completed"
         return "bad" if failed or self.verdict.feasible is False else "good" if self.verdict.feasible else ""
 

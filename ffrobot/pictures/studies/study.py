@@ -65,7 +65,7 @@ class Drawing(Record):
 
 
 class Series(Record):
-    """Bars of one colour: a value for each label and its error, 0 where it is not known."""
+    """Bars of one color: a value for each label and its error, 0 where it is not known."""
 
     label: str = ""
     values: Numbers
@@ -73,7 +73,7 @@ class Series(Record):
 
 
 class Bars(Drawing):
-    """Horizontal bars, the first label on top; a single series has one colour for each sign where `signed`."""
+    """Horizontal bars, the first label on top; a single series has one color for each sign where `signed`."""
 
     kind: Literal["bars"] = "bars"
     x_label: str
@@ -85,7 +85,7 @@ class Bars(Drawing):
 class Axis(Record):
     """One axis of parallel coordinates from `low` to `high`, with the value of every design.
 
-    `limit` is what a goal may not exceed (`sense` 1) or fall below (−1); `names` of a catalogue's rows, whose values
+    `limit` is what a goal may not exceed (`sense` 1) or fall below (−1); `names` of a catalog's rows, whose values
     are then their numbers.
     """
 
@@ -111,7 +111,7 @@ class Axis(Record):
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Places of round numbers within the axis, or of the rows of a catalogue, and their texts."""
+        """Places of round numbers within the axis, or of the rows of a catalog, and their texts."""
         if self.names:
             return [(float(self.place(np.array(float(k)))), name) for k, name in enumerate(self.names)]
         values = _round_logarithms(self.low, self.high) if self.logarithmic else np.array([])
@@ -263,7 +263,7 @@ def study_files(path: Path) -> list[Path]:
     found = [file for name in NAMES if (file := path / f"{name}.json").is_file()]
     if not found:
         raise InputError(
-            f"{path}: expected a folder of ffrobot sensitivity, optimise or uncertainty, with one of"
+            f"{path}: expected a folder of ffrobot sensitivity, optimize or uncertainty, with one of"
             f" {quoted(f'{name}.json' for name in NAMES)}, found none: has the command come to its end?"
         )
     return found

@@ -25,7 +25,7 @@ GHOST, METAL, BARE = "#9a9a9a", "#4a5563", "#c9ced6"
 FOLD = 30.0  # degrees: an edge at which a surface bends by more is shown
 ROD, PIN, STAND = 0.006, 0.009, 0.06  # of the size of the robot: radius of lines and of pins, height of the ground
 AXIS = 0.003  # of the size of the robot: radius of axes
-ROUND = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # ends of colour bars, times a power of ten
+ROUND = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # ends of color bars, times a power of ten
 SHOWN = {"deflection": ("deflection (mm)", 1e3), "von_mises": ("von Mises stress (MPa)", 1e-6)}
 BAR = {
     "vertical": False, "height": 0.05, "width": 0.4, "position_x": 0.3, "position_y": 0.02, "fmt": "%.4g",
@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def _draw_motion(job: dict[str, Any]) -> None:
-    """Bodies where they were, pale, and as exaggerated, coloured; the same view and colours in all frames."""
+    """Bodies where they were, pale, and as exaggerated, colored; the same view and colors in all frames."""
     import pyvista
 
     grids = [_exaggerated(job, step) for step in job["steps"]]
@@ -72,7 +72,7 @@ def _draw_motion(job: dict[str, Any]) -> None:
 
 
 def _exaggerated(job: dict[str, Any], step: int) -> tuple[Any, Any]:
-    """The grid at a time step as it was, and exaggerated with what it is coloured by."""
+    """The grid at a time step as it was, and exaggerated with what it is colored by."""
     grid = _read(job["grid"], step)
     shown = grid.copy()
     shown.points = grid.points + (job["scale"] - 1.0) * grid["exaggeration"]
@@ -207,7 +207,7 @@ def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) 
 def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:  # noqa: ANN401
     """Title, directions, and the view of the other pictures.
 
-    `room` is the part of the height at the bottom that is for a colour bar.
+    `room` is the part of the height at the bottom that is for a color bar.
     """
     plotter.set_background("white")
     plotter.add_text(title, font_size=9, color="black", position="upper_left")

@@ -121,7 +121,7 @@ def _frames(results: Results, analysis: str, count: int) -> Indices:
 
 
 def _snapshot(results: Results, analysis: str, frames: Indices, grid: Grid, options: Options, color: str) -> Picture:
-    """At the step nearest to the time asked for, or where what it is coloured by is largest."""
+    """At the step nearest to the time asked for, or where what it is colored by is largest."""
     assert grid.time is not None
     values = grid.point_data[color]
     largest = np.nanmax(np.linalg.norm(values, axis=2) if values.ndim == 3 else values, axis=1)
