@@ -66,6 +66,8 @@ def commands_page() -> str:
     """The help of every command."""
     parts = [COMMANDS]
     for name, command in cli.commands.items():
+        if command.hidden:
+            continue
         settings = {**cli.context_settings, "terminal_width": 100, "max_content_width": 100}
         context = click.Context(command, info_name=f"ffrobot {name}", **settings)
         lines = [line.rstrip() for line in command.get_help(context).splitlines()]

@@ -6,6 +6,7 @@ They are kept in the repository, so that they can be read there: `python docs/ke
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,7 @@ UNSUPPORTED = (
 """What keys of scenes can say and ffrobot does not support, what to write instead, and the module that rejects it."""
 
 
+HEADER = "| key | description | value | default |"
 LINK_TABLES = tuple(schema("link")["$defs"])
 Schema = dict[str, Any]
 
@@ -70,10 +72,30 @@ def key_pages() -> dict[str, str]:
     pages = {}
     for kind, introduction in INTRODUCTION.items():
         lines = [f"# Keys of a {kind} file", "", introduction, ""]
-        lines += [line for section in _sections(kind) for line in section]
+        lines += _with_common_keys([list(section) for section in _sections(kind)])
         lines += _lacks() if kind == "scene" else ()
         pages[f"{kind}_keys.md"] = "\n".join(lines).rstrip("\n") + "\n"
     return pages
+
+
+COMMON = 3  # tables that have a key with the same description, values and default
+
+
+def _with_common_keys(sections: list[list[str]]) -> Iterator[str]:
+    """Lines of the sections, with the keys of several tables in one table at the end."""
+    rows = Counter(line for lines in sections for line in lines if line.startswith("| `"))
+    common = {line for line, count in rows.items() if count >= COMMON}
+    for lines in sections:
+        own = [line for line in lines if line not in common]
+        if len(own) == len(lines):
+            yield from lines
+            continue
+        shared = ", ".join(line.split("|")[1].strip() for line in lines if line in common)
+        own.insert(own.index(HEADER), f"[Common keys](#common-keys): {shared}.\n")
+        yield from own if own[-2] != "|---|---|---|---|" else own[:-3]
+    if common:
+        yield from ("## Common keys", "", "Several tables have these keys.", "", HEADER, "|---|---|---|---|")
+        yield from (*sorted(common), "")
 
 
 def _lacks() -> Iterator[str]:
@@ -106,7 +128,7 @@ def _section(name: str, record: Schema, parts: dict[str, Schema]) -> Iterator[st
     yield from (f"## {name}", "", *(line.replace("*", "\\*") for line in about), "")
     if len(parts) < 2 and "" not in parts:
         yield from (f"In {next(iter(parts))} scenes only.", "")
-    yield from ("| key | description | value | default |", "|---|---|---|---|")
+    yield from (HEADER, "|---|---|---|---|")
     for key, entry in record["properties"].items():
         having = {space: part for space, part in parts.items() if key in part["properties"]}
         only = f" ({next(iter(having))} only)" if len(having) < len(parts) else ""
