@@ -81,7 +81,7 @@ def read_foreign(path: Path, where: str) -> RawMesh:
         reason = " ".join(reason.replace(str(path), path.name).split())
         if isinstance(error, meshio.ReadError) and path.suffix.lower() not in meshio.extension_to_filetypes:
             reason = f"its ending is not one of {', '.join(_ENDINGS)}: another program has to convert it"
-        raise InputError(f"{where}: expected a mesh that meshio can read, found one that it cannot: {reason}") from None
+        raise InputError(f"{where}: expected a mesh that meshio can read; meshio reports: {reason}") from None
     words = " ".join(said.getvalue().replace(str(path), path.name).split())
     return replace(raw, remarks=(f"meshio on {path.name}: {words}",)) if words else raw
 

@@ -57,9 +57,9 @@ def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: ob
         )
     if done.returncode < 0:
         name = signal.Signals(-done.returncode).name
-        raise InputError(f"{where}: expected a sound file, found one at which the library that reads it ends by {name}")
+        raise InputError(f"{where}: expected an undamaged file; the reader crashed with {name}")
     reason = [*done.stderr.decode(errors="replace").splitlines(), "no reason"][-2 if done.stderr else -1].strip()
-    raise InputError(f"{where}: expected a sound file, found one that cannot be read: {reason}")
+    raise InputError(f"{where}: expected an undamaged file; the reader reports: {reason}")
 
 
 def allow(seconds: float) -> None:

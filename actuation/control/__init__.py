@@ -1,1 +1,1 @@
-"""What acts on a robot by what it does: linear models, and what is made with them."""
+"""Linear models, controllers and placement."""

@@ -121,7 +121,7 @@ class Front(Finding):
             yield [one.goal, one.against, price, *one.point, *states, one.message]
 
     def diagrams(self) -> list[Diagram]:
-        """The curve, and all designs."""
+        """The front and all tried designs."""
         states = states_of(self.problem, self.tried, [one.design for one in self.points])
         limits = [(limit.goal.text, limit) for limit in self.problem.limits]
         goals = [(self.goals[0], None), *limits, (self.goals[1], None)]

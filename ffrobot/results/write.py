@@ -34,7 +34,7 @@ DETAILS: dict[str, Callable[[h5py.Group, RobotMotion, Any], None]] = {
     "Placed": write_placement,
     "TrackedPath": write_tracking,
 }
-"""What writes to the group of an analysis that which only its kind finds, by the name of the class of that."""
+"""Writers of the datasets of each kind of analysis, by class name."""
 
 
 def write_results(solution: Solution, path: Path) -> None:

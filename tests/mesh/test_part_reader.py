@@ -18,8 +18,8 @@ def test_what_is_read_comes_back():
 @pytest.mark.parametrize(
     ("read", "says"),
     [
-        (libraries.crash, "expected a sound file, found one at which the library that reads it ends by SIGABRT"),
-        (libraries.failing, "expected a sound file, found one that cannot be read: KeyError: 'part.step'"),
+        (libraries.crash, "expected an undamaged file; the reader crashed with SIGABRT"),
+        (libraries.failing, "expected an undamaged file; the reader reports: KeyError: 'part.step'"),
     ],
 )
 def test_crashes_are_errors_of_the_input(read, says):

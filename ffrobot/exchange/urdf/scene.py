@@ -206,7 +206,7 @@ class SceneOfRobot:
             value = joint.dynamics.get(key, 0.0)
             label = f'joint "{shown(joint.name)}": {key} {value:g} left out'
             if value < 0:
-                self.remarks.append(f"{label}: expected it not below 0")
+                self.remarks.append(f"{label}: expected a value ≥ 0")
             elif value and joint.type not in SINGLE:
                 self.remarks.append(f"{label}, of a {joint.type} joint")
             elif value:
