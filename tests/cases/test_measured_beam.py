@@ -1,0 +1,71 @@
+"""The measured piezo cantilever: predictions against the records, and its static gain in closed form."""
+
+import importlib.util
+import re
+
+import pytest
+from checkpoints import CASES
+
+CASE = CASES / "piezo_beam_measured"
+
+
+@pytest.fixture(scope="module")
+def printed():
+    """What the comparison prints: predicted and measured values by the name of the line, in order."""
+    specification = importlib.util.spec_from_file_location("compare_measured_beam", CASE / "compare.py")
+    compare = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(compare)
+    lines = []
+    compare.print = lambda text: lines.append(text)
+    compare.draw = lambda *_: None
+    compare.main()
+    return numbers(lines)
+
+
+def numbers(lines):
+    """(name, predicted, measured) of each line of the table."""
+    found = (re.fullmatch(r"(.*?)\s{2,}(-?[\d.e-]+)\s+(-?[\d.e-]+)\s+[+-][\d.]+ %.*", line) for line in lines)
+    return [(match[1].strip(), float(match[2]), float(match[3])) for match in found if match]
+
+
+def test_predictions_are_near_the_records(printed):
+    """Frequency within 2 %, static gain 6 %, settling under control 10 %, oscillations until then one."""
+    bounds = {"lowest frequency": 0.02, "static gain of P1 and P2": 0.06, "settled within 0.5 mm": 0.1}
+    for name, predicted, measured in printed:
+        if name in bounds:
+            assert predicted == pytest.approx(measured, rel=bounds[name]), name
+        if name.startswith("oscillations"):
+            assert abs(predicted - measured) <= 1
+    assert sum(name in bounds for name, *_ in printed) == 4
+
+
+def test_the_readme_has_these_numbers(printed):
+    """One sample of the record, 10 ms, is 0.8 % of a settling time."""
+    written = numbers((CASE / "README.md").read_text(encoding="utf-8").splitlines())
+    assert [name for name, *_ in written] == [name for name, *_ in printed]
+    for (name, *values), (_, *found) in zip(written, printed, strict=True):
+        assert found == pytest.approx(values, rel=0.01), name
+
+
+def test_static_gain_in_closed_form(printed):
+    """Tip over volt of layers on one face, P4 on the other face beneath P1: κ L_p (L − x_c), summed over P1 and P2.
+
+    A volt strains a layer by d31/t_p. With the sums of E A, E A y and E A y² over the section, κ is the curvature at
+    which axial force and moment of that strain vanish.
+    """
+    E, b, h, L = 68e9, 0.04, 0.003, 0.55
+    E_p, w, t, d31, length = 60.97561e9, 0.020, 0.25e-3, -179e-12, 0.044
+    layer = (
+        E_p * w * t,
+        E_p * w * ((h / 2 + t) ** 2 - (h / 2) ** 2) / 2,
+        E_p * w * ((h / 2 + t) ** 3 - (h / 2) ** 3) / 3,
+    )
+
+    def curvature(both):
+        EA, ES, EI = E * b * h + layer[0] * (1 + both), layer[1] * (1 - both), E * b * h**3 / 12 + layer[2] * (1 + both)
+        force, moment = d31 / t * layer[0], d31 / t * layer[1]
+        return (EA * moment - ES * force) / (EA * EI - ES**2)
+
+    gain = length * (curvature(True) * (L - 0.036) + curvature(False) * (L - 0.112))
+    (predicted,) = [predicted for name, predicted, _ in printed if name.startswith("static gain")]
+    assert abs(predicted) == pytest.approx(1e3 * abs(gain), rel=1e-3)  # four digits are printed
