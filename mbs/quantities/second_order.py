@@ -14,6 +14,7 @@ none left (Bathe, Finite Element Procedures, §6.8.2, linearized buckling).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -68,6 +69,23 @@ class ModalLoads:
         """(T,) squares of the Frobenius norms of K_ff^-½ S K_ff^-½."""
         flat = self.relative.reshape(len(self.K), -1)
         return as_floats(np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0))
+
+
+def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
+    """Means of the loads at `time` (T,) over the link's lowest period: it cannot follow loads that last shorter.
+
+    The loads themselves if they stay below those that buckle the link.
+    """
+    if len(time) < 2 or not len(loads.stiffness) or stiffness_change(loads).largest < 1.0:
+        return loads
+    half = min(np.pi / float(np.sqrt(loads.stiffness.min())), 0.5 * float(time[-1] - time[0]))
+    impulse = np.vstack(
+        [np.zeros(loads.f.shape[1]), np.cumsum(0.5 * np.diff(time)[:, None] * (loads.f[1:] + loads.f[:-1]), axis=0)]
+    )
+    middle = np.clip(time, time[0] + half, time[-1] - half)
+    ends = (np.array([np.interp(middle + side, time, of) for of in impulse.T]).T for side in (-half, half))
+    first, last = ends
+    return replace(loads, f=(last - first) / (2 * half))
 
 
 def stiffness_change(loads: ModalLoads) -> StiffnessChange:

@@ -31,6 +31,7 @@ from .second_order import (
     StiffnessChange,
     largest_displacement,
     largest_rotations,
+    lasting,
     missing_to_first_order,
     missing_to_second_order,
     stiffness_change,
@@ -125,6 +126,7 @@ def link_bending(motion: RobotMotion, links: Mapping[str, ModalBody]) -> dict[st
         body, sizes = motion.node(name).body, loads[name].sizes if name in loads else {}
         p = motion.q[:, motion.node(name).p_q] @ body.modal_transform.T
         on_modes = _on_modes(link, motion, name, sizes) if body.n_modes else None
+        on_modes = None if on_modes is None else lasting(on_modes, motion.time)
         run = LinkInRun(p, body.modal_transform, on_modes, body.stiffening is not None, motion.is_at_rest)
         found[name] = bending_of_link(link, run, _largest_force(body, sizes, len(p)))
     return found
