@@ -69,6 +69,7 @@ def remarks(scene: Scene) -> Iterator[str]:
     yield from _voltages(scene)
     yield from _angles(scene)
     yield from _times(scene)
+    yield from _tracked(scene)
     for analysis in scene.analysis:
         if step := getattr(analysis, "output_step", None):
             outputs = round(analysis.last_time / step) + 1
@@ -289,6 +290,16 @@ def _angles(scene: Scene) -> Iterator[str]:
                     f'trajectory "{one.name}" reaches {value.max():.4g} rad, {value.max() / (2 * np.pi):.3g} turns:'
                     " angles are in rad; is it in degrees (45*deg)?"
                 )
+
+
+def _tracked(scene: Scene) -> Iterator[str]:
+    """Paths of tracking with rough ends: known before the search, which takes minutes."""
+    for analysis in scene.analysis:
+        if analysis.kind == "tracking":
+            from ..mbs.analysis.tracking_advice import rough_ends
+
+            functions = [function for one in scene.trajectory for _, function in one.targets]
+            yield from (f'analysis "{analysis.name}": {text}' for text in rough_ends(functions, analysis.last_time))
 
 
 def _times(scene: Scene) -> Iterator[str]:

@@ -263,7 +263,13 @@ def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
 def _causes(context: Context, posed: _Posed) -> str:
     """Why no motion is found."""
     zeros = posed.linear.zeros[[0, -1]]
-    return "; ".join([*singular_times(posed.linear), *rough_ends(posed.servo), *far_patches(context, zeros)])
+    return "; ".join(
+        [
+            *singular_times(posed.linear),
+            *rough_ends(posed.servo.functions, posed.servo.end),
+            *far_patches(context, zeros),
+        ]
+    )
 
 
 def _is_beyond(posed: _Posed, least: Tracked) -> bool:
@@ -310,7 +316,7 @@ def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracke
             else "the least voltage is that of the first intervals: finer ones had no solution. Fewer modes, or more"
             " intervals"
         )
-    yield from rough_ends(posed.servo)
+    yield from rough_ends(posed.servo.functions, posed.servo.end)
     yield from far_patches(context, posed.linear.zeros[[0, -1]])
 
 

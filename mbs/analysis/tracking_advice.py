@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
 from ...common.structs import struct
+from .._core import TimeFunction
 from ..solve.servo import Servo
 from ..solve.stable_inversion import invert
 from ..solve.tracking import Transition
@@ -97,7 +98,7 @@ def enough_path_time(
         breaks = start_breaks(-around[0], slower.end, end, intervals // 2)
         return _share(servo, replace(asked, driven=slower, rest=rest), breaks)
 
-    orders = [order for order in path_orders(servo) if order > 1]
+    orders = [order for order in path_orders(servo.functions, servo.end) if order > 1]
     return float(servo.end * np.exp(_enough(share_with, share, min(orders, default=4.0))))
 
 
@@ -122,20 +123,20 @@ def _enough(share_with: Callable[[float], float], share: float, rate: float) -> 
     return np.nan
 
 
-def path_orders(servo: Servo) -> tuple[float, float]:
-    """With which power of time the path leaves its start, and reaches its end: 2 where its acceleration jumps there."""
-    end, orders = servo.end, []
+def path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, float]:
+    """Power of time with which a path leaves its start and reaches its `end` (s): 2 where its acceleration jumps."""
+    orders = []
     for t, ahead in ((0.0, 1.0), (end, -1.0)):
         near = as_floats(t + ahead * NEAR_END * end * np.array([1.0, 2.0]))
-        size = np.sqrt(sum(target.function.sample(near)[2] ** 2 for target in servo.targets()))
+        size = np.sqrt(sum(target.sample(near)[2] ** 2 for target in targets))
         orders.append(2.0 + np.log2(size[1] / size[0]) if size[0] > 0 else np.inf)
     return float(orders[0]), float(orders[1])
 
 
-def rough_ends(servo: Servo) -> Iterator[str]:
+def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
     """A warning for a path whose acceleration or jerk jumps where it begins or ends."""
     names = {2: "acceleration", 3: "jerk"}
-    found = [(where, round(order)) for where, order in zip(("begins", "ends"), path_orders(servo), strict=True)
+    found = [(where, round(order)) for where, order in zip(("begins", "ends"), path_orders(targets, end), strict=True)
              if np.isfinite(order) and round(order) in names]  # fmt: skip
     for order in sorted({order for _, order in found}):
         where = " and ".join(f"where it {name}" for name, of in found if of == order)

@@ -92,6 +92,11 @@ class Servo:
             for component, function in path.targets:
                 yield Target(path.name, component, function)
 
+    @property
+    def functions(self) -> list[TimeFunction]:
+        """Functions of time that the path follows."""
+        return [target.function for target in self.targets()]
+
     def slowed(self, factor: float) -> Servo:
         """The same path in `factor` times the time, by quintic Hermite pieces of what it is."""
         from scipy.interpolate import BPoly, PPoly

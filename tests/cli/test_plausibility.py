@@ -1,5 +1,6 @@
 """Notes on what is allowed but looks like another unit or a slip; and none on what is right."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +71,20 @@ def test_scenes(path, expected):
     found = list(remarks(arm(**path)))
     assert len(found) == (expected is not None)
     assert expected is None or expected in found[0]
+
+
+@pytest.mark.parametrize(
+    ("law", "told"),
+    [("35*(2*t)**4 - 84*(2*t)**5 + 70*(2*t)**6 - 20*(2*t)**7", None),  # the remedy that the message names
+     ("10*(2*t)**3 - 15*(2*t)**4 + 6*(2*t)**5", "the path's jerk jumps where it ends"),
+     ("3*(2*t)**2 - 2*(2*t)**3", "the path's acceleration jumps where it ends")],
+)  # fmt: skip
+def test_rough_ends_of_a_tracked_path_are_told_before_the_search(law, told):
+    text = (CASES / "two_link_tracking" / "scene.toml").read_text(encoding="utf-8")
+    keys = tomllib.loads(text.replace("560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7", law))
+    found = list(remarks(program.make_scene(folder=CASES / "two_link_tracking", **keys)))
+    assert [one for one in found if "jumps" in one] == [one for one in found if told and told in one]
+    assert bool(told) == any("Smoother ends" in one for one in found)
 
 
 @pytest.mark.parametrize(("yaw", "turns"), [(3.2, True), (3.1, False), (-3.1, False)])
