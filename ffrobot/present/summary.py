@@ -18,7 +18,7 @@ TEXTS, MOST_TEXTS = 2, 5  # lines of warnings and advice for which analyses, and
 REST = "--verbose"
 LABEL = 11  # columns of "warning", "to try" and the like
 
-ANALYSES = ("analysis", "kind", "answer", "tip error, controlled", "tip error, open loop", "deflection", "remark")
+ANALYSES = ("analysis", "kind", "answer", "tip error, controlled", "tip error, open loop", "link deflection", "remark")
 MOTOR = ("motor", "peak", "RMS", "speed", "power", "of limits", "in")
 
 Row = tuple[str, ...]
@@ -54,7 +54,7 @@ def summary_lines(
 
 def _analysis(one: AnalysisVerdict) -> Row:
     error, deflection = one.tool_error, one.deflection
-    unstable = f", unstable {error.growth:.2g} 1/s" if error.growth else ""
+    unstable = f", grows {error.growth:.2g} 1/s" if error.growth else ""
     return (
         one.name,
         one.kind,

@@ -188,10 +188,9 @@ def _advice(
         if (motor.jump or motor.moment > motor.moment_limit) and (text := motor.spike_in_words(units[name])):
             yield f"motor of {name}: {text}"
     if beyond and asked:
-        yield (
-            "a slower path (fastest = true finds the smallest time-scaling factor), or another motor or gear for"
-            f" {', '.join(beyond)}"
-        )
+        slower = "a slower path (fastest = true finds the smallest time-scaling factor), or "
+        moves = len(group["time"]) > 1
+        yield f"{slower if moves else 'less load, or '}another motor or gear for {', '.join(beyond)}"
     at_rest = asked and _is_from_rest_to_rest(group)
     for body, need in patches.items() if asked else ():
         if 1.0 < need.factor <= FAR_BEYOND:

@@ -175,7 +175,7 @@ class AnalysisVerdict:
         factor = self.worst[1]
         if self.feasible:
             return "within limits" if factor else "no limits given"
-        return "limits exceeded" if factor > 1.0 else "cannot do it"
+        return "limits exceeded" if factor > 1.0 else f"not by motors {'and patches' if self.patches else 'alone'}"
 
     @property
     def reached_in_words(self) -> str:

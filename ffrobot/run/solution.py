@@ -71,6 +71,8 @@ class FinerCheck:
         ended = "" if self.status == "completed" else f", which ended early ({self.status})"
         modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
         least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
+        if self.least_voltage is not None and np.isnan(self.least_voltage):
+            least = "; no motion within the limits was found with these modes, so their least voltage is not known"
         return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm{least}"
 
 

@@ -162,3 +162,29 @@ def test_rows_are_left_out_and_counted(count, motors, tmp_path):
         assert float(peak) == pytest.approx(motor.moment, rel=1e-3)
         assert float(limit) == motor.moment_limit
         assert float(share) == pytest.approx({"%": 100, "×": 1}[sign] * motor.moment / 50.0, rel=0.01)
+
+
+def weak(limit, load=0.0, **analysis):
+    """A horizontal rod whose motor carries weight and a load at the tip."""
+    about = {"name": "rest", "kind": "static"} | analysis
+    return make_scene(
+        name="weak", gravity=[0.0, -10.0], body=[{"name": "a", "rigid": ROD}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "a.root"], "moment_limit": limit}],
+        trajectory=[{"name": "path", "joint": "O", "value": "0"}], load=[{"point": "a.tip", "y": str(-load)}],
+        analysis=[about],
+    )  # fmt: skip
+
+
+def test_robots_at_rest_are_told_no_slower_path(tmp_path):
+    """A weight of 20 N at 0.35 m and 10 N at 0.7 m: 14 N·m. Each remedy that the advice names makes it feasible."""
+
+    def verdict(scene):
+        return Results.from_image(results_image(solve_scene(scene, Watcher())), tmp_path / "x.h5").verdict.analyses[0]
+
+    at_rest = verdict(weak(10.0, 10.0))
+    assert at_rest.advice == ("less load, or another motor or gear for O",)
+    assert not at_rest.feasible
+    assert verdict(weak(15.0, 10.0)).feasible
+    assert verdict(weak(10.0, 1.0)).feasible
+    moving = verdict(weak(10.0, 10.0, kind="pcid", end=0.1, output_step=0.01))
+    assert any("slower path" in text for text in moving.advice)
