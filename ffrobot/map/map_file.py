@@ -121,6 +121,9 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
             least = values[f"joints_{condition}/least_stiffness"] / 1e3
             table[f"frequency_{condition}"] = Quantity(f"lowest frequency, {words} (Hz)", frequency, True)
             table[f"stiffness_{condition}"] = Quantity(f"least stiffness, {words} (N/mm)", least, True)
+        if (response := values.get(f"joints_{condition}/response")) is not None:
+            peak = 1e3 * response.max(axis=(1, 2))
+            table[f"response_{condition}"] = Quantity(f"largest response, {words} (mm/N)", peak, False)
     reach = np.nanmax(np.linalg.norm(values["place"], axis=1))
     deflection = 1e3 * _beyond(ROUND_OFF * reach, np.linalg.norm(values["sag"], axis=1))
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)

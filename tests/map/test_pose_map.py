@@ -119,6 +119,8 @@ def test_response_at_zero_frequency_is_the_compliance(arm, tmp_path):
     for condition in ("locked", "compliant"):
         diagonal = np.array([np.diag(C)[:2] for C in found.values[f"joints_{condition}/compliance"]])
         np.testing.assert_allclose(found.values[f"joints_{condition}/response"][:, 0], diagonal, rtol=1e-9)
+        peak = found.values[f"joints_{condition}/response"].max(axis=(1, 2))
+        np.testing.assert_allclose(quantities(found)[f"response_{condition}"].values, 1e3 * peak)
 
 
 def test_files_and_pictures(arm, tmp_path):

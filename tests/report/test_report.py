@@ -9,7 +9,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, tube
 
+import ffrobot
 from ffrobot.cli import cli
 from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
@@ -17,8 +19,10 @@ from ffrobot.common.version import VERSION
 from ffrobot.pictures.motion import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
+from ffrobot.pictures.report.mechanism import mechanism
 from ffrobot.pictures.report.runs import distinct_parts, runs
 from ffrobot.pictures.report.tables import peaks_table
+from ffrobot.pictures.view.view import chosen_frames
 from ffrobot.results.file import Results
 
 
@@ -181,3 +185,25 @@ def test_page_says_what_the_summary_says(two_link_page, results):
             assert line.strip().removeprefix(f"{one.name}: ") in shown
     for text in (text for texts in results.warnings.values() for text in texts):
         assert text in shown
+
+
+MODES = {"count": 2, "family": "in-plane-bending"}
+
+
+def test_what_moves_is_seen_first(tmp_path):
+    """The page opens with the first analysis that goes through time; frames of `view` have the largest deflection."""
+    scene = ffrobot.make_scene(
+        name="swing", gravity=[0.0, -9.81],
+        body=[{"name": "arm", "link": beam_link(0.6, tube(0.02, 0.016), 4, nu=None, modes=MODES)}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
+        trajectory=[{"name": "turn", "joint": "O", "value": "0.3*(1 - cos(6*t))"}],
+        analysis=[{"name": "rest", "kind": "static"},
+                  {"name": "swing", "kind": "pcid", "end": 1.0, "output_step": 0.01}],
+    )  # fmt: skip
+    with ffrobot.solve(scene, tmp_path / "swing.h5") as results:
+        sizes = np.linalg.norm(results["swing/points/arm.tip/deflection"], axis=1)
+        frames = chosen_frames(results, "swing", 5)
+        assert len(frames) == 5
+        assert sizes[frames].max() > 0.99 * results.peak("swing/points/arm.tip/deflection")[0]
+        entries = mechanism(runs([results]))[0]["runs"]
+    assert {entry["label"]: entry["visible"] for entry in entries} == {"rest": False, "swing": True}

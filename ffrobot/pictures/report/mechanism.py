@@ -43,7 +43,9 @@ def mechanism(runs: Sequence[Run]) -> tuple[dict[str, Any], list[str]]:
     """
     notes: list[str] = []
     moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]
-    shown = [k for k, run in enumerate(runs) if run.analysis == run.results.analyses[0]]  # others are hidden at first
+    first = {id(run.results): run.analysis for run in reversed(runs) if len(run.results.time(run.analysis)) > 1}
+    opened = [first.get(id(run.results), run.results.analyses[0]) for run in runs]
+    shown = [k for k, run in enumerate(runs) if run.analysis == opened[k]]  # others are hidden at first
     corners = np.concatenate([body.global_points.reshape(-1, 3) for k in shown for body in moved[k]])
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = float((high - low).max()) or 1.0

@@ -93,7 +93,7 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
             span = f"{times.min():g} to {times.max():g} s"
             raise InputError(f"{path}: time: expected one of the run, {span}, found {options.time:g} s")
         for analysis in analyses:
-            frames = _frames(results, analysis, options.frames)
+            frames = chosen_frames(results, analysis, options.frames)
             grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
             colors = {"deflection": f"{name}.png", "von_mises": f"{name}.stress.png"}
             pictures = [
@@ -115,9 +115,16 @@ def _analyses(results: Results, wanted: str | None) -> Sequence[str]:
     return [wanted]
 
 
-def _frames(results: Results, analysis: str, count: int) -> Indices:
-    outputs = len(results.time(analysis))
-    return np.unique(np.linspace(0, outputs - 1, min(outputs, count)).round().astype(np.intp))
+def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
+    """Outputs equally far apart, the one nearest to the largest deflection moved there."""
+    time = results.time(analysis)
+    frames = np.linspace(0, len(time) - 1, min(len(time), count)).round().astype(np.intp)
+    points = [f"{analysis}/points/{point}/deflection" for point in results.names(f"{analysis}/points")]
+    peaks = [results.peak(name) for name in points if results.has(name)]
+    if peaks and max(peaks)[0] > 0.0:
+        peak = int(np.abs(time - max(peaks)[1]).argmin())
+        frames[np.abs(frames - peak).argmin()] = peak
+    return np.unique(frames)
 
 
 def _snapshot(results: Results, analysis: str, frames: Indices, grid: Grid, options: Options, color: str) -> Picture:
