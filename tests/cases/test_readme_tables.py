@@ -157,7 +157,9 @@ def test_gears_that_give_and_rigid_ones(solved):
         "compliant_arm", lambda text: re.sub(r"(stiffness|damping) = .*\n", "", text).partition("# PD of")[0]
     )
     rigid, key = edited.file, "frequencies/linear/frequency"
-    check_table("compliant_arm", "gears", 1e-3, lambda row: {"with drivetrain": built, "rigid": rigid}[row][key][0, 2:6])
+    check_table(
+        "compliant_arm", "gears", 1e-3, lambda row: {"with drivetrain": built, "rigid": rigid}[row][key][0, 2:6]
+    )
     moments = ((built, "gear_moment"), (built, "moment"), (rigid, "moment"))
     check_table(
         "compliant_arm", "joint", 0.02, lambda row: [peak(of[f"inverse/joints/{row}/{k}"]) for of, k in moments]
