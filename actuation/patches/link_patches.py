@@ -236,10 +236,10 @@ def _placed(path: Path, layout: PztLayout, body: ModalBody) -> Placed:
 def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: ModalBody) -> None:
     """Raise `InputError` where a layout bends or twists the link in no mode."""
     if not modes.served:
-        families = ", ".join(dict.fromkeys(str(family) for family in body.family)) or "none"
+        families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
         raise InputError(
-            f'{_key(path, layout.label)}: bends: expected modes of the link that patches for "{layout.acts_in}" reach,'
-            f" found modes in {families}: move the patches, or add such modes to the link ([modes] family)"
+            f'{_key(path, layout.label)}: bends: expected eigenmodes of the link that patches for "{layout.acts_in}" reach,'
+            f" found eigenmodes in {families}: add such modes ([modes] family, or a larger count), or move the patches"
         )
 
 

@@ -173,7 +173,9 @@ def beyond_rounding(tolerance: float, rounding: float) -> str:
 
 def unmet(choice: Choice, run: _core.TreeRun) -> str:
     """What the integrator saw where steps have become too short and no cause is found in loads or positions."""
-    if np.isfinite(run.last_error):
+    if run.last_error < 1.0:
+        saw = f"steps fell to {run.last_step:.2g} s, where round-off sets the error"
+    elif np.isfinite(run.last_error):
         saw = f"a step of {run.last_step:.2g} s still errs by {run.last_error:.2g} times what it may"
     else:
         saw = f"the equations of a step of {run.last_step:.2g} s could not be solved"

@@ -241,8 +241,15 @@ def test_patches_that_do_not_fit_their_link():
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
     upright = link(SQUAT, 4, "out-of-plane-bending")
     for allocation in ("exact", "least-squares"):
-        with pytest.raises(InputError, match=r'bends: expected modes of the link that patches for "in-plane" reach'):
+        with pytest.raises(InputError, match=r'bends: expected eigenmodes of the link that patches for "in-plane" reach'):
             link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))
+    few = link(SQUAT, 3)  # torsion among its attachment modes only
+    assert "torsion" in few.family
+    assert "torsion" not in few.family[: few.eigenmode_count]
+    twisting = layout(bends="twist", face="both", fibre_angle=np.pi / 4)
+    with pytest.raises(InputError, match=r"found eigenmodes in (?!.*torsion).*: add such modes .* a larger count"):
+        link_patches(SCENE, [twisting], few, from_modal_body("link", few))
+    link_patches(SCENE, [twisting], body, spatial)  # the remedy: a larger count
     with pytest.raises(InputError, match="expected no weights with other layouts"):
         link_patches(SCENE, [layout(name="a", point_weights={"tip": 1.0}), layout(name="b", bends="out-of-plane")],
                      body, spatial)  # fmt: skip
