@@ -241,7 +241,9 @@ def test_patches_that_do_not_fit_their_link():
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
     upright = link(SQUAT, 4, "out-of-plane-bending")
     for allocation in ("exact", "least-squares"):
-        with pytest.raises(InputError, match=r'bends: expected eigenmodes of the link that patches for "in-plane" reach'):
+        with pytest.raises(
+            InputError, match=r'bends: expected eigenmodes of the link that patches for "in-plane" reach'
+        ):
             link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))
     few = link(SQUAT, 3)  # torsion among its attachment modes only
     assert "torsion" in few.family

@@ -10,8 +10,13 @@ from pathlib import Path
 
 import pytest
 from forked_commands import LIMIT
+from PIL import Image
 
 DOCS = Path(__file__).parents[2] / "docs"
+sys.path.insert(0, str(DOCS))
+
+from palette import SAME, WIDEST, difference, pictures, reduced  # noqa: E402
+
 # What their commands do has tests of its own: studies, solids, resumed runs, paths.
 LONG = {"design", "long_runs", "machine_paths", "motor_sizing", "solid"}
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
@@ -78,6 +83,27 @@ class Reader:
         self.ran += len(test.examples)
 
 
+PICTURE = re.compile(r"!\[[^\]]*\]\((?P<file>[\w./-]+\.png)\)\n<!-- from (?P<source>[\w./-]+) -->")
+DRAWN = "FFROBOT_DRAW_PAGES"  # in the environment: pictures are written anew, those that differ
+
+
+def check_pictures(page, text, folder):
+    """Pictures of a page are those that its commands have made."""
+    for match in PICTURE.finditer(text):
+        path, made = page.parent / match["file"], reduced(folder / match["source"], WIDEST)
+        if os.environ.get(DRAWN) and not (path.exists() and difference(path.read_bytes(), made) < SAME):
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(made)
+        assert difference(path.read_bytes(), made) < SAME, f"{path}: {DRAWN}=1 pytest tests/docs/test_pages.py"
+
+
+def test_pictures_have_palettes():
+    """They are a third as large: `python docs/palette.py`."""
+    for path in pictures():
+        with Image.open(path) as picture:
+            assert picture.mode in ("P", "L") or path.stat().st_size < 20_000, path
+
+
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, id=page.stem, marks=[pytest.mark.nightly] * (page.stem in LONG)) for page in PAGES],
@@ -86,5 +112,7 @@ def test_page_does_what_it_says(page, ffrobot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     environment = ffrobot.environment | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     reader = Reader(tmp_path, page, environment, ffrobot.forks)
-    reader.follow(page.read_text(encoding="utf-8"))
+    text = page.read_text(encoding="utf-8")
+    reader.follow(text)
     assert reader.ran >= 3
+    check_pictures(page, text, tmp_path)
