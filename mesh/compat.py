@@ -1,24 +1,38 @@
-"""The few calls that differ between dolfinx 0.5 (Debian 12) and 0.9 (Debian 13); all else is written once.
+"""The few calls that differ between dolfinx 0.5 (Debian 12), 0.9 (Debian 13), 0.10 and 0.11 (PyPI).
 
-Nothing outside this module asks for a dolfinx version. Importing it loads dolfinx.
+Nothing outside this module asks for a dolfinx version. Importing it loads dolfinx, and has to come before all else that
+does: PyPI's wheel, PETSc's signal handlers and versions of UFL are dealt with before.
 """
 
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib import metadata
+from inspect import signature
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-import petsc4py
 
 from ..common.arrays import Array, Integers
 from .cells import CellName
 from .form_cache import form_folder
 
+with suppress(ModuleNotFoundError):
+    import dolfinx_solver  # noqa: F401 (PyPI's dolfinx: it has MPI loaded before its PETSc)
+import petsc4py
+
 # Before dolfinx does it: PETSc's own signal handlers would answer a closed pipe or a kill with a page on debuggers.
 petsc4py.init(["ffrobot", "-no_signal_handler"])
+
+# The setuptools of Debian 12's UFL and FFCx, which ask it for their versions alone, are a third of the time of loading.
+_NEEDS_SETUPTOOLS = "pkg_resources" not in sys.modules
+if _NEEDS_SETUPTOOLS:
+    sys.modules["pkg_resources"] = ModuleType("pkg_resources")
+    sys.modules["pkg_resources"].get_distribution = metadata.distribution  # type: ignore[attr-defined]
 
 import basix  # noqa: E402
 import dolfinx  # noqa: E402
@@ -28,12 +42,22 @@ from dolfinx.fem import FunctionSpace  # noqa: E402
 from dolfinx.mesh import CellType, GhostMode, Mesh, create_cell_partitioner, create_mesh  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
-_OLD = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 7)
+if _NEEDS_SETUPTOOLS:
+    del sys.modules["pkg_resources"]
+
+_VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+_OLD = _VERSION < (0, 7)
+_SPACES_COMPILE = _OLD or "jit_options" in signature(fem.functionspace).parameters
 
 if _OLD:
     from basix import ufl_wrapper as basix_ufl
 else:
     from basix import ufl as basix_ufl
+
+
+def assembly() -> str:
+    """Name and versions of what assembles the matrices."""
+    return f"dolfinx {dolfinx.__version__}, UFL {ufl.__version__}"
 
 
 def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Array) -> Mesh:
@@ -48,8 +72,16 @@ def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Intege
         scalar = ufl.FiniteElement("Lagrange", ufl.Cell(cell, geometric_dimension=3), degree, variant="equispaced")
         return create_mesh(comm, nodes, points, ufl.Mesh(ufl.VectorElement(scalar)), GhostMode.none)
     element = basix_ufl.element("Lagrange", cell, degree, basix.LagrangeVariant.equispaced, shape=(3,))
-    partitioner = create_cell_partitioner(GhostMode.none)
-    return create_mesh(comm, nodes, points, ufl.Mesh(element), partitioner)
+    if _VERSION < (0, 10):
+        return create_mesh(comm, nodes, points, ufl.Mesh(element), create_cell_partitioner(GhostMode.none))
+    links = [2] if _VERSION >= (0, 11) else []  # cells at a facet, at most
+    return create_mesh(comm, nodes, ufl.Mesh(element), points, create_cell_partitioner(GhostMode.none, *links))
+
+
+def cell_name(mesh: Mesh) -> str:
+    """Shape of the cells: "interval", "tetrahedron" or "hexahedron"."""
+    name = mesh.ufl_domain().ufl_cell().cellname
+    return name() if callable(name) else name
 
 
 def geometry_nodes(mesh: Mesh) -> Integers:
@@ -63,7 +95,7 @@ def geometry_nodes(mesh: Mesh) -> Integers:
 
 def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
     """Basix element that maps the reference cell to the cells of `mesh`, by `geometry_nodes`."""
-    cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
+    cell = getattr(basix.CellType, cell_name(mesh))
     equispaced = basix.LagrangeVariant.equispaced
     return basix.create_element(basix.ElementFamily.P, cell, mesh.geometry.cmap.degree, equispaced)
 
@@ -103,11 +135,11 @@ def function_space(mesh: Mesh, degree: int, shape: tuple[int, ...] = ()) -> Func
     options: dict[str, Any] = {"discontinuous": degree == 0}
     if degree:
         options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
-    cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
+    cell = getattr(basix.CellType, cell_name(mesh))
     with _compiling(mesh.comm) as jit:
         if _OLD:
             element = basix_ufl.create_element(basix.ElementFamily.P, cell, degree, **options)
             wrap = {0: lambda e: e, 1: basix_ufl.VectorElement, 2: basix_ufl.TensorElement}[len(shape)]
             return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)), **jit)
         element = basix_ufl.element(basix.ElementFamily.P, cell, degree, shape=shape or None, **options)
-        return fem.functionspace(mesh, element, **jit)
+        return fem.functionspace(mesh, element, **(jit if _SPACES_COMPILE else {}))

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 
 from ...common.arrays import Array, Integers, NDArray
 from ...common.structs import struct
-from ...mesh.compat import compiled_form, function_space, node_map
+from ...mesh.compat import cell_name, compiled_form, function_space, node_map
 from ..link_records.link import Material, OrthotropicMaterial
 from .constitutive import stiffness
 
@@ -247,7 +247,7 @@ def _cellwise(mesh: Mesh, values: Array, of_cell: Integers) -> fem.Function:
 
 
 def _is_simplex(mesh: Mesh) -> bool:
-    return bool(mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron")
+    return cell_name(mesh) == "tetrahedron"
 
 
 def _scalar_mass(M: PETSc.Mat, comm: MPI.Comm) -> tuple[ScalarMass, tuple[Integers, Integers]]:
