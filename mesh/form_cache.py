@@ -3,6 +3,7 @@
 FFCx locks a form by creating its `.c` file, and waits in vain for a process that died before the form was ready. Here
 one process compiles at a time, under a lock that ends with it, so that a form which is not ready then is nobody's. A
 ready one carries the checksum of its library. Entries depend on interpreter, machine and dolfinx, as forms do.
+Forms that came with the installation (`fe_models.forms`) are taken into the cache.
 """
 
 from __future__ import annotations
@@ -46,12 +47,14 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
     if comm.rank != 0:
         yield Path(comm.bcast(None))
         return
-    folder = user_cache_path("ffrobot") / "forms" / f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
+    of = f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
+    folder = folder_of_forms() / of
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
     with held(folder / "compiling.lock", PATIENCE) as is_alone:  # others wait, and find what this process compiles
         if not is_alone or shutil.disk_usage(folder).free < ROOM:
             folder = _own_folder()
+        _take(installed_forms() / of, folder)
         _forget_unsound(folder)
         if comm.size > 1:
             comm.bcast(str(folder))
@@ -65,6 +68,25 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
             for ready in set(folder.glob(f"*{READY}")) - _sound:
                 ready.write_text(_checksum(ready), encoding="ascii")
                 _sound.add(ready)
+
+
+def folder_of_forms() -> Path:
+    """Those of the user, in a folder for each kind."""
+    return user_cache_path("ffrobot") / "forms"
+
+
+def installed_forms() -> Path:
+    """Those of the installation, likewise."""
+    return Path(sys.prefix, "share", "ffrobot", "forms")
+
+
+@cache
+def _take(installed: Path, folder: Path) -> None:
+    """Copy the forms that `folder` does not have; once for each process."""
+    with suppress(OSError):  # what is incomplete is unsound
+        for file in installed.iterdir():
+            if not (folder / file.name).exists():
+                shutil.copy(file, folder / file.name)
 
 
 @cache

@@ -1,0 +1,54 @@
+"""Compile the finite element forms of links ahead: `python -m ffrobot.fe_models.forms`, once for an installation.
+
+Forms of other orders and cells are compiled when a link first needs them, and kept in the user's cache.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..mesh.form_cache import folder_of_forms, installed_forms
+from .link import computed_modal_body
+from .link_source import LinkTable
+
+MATERIAL = {"youngs_modulus": 7e10, "poissons_ratio": 0.33, "density": 2700.0}
+SECTION = {"shape": "rectangle", "height": 0.1, "width": 0.1}
+ROUND = {"shape": "circle", "diameter": 0.1}
+
+
+def links() -> Iterator[dict[str, Any]]:
+    """Small links: beams of both theories, boxes of both cells and a round bar, each of the default order."""
+    for theory in ("euler-bernoulli", "timoshenko"):
+        yield _link({"kind": "beam", "section": SECTION}, {"elements": 2}, model={"theory": theory})
+    for cell in ("tetrahedron", "hexahedron"):
+        yield _link({"kind": "solid", "section": SECTION}, {"cell": cell, "divisions": [2, 1, 1]})
+    yield _link({"kind": "solid", "section": ROUND}, {"size": 0.1})
+
+
+def _link(geometry: Mapping[str, Any], mesh: Mapping[str, Any], **more: object) -> dict[str, Any]:
+    modes = {"count": 2, "attachment_modes": False}
+    named = {"name": "link", "material": MATERIAL, "reference": {"condition": "cantilever"}, "modes": modes}
+    return named | {"geometry": {"length": 0.2} | dict(geometry), "mesh": dict(mesh)} | more
+
+
+def main() -> None:
+    """Compile into the installation or, where nothing can be written there, into the user's cache."""
+    target = installed_forms()
+    if not os.access(next(folder for folder in target.parents if folder.exists()), os.W_OK):
+        target = folder_of_forms()
+    with TemporaryDirectory() as own:
+        os.environ["XDG_CACHE_HOME"] = own  # neither what is compiled already nor meshes of these links are to be seen
+        for keys in links():
+            computed_modal_body(LinkTable(keys, Path("<forms>")))
+        shutil.copytree(folder_of_forms(), target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.o", "*.lock"))
+    sys.stdout.write(f"{len(list(target.glob('*/*.so')))} forms compiled in {target}\n")
+
+
+if __name__ == "__main__":
+    main()
