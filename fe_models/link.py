@@ -182,7 +182,11 @@ def _compute(
     def make() -> ModalBody:
         with of_file(source_path), ending_at_once():
             body = with_measured(compute(link, source_path, progress or _silent), link)
-        return replace(body, input_hash=digest, modes_hash=modes_hash(link))
+        from ..mesh.compat import assembly
+        from .modal_body.krylov_schur import eigensolver
+
+        hashes: dict[str, Any] = {"input_hash": digest, "modes_hash": modes_hash(link)}
+        return replace(body, **hashes, assembly=assembly(), eigensolver=eigensolver())
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out
         on_first(lambda: write(make()))
@@ -205,17 +209,13 @@ def _with_same_modes(link: Link, earlier: Sequence[Path]) -> ModalBody | None:
 
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
-    if isinstance(link, BeamLink):
-        from .beam.link import beam_modal_body  # loads SciPy
-
-        if link.modes.solver != "slepc":
-            return beam_modal_body
     try:
         without_daemon()
         with ending_at_once(), deferred_interrupts():
+            from ..mesh import compat  # noqa: F401 (first of all that load dolfinx)
+
             if isinstance(link, BeamLink):
-                from .beam import dolfinx_forms  # noqa: F401
-                from .modal_body import krylov_schur  # noqa: F401 (what the computation loads)
+                from .beam.link import beam_modal_body
 
                 return beam_modal_body
             from .solid.link import solid_modal_body

@@ -27,6 +27,7 @@ FORMAT_VERSION = 1
 LARGEST = 1e100  # of any number: products of three of them are still finite
 
 _ATTRIBUTES = ("name", "kind", "reference_condition", "ffrobot_version", "input_hash")
+_OPTIONAL = ("modes_hash", "assembly", "eigensolver")  # empty where not known
 # Field of ModalBody → dataset; those with a default not all files have.
 _DATASETS = {
     "length": "length",
@@ -142,10 +143,10 @@ def _body(file: h5py.File) -> ModalBody:
         values["residual"] = _whole_numbers(file["modes/residual"])
     if "damping_of" in file["modes"].attrs:
         values["damping_of"] = _text(file["modes"].attrs["damping_of"])
+    values |= {name: _text(file.attrs.get(name, "")) for name in _OPTIONAL}
     points = file.get("stress/points", {})
     return ModalBody(
         **values,
-        modes_hash=_text(file.attrs.get("modes_hash", "")),
         family=_texts(file, "modes/family"),
         geometric_stiffness=_geometric_stiffness(file),
         interfaces={name: _interface(group) for name, group in file["interfaces"].items()},
@@ -214,8 +215,9 @@ def _image(body: ModalBody) -> bytes:
         file.attrs[MARK] = METHOD
         for name in _ATTRIBUTES:
             file.attrs[name] = getattr(body, name)
-        if body.modes_hash:
-            file.attrs["modes_hash"] = body.modes_hash
+        for name in _OPTIONAL:
+            if text := getattr(body, name):
+                file.attrs[name] = text
         _write_arrays(file, {dataset: getattr(body, name) for name, dataset in _DATASETS.items()})
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit

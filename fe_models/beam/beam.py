@@ -2,8 +2,8 @@
 
 The families of a straight beam with principal axes y and z do not couple. Each gives its stiffness K and mass M over
 its free degrees of freedom, and what the motion is at the stations: all six fields (displacement and rotation of the
-cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. All matrices are products
-BᵀB of values at Gauss points, which integrate them exactly; `dolfinx_forms` assembles the same from their weak forms.
+cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. dolfinx assembles K and M.
+Strains at Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for rounding. Loads dolfinx.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import scipy.sparse as sp
 from ...common.arrays import Array
 from ...common.structs import struct
 from ..link_records.families import Family
-from ..link_records.link import BeamLink, Solver
-from .line import gram, hermite, lagrange
+from ..link_records.link import BeamLink
+from .dolfinx_forms import BeamForms
+from .line import hermite, lagrange
 from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
 
 # Rows of a station: displacement and rotation of the cross section about x, y, z.
@@ -34,71 +35,72 @@ class FamilyModel:
     strain: sp.csr_matrix  # (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain
     # for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x
     fields: Mapping[int, sp.csr_matrix]
-    solver: Solver = "block-lanczos"  # of the eigenproblem
 
 
-def family_model(link: BeamLink, family: Family, nodes: Array, stations: Array) -> FamilyModel:
-    """The eigenproblem of `family` on the elements between `nodes` (e + 1,), read at `stations` (k,), all in m."""
+def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Array) -> FamilyModel:
+    """The eigenproblem of `family` on the elements of `forms`, read at `stations` (k,), in m."""
     if family in ("axial", "torsion"):
-        strain, inertia, values = _rod(link, nodes, stations, *rod_properties(link, family))
+        K, M, strain, values = _rod(link, forms, stations, *rod_properties(link, family))
         fields, held = {U_X if family == "axial" else R_X: values}, [0]
     else:
         bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
-        strain, inertia, deflection, slope, held = bending(link, nodes, stations, second_moment(family))
+        K, M, strain, deflection, slope, held = bending(link, forms, stations, second_moment(family))
         # Out of plane, w' is a rotation about −y.
         in_plane = family == "in-plane-bending"
         fields = {U_Y: deflection, R_Z: slope} if in_plane else {U_Z: deflection, R_Y: -slope}
     free = np.setdiff1d(np.arange(strain.shape[1]), held)
-    B, N, solver = strain.tocsr()[:, free], inertia.tocsr()[:, free], link.modes.solver
-    K, M = gram(B), gram(N)
-    if solver == "slepc":
-        from .dolfinx_forms import assembled  # loads dolfinx
-
-        K, M = (A[free][:, free] for A in assembled(link, family, nodes))
-    return FamilyModel(K, M, B, {row: values[:, free] for row, values in fields.items()}, solver)
+    K, M = (A[free][:, free] for A in (K, M))
+    return FamilyModel(K, M, strain[:, free], {row: values[:, free] for row, values in fields.items()})
 
 
 def _rod(
-    link: BeamLink, nodes: Array, stations: Array, stiffness: Property, inertia: Property
-) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+    link: BeamLink, forms: BeamForms, stations: Array, stiffness: Property, inertia: Property
+) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
     """Axial or torsional motion on cubic Lagrange elements: K = ∫EA u' v' dx, M = ∫ρA u v dx; stations read u."""
-    V = lagrange(nodes, 3)
-    strain = V.root(cellwise(link, nodes, stiffness), derivative=1)
-    return strain, V.root(cellwise(link, nodes, inertia)), V.at(stations)
+    V = lagrange(forms.nodes, 3)
+    EA, rhoA = (cellwise(link, forms.nodes, each) for each in (stiffness, inertia))
+    return forms.matrix(EA, V, 1), forms.matrix(rhoA, V), V.root(EA, 1), V.at(stations)
 
 
-# Roots of K and M, deflection and rotation at the stations, held degrees of freedom.
-Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
+# K, M, strains, deflection and rotation at the stations, held degrees of freedom.
+Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
 
 
-def _euler_bernoulli(link: BeamLink, nodes: Array, stations: Array, second_moment: Property) -> Bending:
+def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_moment: Property) -> Bending:
     """K = ∫EI w'' v'' dx, M = ∫ρA w v dx on cubic Hermite elements; stations read w and w'."""
-    V, E, rho = hermite(nodes), link.material.youngs_modulus, link.material.density
-    strain = V.root(cellwise(link, nodes, lambda s: E * second_moment(s)), derivative=2)
-    inertia = V.root(cellwise(link, nodes, lambda s: rho * s.area))
+    V, E, rho = hermite(forms.nodes), link.material.youngs_modulus, link.material.density
+    EI = cellwise(link, forms.nodes, lambda s: E * second_moment(s))
+    rhoA = cellwise(link, forms.nodes, lambda s: rho * s.area)
     held = [0, 1] if link.reference.holds_root else [0, V.x.size - 2]
-    return strain, inertia, V.at(stations), V.at(stations, derivative=1), held
+    read = V.at(stations), V.at(stations, derivative=1)
+    return forms.matrix(EI, V, 2), forms.matrix(rhoA, V), V.root(EI, 2), *read, held
 
 
-def _timoshenko(link: BeamLink, nodes: Array, stations: Array, second_moment: Property) -> Bending:
+def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment: Property) -> Bending:
     """K = ∫EI θ' η' + kGA (w' − θ)(v' − η) dx, M = ∫ρA w v + ρI θ η dx; w cubic, θ quadratic: no locking.
 
     Stations read w and the section's rotation θ.
     """
+    nodes = forms.nodes
     W, T = lagrange(nodes, 3), lagrange(nodes, 2)
     E, G, rho = link.material.youngs_modulus, shear_modulus(link), link.material.density
     EI = cellwise(link, nodes, lambda s: E * second_moment(s))
     kGA = cellwise(link, nodes, lambda s: s.shear * G * s.area)
     rhoA = cellwise(link, nodes, lambda s: rho * s.area)
     rhoI = cellwise(link, nodes, lambda s: rho * second_moment(s))
+    shear = -forms.matrix(kGA, W, 1, T, 0)
+    K = sp.bmat(
+        [[forms.matrix(kGA, W, 1), shear], [shear.T, forms.matrix(EI, T, 1) + forms.matrix(kGA, T)]], format="csr"
+    )
+    M = sp.block_diag([forms.matrix(rhoA, W), forms.matrix(rhoI, T)], format="csr")
     strain = sp.bmat([[None, T.root(EI, derivative=1)], [W.root(kGA, derivative=1), -T.root(kGA)]], format="csr")
-    inertia = sp.block_diag([W.root(rhoA), T.root(rhoI)], format="csr")
     deflection, rotation = W.at(stations), T.at(stations)
     nothing_w, nothing_t = sp.csr_matrix(deflection.shape), sp.csr_matrix(rotation.shape)
     held = [0, W.x.size if link.reference.holds_root else W.x.size - 1]
     return (
+        K,
+        M,
         strain,
-        inertia,
         sp.hstack([deflection, nothing_t], format="csr"),
         sp.hstack([nothing_w, rotation], format="csr"),
         held,

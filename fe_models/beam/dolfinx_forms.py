@@ -1,4 +1,8 @@
-"""Stiffness and mass of a beam by dolfinx, from their weak forms in UFL: `[modes] solver = "slepc"`. Loads dolfinx."""
+"""Stiffness and mass of a beam by dolfinx, from their weak forms in UFL. Importing this loads dolfinx.
+
+All are bilinear forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx of piecewise cubics and quadratics, with weights that are constant in
+elements: a link needs three forms, with shear six, whatever its families are.
+"""
 
 from __future__ import annotations
 
@@ -12,67 +16,64 @@ from mpi4py import MPI
 
 from ...common.arrays import Array
 from ...mesh.compat import compiled_form, function_space
-from ..link_records.families import Family
-from ..link_records.link import BeamLink
-from .line import Functions, hermite, lagrange
-from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
+from .line import Functions
 
 
-def assembled(link: BeamLink, family: Family, nodes: Array) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """K and M of the free beam over all degrees of freedom of the functions that `family_model` takes."""
-    beam = _Forms(link, nodes)
-    u, v = beam.functions(3)
-    if family in ("axial", "torsion"):
-        stiffness, inertia = (beam.constant(each) for each in rod_properties(link, family))
-        cubics = lagrange(nodes, 3)
-        return beam.matrix(stiffness * u.dx(0) * v.dx(0), cubics), beam.matrix(inertia * u * v, cubics)
-    moment, rho = second_moment(family), link.material.density
-    EI = beam.constant(lambda s: link.material.youngs_modulus * moment(s))
-    rhoA = beam.constant(lambda s: rho * s.area)
-    if link.model.theory == "euler-bernoulli":
-        # Of all piecewise cubics those whose slopes meet.
-        splines = hermite(nodes)
-        return beam.matrix(EI * u.dx(0).dx(0) * v.dx(0).dx(0), splines), beam.matrix(rhoA * u * v, splines)
-    theta, eta = beam.functions(2)
-    G, rhoI = shear_modulus(link), beam.constant(lambda s: rho * moment(s))
-    kGA = beam.constant(lambda s: s.shear * G * s.area)
-    W, T = lagrange(nodes, 3), lagrange(nodes, 2)
-    K_ww = beam.matrix(kGA * u.dx(0) * v.dx(0), W)
-    K_wt = beam.matrix(-kGA * theta * v.dx(0), W, T)
-    K_tt = beam.matrix(EI * theta.dx(0) * eta.dx(0) + kGA * theta * eta, T)
-    mass = [beam.matrix(rhoA * u * v, W), beam.matrix(rhoI * theta * eta, T)]
-    return sp.bmat([[K_ww, K_wt], [K_wt.T, K_tt]], format="csr"), sp.block_diag(mass, format="csr")
+class BeamForms:
+    """Bilinear forms on the elements between `nodes` (e + 1,), in m."""
 
-
-class _Forms:
-    """Forms on the elements between `nodes` (e + 1,), in m."""
-
-    def __init__(self, link: BeamLink, nodes: Array) -> None:
+    def __init__(self, nodes: Array) -> None:
+        self.nodes = nodes
         cells = nodes.size - 1
-        self._link, self._nodes = link, nodes
         self._mesh = dolfinx_mesh.create_interval(MPI.COMM_SELF, cells, [0.0, 1.0])
         x = self._mesh.geometry.x
         x[:, 0] = nodes[np.rint(x[:, 0] * cells).astype(int)]
+        self._weight = fem.Function(function_space(self._mesh, 0))
+        middle = self._weight.function_space.tabulate_dof_coordinates()[:, 0]
+        self._element = np.searchsorted(nodes, middle) - 1
+        self._spaces: dict[int, fem.FunctionSpace] = {}
+        self._forms: dict[tuple[int, ...], fem.Form] = {}
 
-    def functions(self, degree: int) -> tuple[ufl.Argument, ufl.Argument]:
-        """Trial and test function, continuous and piecewise of a degree."""
-        space = function_space(self._mesh, degree)
-        return ufl.TrialFunction(space), ufl.TestFunction(space)
+    def matrix(
+        self,
+        weight: Array,
+        of: Functions,
+        derivative: int = 0,
+        by: Functions | None = None,
+        derivative_by: int | None = None,
+    ) -> sp.csr_matrix:
+        """∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements: test functions f `of`, trial functions g `by`.
 
-    def constant(self, quantity: Property) -> fem.Function:
-        """`quantity` of the section in each element."""
-        function = fem.Function(function_space(self._mesh, 0))
-        middle = function.function_space.tabulate_dof_coordinates()[:, 0]
-        function.x.array[:] = cellwise(self._link, self._nodes, quantity)[np.searchsorted(self._nodes, middle) - 1]
-        return function
-
-    def matrix(self, integrand: ufl.core.expr.Expr, rows: Functions, columns: Functions | None = None) -> sp.csr_matrix:
-        """∫ of a bilinear integrand over functions `rows` of the test space, and `columns` of the trial space."""
-        form = integrand * ufl.dx
-        found = fem_petsc.assemble_matrix(compiled_form(form))
+        Without `by` both are the same functions, and so are the derivatives.
+        """
+        by = of if by is None else by
+        order = derivative if derivative_by is None else derivative_by
+        self._weight.x.array[:] = weight[self._element]
+        found = fem_petsc.assemble_matrix(self._form(of.degree, derivative, by.degree, order))
         found.assemble()
         indptr, indices, values = found.getValuesCSR()
+        rows, columns = (self._points(functions.degree) for functions in (of, by))
+        A = sp.csr_matrix((values, indices, indptr), shape=(rows.size, columns.size))
+        found.destroy()
         # Degrees of freedom of Lagrange functions are values at points.
-        test, trial = (each.ufl_function_space().tabulate_dof_coordinates()[:, 0] for each in form.arguments())
-        A = sp.csr_matrix((values, indices, indptr), shape=(test.size, trial.size))
-        return (rows.at(test).T @ A @ (columns or rows).at(trial)).tocsr()
+        return (of.at(rows).T @ A @ by.at(columns)).tocsr()
+
+    def _form(self, *key: int) -> fem.Form:
+        """Compiled, by degree and derivative of test and trial functions."""
+        if key not in self._forms:
+            v, u = ufl.TestFunction(self._space(key[0])), ufl.TrialFunction(self._space(key[2]))
+            for _ in range(key[1]):
+                v = v.dx(0)
+            for _ in range(key[3]):
+                u = u.dx(0)
+            self._forms[key] = compiled_form(self._weight * u * v * ufl.dx)
+        return self._forms[key]
+
+    def _space(self, degree: int) -> fem.FunctionSpace:
+        """Continuous functions, piecewise of a degree."""
+        if degree not in self._spaces:
+            self._spaces[degree] = function_space(self._mesh, degree)
+        return self._spaces[degree]
+
+    def _points(self, degree: int) -> Array:
+        return self._space(degree).tabulate_dof_coordinates()[:, 0]

@@ -26,6 +26,11 @@ class Functions:
     slopes: Integers  # (d,) 1 of degrees of freedom that are derivatives by x, else 0
 
     @property
+    def degree(self) -> int:
+        """Of the polynomials."""
+        return len(self.powers) - 1
+
+    @property
     def lengths(self) -> Array:
         """(e,) of the elements, in m."""
         return np.diff(self.nodes)

@@ -22,6 +22,7 @@ from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
 from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
 from .beam import R_X, FamilyModel, family_model
+from .dolfinx_forms import BeamForms
 from .eigen import lowest_modes
 from .geometric_stiffness import geometric_stiffness
 from .invariants import shape_integrals
@@ -98,10 +99,10 @@ def loaded_models(
     nodes = _element_boundaries(link)
     # The fields are read on elements of their own: there also the middle and the interfaces are nodes.
     stations = lagrange(with_points(nodes, [0.5 * link.geometry.length, *link.places.values()]), 3)
-    models: dict[Family, FamilyModel] = {}
+    forms, models = BeamForms(nodes), dict[Family, FamilyModel]()
     for family in families:
         progress(f"{link.name}: assembling {family}")
-        models[family] = _loaded(family_model(link, family, nodes, stations.x), link, stations.x)
+        models[family] = _loaded(family_model(link, family, forms, stations.x), link, stations.x)
     return models, stations
 
 
@@ -174,7 +175,7 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
     """
     modes = []
     for family, model in models.items():
-        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]), model.solver)
+        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
         modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
     modes = _by_frequency(modes)
     return [modes[number - 1] for number in wanted]

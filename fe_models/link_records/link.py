@@ -69,8 +69,6 @@ class SurfacePatches(Record):
         return Outlines(tuple(self.edges(length)), self.width, self.faces)
 
 
-Solver = Literal["block-lanczos", "slepc"]
-
 Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
 
 
@@ -165,8 +163,8 @@ class Modes(Record):
     """Family or families of the eigenmodes."""
     attachment_modes: bool = True
     """Addition of static shapes of loads at the interfaces."""
-    solver: Solver = "block-lanczos"
-    """Solver of the eigenproblem: block Lanczos, or Krylov–Schur of SLEPc, for beams with matrices of dolfinx."""
+    solver: Literal["slepc"] = "slepc"
+    """Solver of the eigenproblem: Krylov–Schur of SLEPc with shift-and-invert."""
 
     @property
     def are_default(self) -> bool:

@@ -72,6 +72,8 @@ class ModalBody(Integrals, Frozen):
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
+        assembly: the program that assembled its matrices, with versions; empty where not known.
+        eigensolver: that found its modes, likewise.
         remarks: what the file of a solid's part holds and the body does not, a sentence each.
 
     Raises:
@@ -105,6 +107,8 @@ class ModalBody(Integrals, Frozen):
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""
+    assembly: str = ""
+    eigensolver: str = ""
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

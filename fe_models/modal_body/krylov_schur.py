@@ -1,12 +1,14 @@
-"""The lowest modes of a held link by SLEPc's Krylov–Schur, the reference for `BlockLanczos`. Loads PETSc and SLEPc.
+"""The lowest modes of a held link by SLEPc's Krylov–Schur: shift-and-invert at zero. Loads PETSc and SLEPc.
 
-Shift-and-invert at zero without any shift: the flexibility F is the inverse of the stiffness under the supports. PETSc
-sees it as the preconditioner of an exact solve, and the mass as a matrix that only multiplies.
+The flexibility F is the inverse of the stiffness under the supports. PETSc sees it as the preconditioner of an exact
+solve, and the mass as a matrix that only multiplies. Modes found before are deflated: a search goes on where it ended,
+and one for what is left tells whether one of several alike is missing, which no single Krylov space shows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -15,15 +17,36 @@ from slepc4py import SLEPc
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
-from .lanczos import Product
 
-TOLERANCE = 1e-13
+# Of θ = 1/ω², the residual of a mode that has converged: ω² then has errors of its square.
+TOLERANCE = 1e-10
+# The same, of the search for what may be missing: θ is then known to 1e-4 of the distance to its neighbors.
+LOOSE = 1e-2
+# Relative distance of ω² that may be rounding.
+ALIKE = 1e-8
+# Of the largest θ: less is rounding of F, of motions that the supports do not allow.
+ROUNDING = 1e-15
+CYCLES = 1000  # of Krylov–Schur at most
+
+
+def eigensolver() -> str:
+    """Name, version and method."""
+    return f"SLEPc {'.'.join(map(str, SLEPc.Sys.getVersion()))}, Krylov–Schur with shift-and-invert"
+
+
+class Product(Protocol):
+    """A matrix."""
+
+    def __matmul__(self, U: Array) -> Array:
+        """Its product with U (m, k)."""
 
 
 class KrylovSchur:
-    """The search, anew each time, with F (m, m) symmetric and M (m, m) symmetric positive definite, m `rows` here.
+    """The search, which goes on from where it is when more modes are asked for.
 
-    `comm` are the processes that share the vectors, `total` sums an array over all of them.
+    Of vectors that several processes share each has its own m `rows`; all take part in everything: `comm` are these
+    processes, `total` sums an array over them. F (m, m) is symmetric, of a `rank`; M (m, m) positive definite.
+    `tolerance`: of θ, the residual of a mode that has converged.
     """
 
     def __init__(
@@ -31,22 +54,53 @@ class KrylovSchur:
         flexibility: Product,
         mass: Product,
         rows: int,
+        rank: int,
         *,
         comm: MPI.Comm = MPI.COMM_SELF,
         total: Callable[[Array], Array] = np.asarray,
+        tolerance: float = TOLERANCE,
     ) -> None:
-        self._flexibility, self._mass, self._rows, self._comm, self._total = flexibility, mass, rows, comm, total
+        self._flexibility, self._mass, self._rows, self._rank = flexibility, mass, rows, rank
+        self._comm, self._total, self._tolerance = comm, total, tolerance
+        self._X, self._theta = np.empty((rows, 0)), np.empty(0)
 
     def lowest(self, count: int) -> Array:
-        """X (m, count), XᵀMX = I to rounding, ω² ascending. Raises `SolveError` where fewer converge."""
+        """X (m, count), XᵀMX = I to rounding, ω² ascending.
+
+        Raises `SolveError` where there are not as many but for round-off, or too few converge.
+        """
+        missing = count - self._theta.size
+        while missing > 0:
+            self._add(missing, self._tolerance)
+            last = self._theta[min(count, self._theta.size) - 1]
+            if self._theta.size < min(count, self._rank):
+                missing = count - self._theta.size
+            elif self._theta.size < self._rank:
+                missing = int(np.sum(self._search(1, LOOSE)[1] > (1 + ALIKE) * last))
+            else:
+                missing = 0
+        found = int(np.sum(self._theta > ROUNDING * self._theta.max(initial=0.0)))
+        if found < count:
+            raise SolveError(f"eigenproblem: {found} of {count} modes are above round-off; request fewer modes")
+        return self._X[:, :count]
+
+    def _add(self, count: int, tolerance: float) -> None:
+        """The lowest `count` modes beside those known."""
+        found, theta = self._search(min(count, self._rank - self._theta.size), tolerance)
+        order = np.argsort(np.append(-self._theta, -theta), kind="stable")
+        self._theta = np.append(self._theta, theta)[order]
+        self._X = self._orthonormal(np.hstack([self._X, found]))[:, order]
+
+    def _search(self, count: int, tolerance: float) -> tuple[Array, Array]:
+        """X (m, count) and θ (count,) of the lowest modes beside those known."""
         size = ((self._rows, PETSc.DETERMINE), (self._rows, PETSc.DETERMINE))
         mass = PETSc.Mat().createPython(size, _Shell(self._mass), comm=self._comm)
         mass.setUp()
         solver = SLEPc.EPS().create(self._comm)
         solver.setOperators(mass, mass)  # the first is never multiplied with: the solve below stands for its inverse
         solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setDimensions(count, min(mass.getSize()[0], max(2 * count, count + 40)))
-        solver.setTolerances(TOLERANCE, 1000)
+        solver.setDimensions(count, min(mass.getSize()[0], max(2 * count, count + 15)))
+        solver.setTolerances(tolerance, CYCLES)
         solver.setPurify(False)  # a solve for each mode, which M does not need: it is regular
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         solver.setTarget(0.0)
@@ -55,20 +109,27 @@ class KrylovSchur:
         transform.getKSP().setType(PETSc.KSP.Type.PREONLY)
         transform.getKSP().getPC().setType(PETSc.PC.Type.PYTHON)
         transform.getKSP().getPC().setPythonContext(_Shell(self._flexibility))
+        vector = mass.createVecRight()
+        if self._theta.size:
+            known = [vector.duplicate() for _ in self._theta]
+            for one, x in zip(known, self._X.T, strict=True):
+                one.array[:] = x
+            solver.setDeflationSpace(known)
         solver.solve()
         if solver.getConverged() < count:
             raise SolveError(
-                f"eigenproblem: {solver.getConverged()} of {count} modes converged to {TOLERANCE:g}: request fewer"
+                f"eigenproblem: {solver.getConverged()} of {count} modes converged to {tolerance:g}: request fewer"
             )
-        X, vector = np.empty((self._rows, count)), mass.createVecRight()
+        X, theta = np.empty((self._rows, count)), np.empty(count)
         for k in range(count):
-            solver.getEigenvector(k, vector)
+            theta[k] = 1.0 / solver.getEigenpair(k, vector).real
             X[:, k] = vector.array_r
         solver.destroy()
-        return self._orthonormal(X)
+        mass.destroy()
+        return X, theta
 
     def _orthonormal(self, X: Array) -> Array:
-        """X made M-orthonormal to rounding, the lowest changed least."""
+        """X made M-orthonormal to rounding, the first changed least."""
         for _ in range(2):  # twice is enough (Kahan; Parlett, The Symmetric Eigenvalue Problem, §6.9)
             gram = self._total(X.T @ (self._mass @ X))
             X = np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), X.T).T

@@ -72,13 +72,7 @@ class FixedInterfaceFlexibility:
 
     def __matmul__(self, loads: Array) -> Array:
         """Displacements under loads (3 owned, k); collective."""
-        return self._at_rest(self._free @ loads)
-
-    def allowed(self, U: Array) -> Array:
-        """U (3 owned, k) less what the supports and the interfaces at rest do not allow; collective."""
-        return self._at_rest(self._free.allowed(U))
-
-    def _at_rest(self, U: Array) -> Array:
+        U = self._free @ loads
         return np.asarray(U - self._shapes @ (self._inverse @ self.model.total(self._rows @ U)))
 
 

@@ -13,13 +13,12 @@ from ...common.errors import InputError, quoted
 from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL
 from ..link_records.link import SolidLink
 from ..modal_body.attachment_modes import Modes, ascending
-from ..modal_body.lanczos import BlockLanczos
+from ..modal_body.krylov_schur import KrylovSchur
 from .elasticity import Mass
 from .families import NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 
 if TYPE_CHECKING:
-    from ..modal_body.krylov_schur import KrylovSchur
     from .attachment_modes import FixedInterfaceFlexibility
     from .supports import Flexibility
 
@@ -44,7 +43,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     batch = needed + 2 if family == "all" else 2 * needed + 2
     key = "count" if link.modes.indices is None else "indices"
     most = min(available, 40 * needed + 200)  # far more than slender parts need
-    search = _search(link, flexibility, mass)
+    search = KrylovSchur(flexibility, mass, 3 * model.owned, flexibility.rank, comm=model.comm, total=model.total)
     found = 0
     while True:
         if (family == "all" and needed > available) or found == available:
@@ -74,23 +73,6 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
             )
         share = max(len(hits), 1) / found
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
-
-
-def _search(link: SolidLink, flexibility: Inverse, mass: Mass) -> BlockLanczos | KrylovSchur:
-    model = flexibility.model
-    if link.modes.solver == "slepc":
-        from ..modal_body.krylov_schur import KrylovSchur  # loads SLEPc
-
-        return KrylovSchur(flexibility, mass, 3 * model.owned, comm=model.comm, total=model.total)
-    return BlockLanczos(
-        flexibility,
-        mass,
-        3 * model.owned,
-        flexibility.rank,
-        total=model.total,
-        allowed=flexibility.allowed,
-        process=model.comm.rank,
-    )
 
 
 def _lowest_of_each(hits: Sequence[int], kinds: Sequence[str]) -> list[int]:

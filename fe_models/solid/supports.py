@@ -99,15 +99,6 @@ class Flexibility:
         total = 3 * self.model.V.dofmap.index_map.size_global - self.model.comm.allreduce(int(self.clamped.sum()))
         return int(total + self.W.shape[1] - (0 if self.B is None else len(self.B)))
 
-    def allowed(self, U: Array) -> Array:
-        """U (3 owned, k) less what the supports do not allow: plates move as such, mean supports rest; collective."""
-        if self.faces:
-            T = self.W[self.clamped]
-            q = np.linalg.solve(self.model.total(T.T @ T), self.model.total(T.T @ U[self.clamped]))
-            U = U.copy()
-            U[self.clamped] = T @ q
-        return self._projected(U)
-
     def release(self) -> None:
         """Free the factors: no loads after that; collective."""
         self._factor.release()

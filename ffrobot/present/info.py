@@ -50,6 +50,7 @@ def _modal_body(body: ModalBody) -> str:
     lines = [
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
+        *(f"{name}: {text}" for name in ("assembly", "eigensolver") if (text := getattr(body, name))),
         f"mass {body.mass:.6g} kg, center of mass {center}",
         f"interfaces: {', '.join(_interface(body, name, one) for name, one in body.interfaces.items())}",
         f"stations: {len(body.stations.position)} along the axis",

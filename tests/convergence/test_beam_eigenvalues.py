@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from ffrobot.common.errors import SolveError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.beam import family_model
+from ffrobot.fe_models.beam.dolfinx_forms import BeamForms
 from ffrobot.fe_models.beam.eigen import lowest_modes
 from ffrobot.fe_models.link_records.link import BeamLink
 
@@ -49,7 +50,7 @@ def nodes_of(kind, elements, breakpoints=(0.0, LENGTH)):
 
 
 def frequencies(link, family, nodes, count=3):
-    model = family_model(link, family, nodes, np.array([0.0, LENGTH]))
+    model = family_model(link, family, BeamForms(nodes), np.array([0.0, LENGTH]))
     return np.sqrt(lowest_modes(model.K, model.M, model.strain, count)[0])
 
 
