@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
+from ...mbs._core import TimeFunction
 from ...mbs.analysis.context import place_of
 from ...mbs.analysis.drive import Control, drive_robot
 from ...mbs.analysis.forward import actuator_commands, largest_moments
@@ -24,6 +26,7 @@ from ...mbs.model.model import Model, without_paths
 from ...mbs.solve.linearisation import LinearEquations
 from ...mbs.solve.statics import initial_state
 from ..context import ActuatedContext
+from ..patches.link_patches import LinkPatches
 from .controllers import (
     ComputedTorqueControl,
     Controller,
@@ -34,14 +37,16 @@ from .controllers import (
     load_function,
     modal_velocity,
 )
+from .linear import voltages_at
 from .linear_model import LinearModel, state_space
 from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
-from .margins import lowest_frequency
-from .metrics import Followed, place_of_tip
+from .margins import Feedback, lowest_frequency
+from .metrics import Followed, last_change, place_of_tip
+from .probing import LONGEST, find_feedback
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, SampledAnalysis, Sensor
 from .records import Controller as Record
 from .robot import Robot, input_names
-from .signals import Sensing, make_signals, merged
+from .signals import Sensing, Signal, make_signals, merged
 
 APART = 1e-6  # of a run, between two times of a spline
 
@@ -128,7 +133,7 @@ class ClosedLoop(SampledAnalysis):
         read = merged(given, more)
         sensing = Sensing(plant, read)
         outputs, tip = replay_times(source, self), place_of(whole, self.tip) or _default_tip(plant)
-        models = loop_models(plant, source.time, moved)
+        models = loop_models(plant, source.time, moved, context.patches, read)
         place_at = _place_of_tip(self, plant, source, tip)
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
         times, rows = times_of_run(outputs, place_at, lowest)
@@ -142,6 +147,7 @@ class ClosedLoop(SampledAnalysis):
         )  # fmt: skip
         acting = [make_controller(record, setup, self.controller) for record in self.controller]
         limit = np.full(len(setup.inputs), np.inf) if self.unlimited else _limits(context)
+        begun = [of if isinstance(of, PythonControl) else copy(of) for of in acting]
         loop = Loop(setup, read, acting, limit, self.seed)
         splits = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
 
@@ -158,8 +164,10 @@ class ClosedLoop(SampledAnalysis):
             control=control,
         )  # fmt: skip
         closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
-        runs = _followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)
-        record = loop_record(self, setup, loop, acting, runs, models, lowest, gears=bool(plant.tree.gears))
+        quiet = max((last_change(partial(_values, of, self), outputs) for of in _exciting(plant, self)), default=0.0)
+        runs = _followed(run, place_at, held, tip, quiet), _followed(closer, place_at, held, tip, quiet)
+        loops = loops_about(setup, begun, loop.readings[: loop.taken], models)
+        record = loop_record(self, setup, loop, acting, runs, loops, lowest, gears=bool(plant.tree.gears))
 
         def completed(of: Outcome) -> Outcome:
             commanded = context.model.by_motor(held(of.time))
@@ -182,13 +190,50 @@ def _robot(context: ActuatedContext, source: Outcome) -> Robot:
     return Robot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
 
 
-def loop_models(model: Model, time: Array, reference: MotorCoordinates) -> tuple[LinearModel, ...]:
-    """The robot at rest on its reference at start, middle and end; none where it is singular, or has none yet."""
+def loop_models(
+    model: Model, time: Array, reference: MotorCoordinates, patches: Mapping[str, LinkPatches], read: Sequence[Signal]
+) -> tuple[LinearModel, ...]:
+    """The robot at rest on its reference at start, middle and end, with what signals read among its outputs.
+
+    None where it is singular, or has none yet.
+    """
     rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
+    points = {signal.of.split("/")[1]: signal.point for signal in read if signal.point}
+    along = {signal.of: signal.along for signal in read if not signal.point}
     with suppress(SolveError, InputError):
-        linearisation = LinearEquations(model, reference.q[0])
-        return tuple(state_space(linearisation.at(float(time[k]), reference.q[k], rest, rest), {}) for k in rows)
+        linearisation, found = LinearEquations(model, reference.q[0], points), []
+        for k in rows:
+            at = linearisation.at(float(time[k]), reference.q[k], rest, rest)
+            outputs = dict(at.outputs) | {name: of @ at.transformation for name, of in along.items()}
+            found.append(state_space(replace(at, outputs=outputs), voltages_at(model, at, patches)))
+        return tuple(found)
     return ()
+
+
+def loops_about(
+    setup: Setup, controllers: Sequence[Controller], readings: Array, models: Sequence[LinearModel]
+) -> list[tuple[LinearModel, Feedback]]:
+    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there."""
+    is_asked_in_order = any(isinstance(controller, PythonControl) for controller in controllers)
+    latest = 0 if is_asked_in_order else max(len(setup.times) - LONGEST, 0)
+    at = cache(partial(find_feedback, setup, controllers, readings))
+    found = [(model, at(min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
+    known = [(model, feedback) for model, feedback in found if feedback is not None]
+    return known if len(known) == len(found) else []
+
+
+def _exciting(model: Model, analysis: ClosedLoop) -> Iterator[TimeFunction]:
+    """Paths and loads."""
+    for path in model.scene.trajectory:
+        yield from (target for _, target in path.targets)
+    yield from model.scene.load_functions
+    for load in analysis.disturbance:
+        yield from load.components.values()
+
+
+def _values(of: TimeFunction, analysis: ClosedLoop, time: Array) -> Array:
+    """(T, 1) at `time` (T,), s, held outside the run."""
+    return of.sample(np.clip(time, 0.0, analysis.last_time))[0][:, None]
 
 
 def _feed_forward(
@@ -233,15 +278,17 @@ def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: 
     return State(q, v)
 
 
-def _followed(run: Outcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str) -> Followed:
-    """Where the tip went against where it should be."""
+def _followed(
+    run: Outcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str, quiet: float
+) -> Followed:
+    """Where the tip went against where it should be; `quiet` as there."""
     assert isinstance(run.analysis, ClosedLoop)
     model = run.model
     columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
     rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
-    completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
     error = _position(run, tip) - place_at(run.time)
-    return Followed(run.time, error, place_at, rates, held(run.time), completed, is_disturbed)
+    completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
+    return Followed(run.time, error, place_at, rates, held(run.time), completed, is_disturbed, quiet)
 
 
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str) -> Callable[[Array], Array]:

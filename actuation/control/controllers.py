@@ -26,7 +26,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, SolveError, quoted
 from ...common.python_files import count_failed, count_imports, imported_files
 from ...common.structs import struct
@@ -116,7 +116,7 @@ class LinearFeedback:
             u += self.D @ (e - (e if self.before is None else self.before)) / self.T
             self.before = e
         if self.integral is not None:
-            self.sum += self.T * e
+            self.sum = self.sum + self.T * e
             u += self.integral @ self.sum
         return u
 
@@ -197,6 +197,7 @@ class PythonControl:
 
     def __init__(self, factory: Callable[[Setup], Callable[[int, Array], Array]], setup: Setup, label: str) -> None:
         self.label, self.size, self.times = label, len(setup.inputs), setup.times
+        self.made_by = factory, setup, label
         try:
             self.act = factory(setup)
         except (Exception, SystemExit) as error:  # the user's code may raise anything
@@ -213,6 +214,10 @@ class PythonControl:
         if u.shape != (self.size,) or not np.isfinite(u).all():
             raise SolveError(f"{self._at(k)}: expected {self.size} finite commands, found shape {u.shape}: {u}")
         return u
+
+    def __copy__(self) -> PythonControl:
+        """As at the start of a run: what the user's function remembers cannot be copied."""
+        return PythonControl(*self.made_by)
 
     def _at(self, k: int) -> str:
         return f"{self.label}: sample {k}, t = {self.times[k]:g} s"
@@ -257,10 +262,16 @@ class Loop:
         self._coarse = np.flatnonzero(resolution)
         self._resolution = resolution[self._coarse]
         self._controllers, self._limit, self._feed_forward = controllers, limit, setup.feed_forward
+        self.blur = resolution + noise  # (outputs,)
         self.readings = np.zeros(samples)
         self.commands, self.wanted = np.zeros_like(setup.feed_forward), np.zeros_like(setup.feed_forward)
         self.first: Array = np.clip(setup.feed_forward[0], -limit, limit)
         self.taken = 0
+
+    @property
+    def at_limits(self) -> Booleans:
+        """(K, inputs) at the samples taken, also where a controller has cut its commands itself."""
+        return np.abs(self.commands[: self.taken]) >= self._limit * (1.0 - 1e-9)
 
     def __call__(self, k: int, _t: float, y: Array) -> Array:
         """Commands at sample k for what the sensors are exposed to."""

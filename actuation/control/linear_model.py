@@ -177,19 +177,22 @@ class SampledModel:
     B: Array
 
 
-def sampled(A: Array, B: Array, T: float, delay: float) -> SampledModel:
-    """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3)."""
+def sampled(A: Array, B: Array, T: float, delay: float, *, with_last: bool = False) -> SampledModel:
+    """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3).
+
+    `with_last`: without delay, too, the last command is a state, which acts until the sample.
+    """
     n, m = B.shape
     late, fraction = divmod(delay, T)
     is_whole = fraction <= 1e-9 * T
-    waiting = int(late) + (not is_whole)
+    waiting = max(int(late) + (not is_whole), int(with_last))
     Phi, Gamma = _zero_order_hold(A, B, T)
     early = Gamma if is_whole else _zero_order_hold(A, B, T - fraction)[1]
     columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
     columns[:n, :n] = Phi
     columns[n:, n + m :] = np.eye(waiting * m)
     columns[:n, n : n + m] = Gamma - early  # the oldest command acts for the first part of the interval
-    next_one = n if is_whole else n + m
+    next_one = n + m * (waiting - int(late))
     columns[:n, next_one : next_one + m] = early
     return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :])
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,9 +12,8 @@ from ...common.structs import struct
 from ...mbs.analysis.outcome import Details
 from ...mbs.analysis.samples import in_order
 from .controllers import Controller, Loop, Setup
-from .linear_model import LinearModel
-from .margins import Margins, advice, joint_gains, margins
-from .metrics import Followed, Metrics, measure, resting, ringing, watched
+from .margins import Loops, Margins, advice, margins
+from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched
 from .records import ComputedTorque, JointPid, Lqr, SampledAnalysis
 
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
@@ -37,7 +35,7 @@ class LoopRecord(Details):
     tip_error_peak_time: float  # s, of the largest at all times
     metrics: Metrics  # how well it went
     warnings: tuple[str, ...]  # one line each
-    margins: Margins | None = None  # by the linear model, of loops of joint PID controllers alone; else None
+    margins: Margins | None = None  # by the linear model; None where controllers, or the robot, are not linear
     advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
 
 
@@ -84,39 +82,35 @@ def loop_record(
     loop: Loop,
     acting: Sequence[Controller],
     runs: tuple[Followed, Followed],
-    models: Sequence[LinearModel],
+    loops: Loops,
     lowest: float,
     *,
     gears: bool,
 ) -> LoopRecord:
-    """Of a run at its outputs, and at these and between; `models` on the reference, none where it is singular.
+    """Of a run at its outputs, and at these and between; linear `loops` on the reference, none where it has none.
 
     `lowest`: as in `measure`. `gears`: some give.
     """
     taken, (at_outputs, run) = slice(loop.taken), runs
-    tip_error, metrics = np.linalg.norm(at_outputs.error, axis=1), measure(run, setup, loop, lowest)
-    warnings = tuple(_warnings(analysis, acting, metrics, gears))
-    record = LoopRecord(
+    T, delay = analysis.sample_time, analysis.delay
+    found = margins(loops, T, delay) if loops else None
+    metrics = measure(run, setup, loop, lowest, None if found is None else found.is_stable)
+    tip_error = np.linalg.norm(at_outputs.error, axis=1)
+    warnings = tuple(_warnings(analysis, acting, metrics, found, gears))
+    pids = [controller for controller in analysis.controller if isinstance(controller, JointPid)]
+    texts: list[str] = []
+    if found is not None and metrics.verdict not in CALM:
+        texts = advice(loops, pids if len(pids) == len(analysis.controller) else (), T, delay, found)
+    return LoopRecord(
         setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
         loop.commands[taken], loop.wanted[taken], tip_error,
-        largest(run.time, np.linalg.norm(run.error, axis=1))[1], metrics, warnings,
+        largest(run.time, np.linalg.norm(run.error, axis=1))[1], metrics, warnings, found, tuple(texts),
     )  # fmt: skip
-    return _judged(record, analysis, models)
 
 
-def _judged(record: LoopRecord, analysis: SampledAnalysis, models: Sequence[LinearModel]) -> LoopRecord:
-    """With margins of the loop, and advice where it is not stable, by linear models on the reference."""
-    pids = [controller for controller in analysis.controller if isinstance(controller, JointPid)]
-    if not models or not pids or len(pids) < len(analysis.controller):
-        return record
-    T, delay = analysis.sample_time, analysis.delay
-    found = margins(models, joint_gains(models[0], pids), T, delay)
-    is_stable = record.metrics.verdict == "stable" and found.is_stable
-    texts = () if is_stable else tuple(advice(models, pids, T, delay, found))
-    return replace(record, margins=found, advice=texts)
-
-
-def _warnings(analysis: SampledAnalysis, controllers: Sequence[Controller], metrics: Metrics, gears: bool) -> list[str]:
+def _warnings(
+    analysis: SampledAnalysis, controllers: Sequence[Controller], metrics: Metrics, found: Margins | None, gears: bool
+) -> list[str]:
     lines = [line for controller in controllers for line in getattr(controller, "warnings", ())]
     fastest = max((controller.bandwidth for controller in controllers), default=0.0)
     sampling = 2 * np.pi / analysis.sample_time
@@ -127,6 +121,8 @@ def _warnings(analysis: SampledAnalysis, controllers: Sequence[Controller], metr
         )
     if gears and any(isinstance(record, Lqr | ComputedTorque) for record in analysis.controller):
         lines.append("the controller is designed for rigid gears, but some are compliant")
-    if metrics.verdict != "stable":
-        lines.append(f"the loop {metrics.verdict}: gains too high for sampling and delay, or for the links?")
+    if metrics.verdict not in CALM:
+        by_model = "" if found is None else f" (largest |eigenvalue| of the sampled linear loop: {found.radius:.6g})"
+        why = ": gains too high for sampling and delay, or for the links?" if controllers else ""
+        lines.append(f"loop {metrics.verdict}{by_model}{why}")
     return lines

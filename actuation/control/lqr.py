@@ -78,13 +78,14 @@ class LqrControl:
         e = y - self.reference[k]
         change = e - (e if self.before is None else self.before)
         self.before = e
-        x, f = self.x, self.f
+        x, f = self.x.copy(), self.f
         x[:f] = self.values @ e
         x[f : 2 * f] = self.rates @ e + self.differences @ change
         command = -self.K @ x
         if len(x) > 2 * f:
             x[2 * f : -len(command)] = x[2 * f + len(command) :]
             x[-len(command) :] = command
+        self.x = x
         u = np.zeros(self.size)
         u[self.inputs] = command
         return u

@@ -1,8 +1,9 @@
-"""Stability of sampled joint PID loops by the linear model.
+"""Stability of sampled loops by the linear model.
 
-The loop is judged as it acts: moments are held between samples and begin `delay` after their reading. Of the model
-sampled exactly (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3) the loop x(k+1) = F x(k) is stable where
-the spectral radius of F is below 1. Margins are by how much all gains, or the delay, may grow until it is 1.
+The loop is judged as it acts: commands are held between samples and begin `delay` after their reading. Of the model
+sampled exactly (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3) with the states of the controllers the
+loop x(k+1) = F x(k) is stable where the spectral radius of F is below 1. Margins are by how much all commands of the
+controllers, or the delay, may grow until it is 1.
 
 Gains for joint PD controllers to start with, and why a loop is not stable: by the linear model.
 
@@ -14,6 +15,7 @@ rigid robot. The sampled model has the last word (see `margins`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -35,17 +37,24 @@ RIGID = 1e-6  # of the fastest eigenvalue: slower ones are rounding of motion wi
 
 
 @struct
-class JointGains:
-    """u = −(P y + D ẏ + D' (y − y₋)/T + I Σ T y) with matrices (motors, outputs); y are the joints' errors."""
+class Feedback:
+    """ξ(k+1) = A ξ + B y, u = C ξ + D y: what controllers command for readings off their reference."""
 
-    P: Array
+    A: Array
+    B: Array
+    C: Array
     D: Array
-    difference: Array
-    integral: Array
+    # of commands and readings; a reading's rate is "NAME/rate", its acceleration "NAME/acceleration"
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
 
-    def times(self, factor: float) -> JointGains:
-        """All gains times a factor."""
-        return JointGains(*(factor * matrix for matrix in (self.P, self.D, self.difference, self.integral)))
+    def times(self, factor: float) -> Feedback:
+        """All commands times a factor."""
+        return replace(self, C=factor * self.C, D=factor * self.D)
+
+
+Loops = Sequence[tuple[LinearModel, Feedback]]
+"""A loop in several configurations."""
 
 
 @struct
@@ -62,19 +71,26 @@ class Margins:
         return self.radius <= STABLE
 
 
-def joint_gains(model: LinearModel, records: Sequence[JointPid]) -> JointGains:
-    """The gains of joint PID controllers, which add up."""
-    shape = (len(motor_inputs(model)), len(model.output_names))
-    P, D, difference, integral = (np.zeros(shape) for _ in range(4))
-    motors = [model.input_names[k] for k in motor_inputs(model)]
+def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Feedback:
+    """Joint PID controllers, which add up: −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋ and Σ T y."""
+    inputs = tuple(model.input_names[k] for k in motor_inputs(model))
+    P, D, difference, integral = (np.zeros((len(inputs), len(model.output_names))) for _ in range(4))
     for record in records:
-        for joint, motor in [(name, motor) for name in record.joints for motor in _motors_of(name, motors)]:
+        for joint, motor in [(name, motor) for name in record.joints for motor in _motors_of(name, inputs)]:
             output = motor.replace("joint/", f"{record.side}/", 1)
-            at = motors.index(motor), model.outputs(output)[0]
+            at = inputs.index(motor), model.outputs(output)[0]
             P[at] += record.proportional.get(joint, 0.0)
             (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
             integral[at] += record.integral.get(joint, 0.0)
-    return JointGains(P, D, difference, integral)
+    o, none = len(P[0]), np.zeros((len(P[0]), len(P[0])))
+    names = (*model.output_names, *(f"{name}/rate" for name in model.output_names))
+    used = np.append(difference.any(axis=0), integral.any(axis=0))  # sums without a gain would stay at 1
+    into = np.block([[np.eye(o), none], [T * np.eye(o), none]])
+    return Feedback(
+        np.diag(np.repeat([0.0, 1.0], o))[np.ix_(used, used)], into[used],
+        np.hstack([difference / T, -integral])[:, used], np.hstack([-P - difference / T - T * integral, -D]),
+        inputs, names,
+    )  # fmt: skip
 
 
 def _motors_of(joint: str, motors: Sequence[str]) -> list[str]:
@@ -88,9 +104,9 @@ def motor_inputs(model: LinearModel) -> list[int]:
     return [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]
 
 
-def spectral_radius(model: LinearModel, gains: JointGains, T: float, delay: float) -> float:
+def spectral_radius(model: LinearModel, feedback: Feedback, T: float, delay: float) -> float:
     """The largest |eigenvalue| of the sampled loop."""
-    return float(np.abs(loop_eigenvalues(model, gains, T, delay)).max())
+    return float(np.abs(loop_eigenvalues(model, feedback, T, delay)).max())
 
 
 def lowest_frequency(
@@ -106,7 +122,7 @@ def lowest_frequency(
     if any(not isinstance(record, JointPid | ModalVelocity) for record in controllers):
         locked *= 0.5
     elif pids and models:
-        gains = joint_gains(models[0], pids)
+        gains = joint_gains(models[0], pids, T)
         z = np.concatenate([_without_aliases(loop_eigenvalues(model, gains, T, delay), model, T) for model in models])
         s = np.log(z[np.abs(z) > GONE]) / T
         ringing = s[(s.imag > 0.0) & (-s.real < LIGHTLY * np.abs(s)) & (np.abs(s.imag) * T < np.pi * SAMPLED)]
@@ -123,32 +139,37 @@ def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexAr
     return z[distance > ALIAS * np.abs(z)]
 
 
-def loop_eigenvalues(model: LinearModel, gains: JointGains, T: float, delay: float) -> ComplexArray:
-    """Those of the matrix F of the sampled loop."""
-    f, m, o = model.freedom, len(gains.P), len(model.output_names)
-    plant = sampled(model.A, model.B[:, motor_inputs(model)], T, delay)
-    n = len(plant.A)
-    value, rate = np.zeros((o, n)), np.zeros((o, n))
-    value[:, :f] = rate[:, f : 2 * f] = model.C[:, :f]
-    # states: those of the plant with commands on their way, the last readings, and their sums
-    feedback = np.zeros((m, n + 2 * o))
-    feedback[:, :n] = (gains.P + gains.difference / T + T * gains.integral) @ value + gains.D @ rate
-    feedback[:, n : n + o] = -gains.difference / T
-    feedback[:, n + o :] = gains.integral
-    used = np.append(np.ones(n + o, dtype=bool), gains.integral.any(axis=0))  # sums without a gain would stay at 1
-    F = np.zeros((n + 2 * o, n + 2 * o))
-    F[:n, :n] = plant.A
-    F[:n] -= plant.B @ feedback
-    F[n : n + o, :n] = value
-    F[n + o :, :n], F[n + o :, n + o :] = T * value, np.eye(o)
-    return np.asarray(np.linalg.eigvals(F[np.ix_(used, used)]), dtype=complex)
+def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
+    """Those of the matrix F of the sampled loop: of the plant, commands on their way, and the controllers' states."""
+    seen, felt = _readings(model, feedback.outputs)
+    columns = model.inputs(feedback.inputs)
+    plant = sampled(model.A, model.B[:, columns], T, delay, with_last=bool(felt.any()))
+    y = np.zeros((len(seen), len(plant.A)))
+    y[:, : len(model.A)] = seen
+    if felt.any():  # accelerations under the oldest command on its way, which acts until the sample
+        y[:, len(model.A) : len(model.A) + len(columns)] = felt[:, columns]
+    F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
+    return np.asarray(np.linalg.eigvals(F), dtype=complex)
 
 
-def margins(models: Sequence[LinearModel], gains: JointGains, T: float, delay: float) -> Margins:
-    """Of a loop about each of the `models`, the worst."""
+def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
+    """What sensors read of states (readings, 2f), and of inputs (readings, inputs)."""
+    f, seen, felt = model.freedom, np.zeros((len(names), len(model.A))), np.zeros((len(names), model.B.shape[1]))
+    for row, name in enumerate(names):
+        of, _, order = name.rpartition("/")
+        along = model.C[model.outputs(of if order in ("rate", "acceleration") else name)[0], :f]
+        if order == "acceleration":
+            seen[row], felt[row] = along @ model.A[f:], along @ model.B[f:]
+        else:
+            seen[row, f * (order == "rate") :][:f] = along
+    return seen, felt
+
+
+def margins(loops: Loops, T: float, delay: float) -> Margins:
+    """Of a loop in several configurations, the worst."""
 
     def radius(factor: float, more: float) -> float:
-        return max(spectral_radius(model, gains.times(factor), T, delay + more) for model in models)
+        return max(spectral_radius(model, of.times(factor), T, delay + more) for model, of in loops)
 
     now = radius(1.0, 0.0)
     if now > STABLE:
@@ -235,7 +256,7 @@ def suggested_gains(
     for _ in range(MOST_TIMES):
         P, D = ({n: _two_digits(v) for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
         record = JointPid(kind="joint-pid", proportional=P, derivative=D, side=side)
-        twice = joint_gains(models[0], [record]).times(SPARE)
+        twice = joint_gains(models[0], [record], T).times(SPARE)
         if all(spectral_radius(model, g, T, delay) <= STABLE for model in models for g in (twice, twice.times(0.5))):
             return Suggestion(P, D, float(omega / (2 * np.pi)))
         omega *= SMALLER
@@ -274,11 +295,9 @@ def light_roots(models: Sequence[LinearModel]) -> list[str]:
     return list(found)
 
 
-def advice(
-    models: Sequence[LinearModel], records: Sequence[JointPid], T: float, delay: float, found: Margins
-) -> list[str]:
-    """Why a loop of joint PID controllers that is not stable is so, and gains to start with."""
-    gains = joint_gains(models[0], records)
+def advice(loops: Loops, records: Sequence[JointPid], T: float, delay: float, found: Margins) -> list[str]:
+    """Why a loop is not stable, and gains to start with where `records` of joint PID controllers are all of it."""
+    models = [model for model, _ in loops]
     texts = []
     if found.is_stable and found.gain < NARROW:
         texts.append(
@@ -290,11 +309,13 @@ def advice(
             "the linear model of the loop is stable, so limits of motors, a disturbance or the size of the motion drive"
             " it away: smaller steps of the path, or motors with higher limits"
         )
-    elif max(spectral_radius(model, gains, T / 10, delay / 10) for model in models) <= STABLE:
-        texts.append(
-            f"the loop is stable with a tenth of sample_time{' and delay' if delay else ''}: sampling every {T:g} s is"
-            " too slow for these gains"
-        )
+    elif records:
+        faster = joint_gains(models[0], records, T / 10)
+        if max(spectral_radius(model, faster, T / 10, delay / 10) for model in models) <= STABLE:
+            texts.append(
+                f"the loop is stable with a tenth of sample_time{' and delay' if delay else ''}: sampling every {T:g} s"
+                " is too slow for these gains"
+            )
     if 0.0 < found.gain < 1.0:
         texts.append(f"gains too high: times {found.gain:.2g} they are at the bound of stability")
     if light := light_roots(models):
@@ -302,6 +323,8 @@ def advice(
             f"{', '.join(light)}: negligible rotor_inertia at the joint, so that a torque turns the root of the"
             " link at once: specify the inertia of the rotor (or hub)"
         )
+    if not records:
+        return texts
     if (suggestion := suggested_gains(models, T, delay, records[0].side)) is not None:
         texts.append(f"start with {suggestion.in_words()}")
     else:

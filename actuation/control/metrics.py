@@ -35,6 +35,12 @@ FINE = 4000  # intervals of a run, at which its place is read
 WINDOW = 0.1  # s at least, over which motion that a cubic follows is no vibration, for the verdict
 GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its last
 AT_REST = 1e-6  # of the way to the last place
+AT_LIMITS = 0.05  # of the samples
+KEPT = 0.5  # of the vibration of a quarter, in its second half
+NEGLIGIBLE = 1e-3  # of the largest motion, or of the way
+ROUND_OFF = 1e-9  # m
+JITTER = 20.0  # times noise and resolution of a sensor
+CALM = ("stable", "not settled")
 
 DEFINITIONS = (
     "settling time: the tip error stays below 5 % of its largest value; overshoot: beyond the final position along"
@@ -47,7 +53,7 @@ DEFINITIONS = (
 class Metrics:
     """One run in numbers; see `DEFINITIONS`."""
 
-    verdict: str  # "stable", "grows" (vibration, quarter by quarter of an undisturbed run) or "diverges"
+    verdict: str  # see `_verdict`
     # tip_error_rms, tip_error_max: distance of the tip from its place, m
     tip_error_rms: float
     tip_error_max: float
@@ -59,7 +65,7 @@ class Metrics:
     voltage_effort: float  # ∫ Σ V² dt, V² s
     peak_moment: float  # N·m
     peak_voltage: float  # V
-    saturated: float  # part of the samples at which a command was cut
+    saturated: float  # part of the samples at which a command is at its limit
     # of the tip beyond its last place along the line from the first place to it, m
     overshoot: float = np.nan  # these are not in files of version 0.1
     # about which vibration is measured, Hz, see `ringing`; NaN where the linear model has none
@@ -78,19 +84,24 @@ class Followed:
     held: Array  # (T, inputs) commands
     completed: bool  # whether it came to its end
     is_disturbed: bool  # by loads that the reference does not know
+    quiet: float  # s, from which on the reference rests and loads stay
 
 
-def measure(run: Followed, setup: Setup, loop: Loop, lowest: float) -> Metrics:
-    """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN."""
+def measure(run: Followed, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
+    """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN.
+
+    `is_stable`: the sampled linear loop; None where it is not known.
+    """
     t, motors = run.time, len(setup.robot.motors)
     distance = np.linalg.norm(run.error, axis=1)
     taken = slice(loop.taken)
     moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
     work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
-    cut = (loop.commands[taken] != loop.wanted[taken]).any(axis=1)
+    cut = np.sign(loop.commands[taken]) * loop.at_limits
+    asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0)
     lowest, window = ringing(*resting(run.place_at, t), lowest)
     return Metrics(
-        _verdict(run, lowest),
+        _verdict(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
         root_mean_square(t, distance),
         largest(t, distance)[0],
         _settling(t, distance),
@@ -100,7 +111,7 @@ def measure(run: Followed, setup: Setup, loop: Loop, lowest: float) -> Metrics:
         float((volts**2).sum() * setup.sample_time),
         float(np.abs(moments).max(initial=0.0)),
         float(np.abs(volts).max(initial=0.0)),
-        float(cut.mean()),
+        float(cut.any(axis=1).mean()),
         overshoot(t, run.place_at(t), run.error),
         lowest,
         window,
@@ -231,14 +242,61 @@ def _last_crossing(t: Array, values: Array, level: float) -> float:
     return float(t[k] + share * step)
 
 
-def _verdict(run: Followed, lowest: float) -> str:
-    """Of vibration as fast as `lowest` (Hz), quarter by quarter."""
+def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
+    """When (s) what has `values_at` times (T, d) comes to where it is at the end of `time` (T,), s."""
+    even, values = resting(values_at, time)
+    way = np.linalg.norm(values - values[-1], axis=1)
+    changing = np.flatnonzero(way > AT_REST * way.max(initial=0.0))
+    return float(even[min(changing[-1] + 1, FINE)]) if changing.size else float(time[0])
+
+
+def _verdict(
+    run: Followed, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
+) -> str:
+    """Of the sampled linear loop, where that is known, and of the run; `cut` (K, inputs): 1 and -1 at limits, else 0.
+
+    "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
+    decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without
+    disturbance, or of the time in which nothing changes, or what is `asked` then, by samples (K,) in s and the largest
+    of their commands (K,); "unstable (linear)"; "not settled": in that time the tip does not come to rest, though
+    sensors are exact; else "stable".
+    """
     if not run.completed:
         return "diverges"
     even = np.linspace(run.time[0], run.time[-1], len(run.time))
-    error = _interpolated(even, run.time, run.error)
-    window = WINDOW if not lowest > 0.0 else max(WINDOW, min(PERIODS / lowest, np.ptp(even) / 4))
+    error, whole = _interpolated(even, run.time, run.error), float(np.ptp(even))
+    window = WINDOW if not lowest > 0.0 else max(WINDOW, min(PERIODS / lowest, whole / 4))
     shaking = np.linalg.norm(error - _slow(even, error, window), axis=1)
+    off = np.linalg.norm(error - error[-1], axis=1)
+    still = even >= run.quiet
+    is_quiet = even[-1] - run.quiet >= RESTING * whole
+    third, fourth = (shaking[even >= even[-1] - part * whole].max(initial=0.0) for part in (1 / 4, 1 / 8))
+    last = cut[3 * len(cut) // 4 :]
+    is_cut = last.any(axis=1).mean() > AT_LIMITS and (is_stable is False or is_quiet)
+    alternates = all((half.min(axis=0) * half.max(axis=0) < 0.0).any() for half in np.array_split(last, 2) if len(half))
+    if is_cut and (alternates or fourth > max(KEPT * third, NEGLIGIBLE * off.max(initial=0.0))):
+        return "oscillates at its limits"
+    if (not run.is_disturbed and _grows(shaking)) or (
+        is_quiet and (_grows(shaking[still]) or _grows(asked[1][asked[0] >= run.quiet]))
+    ):
+        return "grows"
+    if is_stable is False:
+        return "unstable (linear)"
+    period = 1.0 / lowest if lowest > 0.0 else 0.0
+    tail = min(max(RESTING * whole, period), (even[-1] - run.quiet) / 2)
+    moves, least = off[even >= even[-1] - tail].max(initial=0.0), np.linalg.norm(np.ptp(run.place_at(even), axis=0))
+    is_settled = moves <= max(SETTLED * off.max(initial=0.0), NEGLIGIBLE * least, ROUND_OFF)
+    return "stable" if is_settled or not is_quiet or not is_seen else "not settled"
+
+
+def _is_seen(loop: Loop, setup: Setup) -> bool:
+    """Whether sensors move at the end by more than their noise and resolution may be the cause of."""
+    end = slice(loop.taken - max(round(RESTING * loop.taken), 1), loop.taken)
+    moves, blurred = np.ptp(loop.readings[end] - setup.reference[end], axis=0), loop.blur > 0.0
+    return not blurred.any() or bool((moves > JITTER * loop.blur)[blurred].any())
+
+
+def _grows(shaking: Array) -> bool:
+    """From quarter to quarter of its times."""
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]
-    growing = quarters[1] < quarters[2] < quarters[3] and quarters[3] > GROWTH * quarters[1]
-    return "grows" if growing and not run.is_disturbed else "stable"
+    return bool(quarters[1] < quarters[2] < quarters[3] and quarters[3] > max(GROWTH * quarters[1], ROUND_OFF))

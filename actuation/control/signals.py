@@ -42,6 +42,11 @@ class Signal:
     point: str = ""
     axis: int = 0
 
+    @property
+    def of(self) -> str:
+        """The name without what is behind it."""
+        return self.name if self.order == ORDERS["value"] else self.name.rpartition("/")[0]
+
 
 class Sensing:
     """What signals read of states of a tree."""

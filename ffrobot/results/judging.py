@@ -106,7 +106,9 @@ def _answer(
         held = f", {100 * about['saturated']:.2g} % of the samples saturated" if about["saturated"] else ""
         most, rms = (millimeters(about[f"tip_error_{key}"]) for key in ("max", "rms"))
         error = f"tip off by {most} at most, {rms} RMS"
-        return f"loop {about['verdict']}: {error}{held}", None
+        is_settled = about["verdict"] == "stable" and np.isfinite(about["settling_time"])
+        alone = "" if "spectral_radius" in about else ", by the run alone"
+        return f"loop {'settled' if is_settled else about['verdict']}{alone}: {error}{held}", None
     if "feasibility" not in group or _ended_early(group):
         return "", None
     short = dict(_short(motors, patches))
@@ -215,7 +217,7 @@ def _advice(
     if "control" in group:
         about = group["control"].attrs
         yield from map(str, found := about.get("advice", ()))
-        if not len(found) and about["verdict"] != "stable":
+        if not len(found) and about["verdict"] not in ("stable", "not settled"):
             yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
 
 
@@ -230,7 +232,7 @@ def _is_from_rest_to_rest(group: h5py.Group) -> bool:
 
 
 def _margins(group: h5py.Group) -> str:
-    """Of a closed loop of joint PID controllers."""
+    """Of a closed loop, by its linear model."""
     about = group["control"].attrs if "control" in group else {}
     if "gain_margin" not in about:
         return ""

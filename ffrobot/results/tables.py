@@ -63,7 +63,7 @@ def volts(value: float) -> str:
 def loop_cells(metrics: Metrics) -> Cells:
     """How well a closed loop follows its reference, and what that takes."""
     return {
-        "verdict": metrics.verdict,
+        "verdict": metrics.verdict.partition(" ")[0].replace("not", "stable"),  # and settling: "no"
         "rms (mm)": f"{1e3 * metrics.tip_error_rms:.3g}",
         "max (mm)": f"{1e3 * metrics.tip_error_max:.3g}",
         "settling\n(s)": "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}",
