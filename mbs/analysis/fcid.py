@@ -11,7 +11,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array, as_floats, as_list
+from ...common.arrays import Array, Indices, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -28,6 +28,7 @@ from ..solve.prescribed import PrescribedMotion, prescribed_by, prescribed_motio
 from ..solve.reach import check_reach
 from ..solve.redundancy import resolved
 from ..solve.start import shape_in_redundant_loops, undeformed_posture
+from ..solve.statics import static_shapes
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 
@@ -193,44 +194,28 @@ def prescribed_shape(
 
 def _static(scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
-    nodes, stiffness = shape_nodes(analysis), np.concatenate([body.stiffness for body in bodies])
-    p = quasi_static_shape(motion, stiffness, nodes, posture)
-    is_found = np.isfinite(p).all(axis=1)
-    if not is_found.all():
+    nodes = shape_nodes(analysis)
+    near: Array = np.empty((0, len(posture)))
+
+    def forces(p: Array, at: Indices) -> Array:
+        nonlocal near
+        first = near[at] if len(near) else posture[None]  # from there one after the other
+        q, left = motion.left_on_modes(as_list(nodes[at]), p, 0 * p, 0 * p, first)
+        near = near if len(near) else q
+        near[at] = q
+        return left
+
+    def stiffness(p: Array, at: Indices) -> Array:
+        K = motion.derivatives(as_list(nodes[at]), p, 0 * p, 0 * p, near[at])[2]
+        return K.reshape(len(at), -1, p.shape[1])[:, : p.shape[1]]
+
+    omega = np.sqrt(np.concatenate([body.stiffness for body in bodies]))
+    sizes = np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
+    p, is_met = static_shapes(omega, sizes, forces, stiffness, len(nodes))
+    if not is_met.all():
         raise SolveError(
             f'{scene_path}: analysis "{analysis.name}": no static shape was found at'
-            f" t = {nodes[is_found.argmin()]:g} s: the links are too soft for their loads there"
+            f" t = {nodes[is_met.argmin()]:g} s: the links are too soft for their loads there"
         )
     functions = iter(spline(nodes, p))
     return [[next(functions) for _ in range(body.n_modes)] for body in bodies]
-
-
-MOST_ITERATIONS = 100
-SETTLED = 1e-14  # of a shape's size: what the next step would change
-TINY = 1e-300
-
-
-def quasi_static_shape(motion: PrescribedMotion, stiffness: Array, times: Array, posture: Array) -> Array:
-    """Shapes p (T, n) of all bodies at `times` (T,) with which nothing is left on modes, by p ← p − F_p/K.
-
-    With `stiffness` K (n,), from a posture (n_q,) near the first. NaN where that does not converge: links too soft for
-    their loads.
-    """
-    shape = np.zeros((len(times), len(stiffness)))
-    going, near, rate = np.arange(len(times)), posture[None], np.ones(len(times))  # by which a step shrinks
-    previous = np.zeros(len(times))
-    for _ in range(MOST_ITERATIONS):
-        p = shape[going]
-        near, left = motion.left_on_modes(as_list(times[going]), p, 0 * p, 0 * p, near)
-        step = left / stiffness
-        shape[going] -= step
-        size = np.linalg.norm(step, axis=1) / (np.linalg.norm(shape[going], axis=1) + TINY)
-        is_seen = (previous > 0) & (size > 10 * SETTLED)  # steps below that are rounding
-        rate[is_seen] = size[is_seen] / previous[is_seen]
-        on = ~(size * np.minimum(rate, 1.0) <= SETTLED) & np.isfinite(size)
-        shape[going[~np.isfinite(size)]] = np.nan
-        going, near, rate, previous = going[on], near[on], rate[on], size[on]
-        if not len(going):
-            break
-    shape[going] = np.nan
-    return shape

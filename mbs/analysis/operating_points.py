@@ -24,7 +24,7 @@ from ..solve.joint_conditions import JointCondition, joint_conditions, robot_mod
 from ..solve.linearisation import LinearEquations, LinearMechanism
 from ..solve.redundancy import resolved
 from ..solve.start import undeformed_posture
-from ..solve.statics import holding_multipliers, static_equilibrium, unstable_ways
+from ..solve.statics import Statics
 from .context import Context, place_of
 from .gears import with_motor_coordinates
 from .outcome import Details, Motion, Outcome, Statistics
@@ -37,16 +37,14 @@ def run_static(context: Context, analysis: Analysis) -> Outcome:
     """
     began = time.perf_counter()
     model = with_prescribed_motors(resolved(context.model, analysis.last_time))
-    q = static_equilibrium(model, undeformed_posture(model)).q[None]
+    statics = Statics(model)
+    q = statics.equilibrium(undeformed_posture(model).q)
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
-    multipliers = holding_multipliers(model, q[0])
     return Outcome(
         analysis=analysis,
         model=model,
-        motion=Motion(times, q, at_rest, at_rest, multipliers[None], is_at_rest=True),
-        statistics=Statistics(
-            wall_seconds=time.perf_counter() - began, warnings=tuple(unstable_ways(model, q[0], multipliers))
-        ),
+        motion=Motion(times, q[None], at_rest, at_rest, statics.holding_multipliers(q)[None], is_at_rest=True),
+        statistics=Statistics(wall_seconds=time.perf_counter() - began, warnings=tuple(statics.unstable_ways(q))),
     )
 
 

@@ -1,6 +1,6 @@
 // The recursion in joint coordinates (docs/developer/kernel.md), for tests and for what is built upon it.
-#include "core/recursion/constrained_aba/derivatives.h"
 #include "core/recursion/constrained_aba/independent_constraints.h"
+#include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/inverse/observe.h"
 
 #include <nanobind/stl/array.h>
@@ -71,19 +71,12 @@ Derivatives derivatives_at(Model<Space> &model, const Scene &scene, double t, co
   VectorXd force = supplied;
   if (const double *given = acting.generalized())
     force += Eigen::Map<const VectorXd>(given, force.size());
-  VectorXd wrench = VectorXd::Zero(Space::dim * static_cast<Index>(model.mechanism.wrenches.size()));
-  for (const PointLoad &load : scene.point_loads)
-    wrench[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
-  VectorXd along_cuts = VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()));
-  for (const CutLoad &load : scene.cut_loads)
-    along_cuts[load.joint] += load.share * load.magnitude(t).value;
-  std::vector<double> target;
-  for (const Jet &jet : targets_at(scene, t))
-    target.push_back(jet.acceleration);
-  const AtSections at{scene.cut_joints, along_cuts.data(), scene.point_forces, t,
-                      NaturalSizes<Space>(model.mechanism).length()};
-  Derivatives found = derivatives(model.mechanism, model.w, q.data(), v.data(),
-                                  Forces<double>{force.data(), wrench.data()}, at, target.data());
+  VectorXd target(model.rows()), state(q.size() + v.size());
+  state << q, v;
+  const std::vector<Jet> targets = targets_at(scene, t);
+  for (Index r = 0; r < target.size(); ++r)
+    target[r] = targets[static_cast<std::size_t>(r)].acceleration;
+  Derivatives found = derivatives_under(model.mechanism, scene, t, state, force, target, model.w);
   for (const JointForce &joint : scene.joint_forces)
     found.a_v.col(joint.v) -= joint.friction.slope(v[joint.v]) * found.a_f.col(joint.v);
   return found;
@@ -145,7 +138,29 @@ template <class Space> nb::class_<Model<Space>> bind_model(nb::module_ &m, const
       .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of rows.")
       .def("derivatives", &derivatives_at<Space>, "scene"_a, "t"_a, "q"_a, "v"_a, "supplied"_a,
            "At a state at time t, under a scene and forces supplied beside (n_v), exact; springs of joints and gears "
-           "are\nleft as they are, and rows that depend on others are left out.");
+           "are\nleft as they are, and rows that depend on others are left out.")
+      .def(
+          "forces_at_rest",
+          [](Model<Space> &model, const Scene &scene, double t, const VectorXd &q) {
+            model.check_state(q, VectorXd::Zero(model.mechanism.n_v));
+            check_scene(model, scene);
+            return forces_at_rest(model.mechanism, scene, t, q, model.w);
+          },
+          "scene"_a, "t"_a, "q"_a, "Forces and constraint equations at rest.")
+      .def(
+          "stiffness_at_rest",
+          [](Model<Space> &model, const Scene &scene, double t, const VectorXd &q, const VectorXd &multipliers,
+             const std::vector<int> &independent) {
+            model.check_state(q, VectorXd::Zero(model.mechanism.n_v));
+            check_scene(model, scene);
+            check_size("multipliers", multipliers.size(), model.rows());
+            for (const int r : independent)
+              check_index("row", r, model.rows());
+            return stiffness_at_rest(model.mechanism, scene, t, q, multipliers, independent, model.w);
+          },
+          "scene"_a, "t"_a, "q"_a, "multipliers"_a, "independent"_a,
+          "(n_v, n_v) derivative of C_q^T multipliers - Q by increments of q, exact; multipliers of rows that are not\n"
+          "among the `independent` ones are 0.");
 }
 
 // At states that are known
@@ -199,6 +214,13 @@ void bind_recursion(nb::module_ &m) {
       .def_ro("a_f", &Derivatives::a_f)
       .def_ro("value_q", &Derivatives::value_q)
       .def_ro("rate_q", &Derivatives::rate_q);
+  nb::class_<ForcesAtRest>(m, "ForcesAtRest", "What acts at rest, and what constraint equations measure.")
+      .def_ro("Q", &ForcesAtRest::Q, "(n_v) of gravity, elasticity and the scene.")
+      .def_ro("value", &ForcesAtRest::value, "(rows) less their targets.")
+      .def_ro("C_q", &ForcesAtRest::C_q, "(rows, n_v)")
+      .def_ro("independent", &ForcesAtRest::independent, "Rows that do not depend on others.")
+      .def_ro("force", &ForcesAtRest::force, "N, the largest that a joint transmits, or a load.")
+      .def_ro("moment", &ForcesAtRest::moment, "N m, the same.");
   bind_body<Planar>(m, "PlanarBody"), bind_body<Spatial>(m, "SpatialBody");
   bind_outputs(bind_model<Planar>(m, "PlanarModel", "A mechanism in the plane, in joint coordinates."));
   bind_outputs(bind_model<Spatial>(m, "SpatialModel", "A mechanism in space, in joint coordinates."));

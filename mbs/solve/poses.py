@@ -21,11 +21,10 @@ from .joint_conditions import (
     translational_stiffness,
 )  # fmt: skip
 from .linearisation import LinearEquations, LinearMechanism, labelled
-from .posture import solve_posture
 from .start import relaxed_gears
+from .statics import Statics
 
-MOST_STEPS = 12
-SETTLED = 1e-16  # of the strain energy of the first step: of a step after which there is nothing left to correct
+FREE = 1e-12  # of the largest stiffness: less lets the robot move
 
 
 class PoseEvaluator:
@@ -40,7 +39,7 @@ class PoseEvaluator:
         """`q` (n_q,) is any posture of `model`; `count` frequencies are kept, and responses at `omega` (F,), rad/s."""
         self.model = with_compliance(without_paths(model))
         self.space, self.point, self._count, self._omega = SPACES[model.scene.space], point, count, omega
-        self._linear = LinearEquations(self.model, self._all(q), {point: point})
+        self._linear, self._statics = LinearEquations(self.model, self._all(q), {point: point}), Statics(self.model)
         shafts = [name for name in self._linear.names if name.startswith("motor/")]
         driven = {name for joint in self.model.motors for name, _ in labelled(self.model, joint)}
         direct = [name for name in self._linear.names if name in driven]
@@ -81,36 +80,18 @@ class PoseEvaluator:
         return self.space.along(motion.r[0])
 
     def _equilibrium(self, q: Array) -> tuple[LinearMechanism, LinearMechanism, Array]:
-        """The linear equations in q (n_q,) and in the equilibrium next to it with motors locked, and its coordinates.
-
-        Newton with the exact stiffness K: the forces F that keep the robot at rest in q vanish on what motors leave
-        free, NᵀF + NᵀK N δz = 0.
-        """
-        condition = COMPLIANT if self.model.tree.gears else LOCKED
-        rest, first, last = np.zeros(self.model.tree.n_v), 0.0, np.inf
-        mechanism = straight = self._linear.at(0.0, q, rest, rest)
-        for _ in range(MOST_STEPS):
-            N, K, _ = free_coordinates(mechanism, condition)
-            try:
-                step = -np.linalg.solve(K, N.T @ mechanism.force)
-            except np.linalg.LinAlgError:
-                raise SolveError("joints without motors leave the robot free to move") from None
-            energy = float(step @ K @ step)
-            first = first or energy
-            if not np.isfinite(energy) or energy < -SETTLED * abs(first) or energy > 1e2 * last:
-                break
-            q = self._closed(self.model.tree.integrate(q, mechanism.transformation @ (N @ step)))
-            if energy <= SETTLED * first:
-                return straight, mechanism, q
-            mechanism, last = self._linear.at(0.0, q, rest, rest), energy
-        raise SolveError("no stable equilibrium near the posture with straight links")
-
-    def _closed(self, q: Array) -> Array:
-        """The posture with loops closed again, links bent as they are."""
-        found = solve_posture(self.model, 0.0, q) if self.model.rows else q
-        if found is None:
-            raise SolveError("loops cannot be closed")
-        return found
+        """The linear equations in q (n_q,) and in the equilibrium near it with motors locked, and its coordinates."""
+        rest, motors = np.zeros(self.model.tree.n_v), [*self.model.motors.values(), np.zeros(0, dtype=np.intp)]
+        straight = self._linear.at(0.0, q, rest, rest)
+        bent = self._statics.equilibrium(q, np.concatenate(motors))
+        mechanism = self._linear.at(0.0, bent, rest, rest)
+        K = free_coordinates(mechanism, COMPLIANT if self.model.tree.gears else LOCKED).K
+        values = np.linalg.eigvalsh(K)
+        if len(values) and abs(values).min() <= FREE * values[-1]:
+            raise SolveError("joints without motors leave the robot free to move")
+        if len(values) and values[0] < 0.0:
+            raise SolveError("no stable equilibrium near the posture with straight links")
+        return straight, mechanism, bent
 
     def _manipulability(self, mechanism: LinearMechanism) -> float:
         """√det(J Jᵀ) of the point's velocity by the rates of joints with motors (Yoshikawa, 1985)."""

@@ -197,12 +197,6 @@ def slopes_by_differences(
     return M, D, K
 
 
-def stiffness(servo: Servo, times: Array, p: Array) -> Array:
-    """K (N, n, n) alone, at times (N,) and p (N, n) at rest."""
-    rest = np.array([p, 0 * p, 0 * p])
-    return _derivative(servo.residuals, times, rest, 0, DIFFERENCE * servo.mode_sizes)
-
-
 def _derivative(
     forces: Callable[[Array, Array, Array, Array], Array], times: Array, modes: Array, k: int, step: Array
 ) -> Array:

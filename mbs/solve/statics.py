@@ -1,31 +1,45 @@
-"""Static equilibrium under gravity, given loads and the constraints at one time."""
+"""Static equilibrium under gravity, given loads and the constraints at one time: one Newton's method for all callers.
+
+With Q of gravity, elasticity and loads, and constraint equations C = 0 of which λ are the multipliers,
+
+    Q(q, t) − C_vᵀ λ = 0,  C(q, t) = 0;      [K  C_vᵀ] [δ ]   [Q − C_vᵀ λ]
+                                             [C_v   0] [δλ] = [   −C     ],   K = ∂(C_vᵀ λ − Q)/∂q.
+
+The core has K from dual numbers. λ are at every step those of least squares at q (Nocedal and Wright, Numerical
+Optimization, 2006, sec. 18.3), so that nothing adds up in them; of equations that depend on others there they are 0.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats, null_space
+from ...common.arrays import Array, Booleans, Indices, as_floats, null_space
 from ...common.errors import SolveError, quoted
-from ..model.known_motion import KnownStates, State, required_forces
-from ..model.model import Model, row_values
+from .. import _core
+from ..model.known_motion import State
+from ..model.model import Model
+from ..model.system import MultibodySystem
 from .posture import joint_scales, robot_size, row_sizes, with_rates
 from .start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
-TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
+TOLERANCE = 1e-12  # residual forces relative to the largest that meet, positions to the size of the robot
+ROUNDING = 4 * np.finfo(float).eps  # of coordinates, which stiff springs turn into forces
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
-DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
 SLACK = 1e-3  # of the largest force over its natural size: less stiffness is none
+SINGULAR = 1e-12  # of the largest singular value of scaled equations: below it nothing resists
 DEPENDENT = 1e-12  # of the largest singular value of rows: below it they depend on others
-UNSTABLE = -1e-5  # of the stiffness of single coordinates: closer to none is rounding of differences
-
-
-def forces_at_rest(model: Model, q: Array, t: float = 0.0) -> Array:
-    """Generalized forces (T, n_v) at rest, of q (T, n_q): gravity, elasticity, given loads."""
-    still = np.zeros((len(q), model.tree.n_v))
-    return -required_forces(model, KnownStates(q, still, still), np.full(len(q), t))
+UNSTABLE = -1e-7  # of the stiffness of single coordinates: closer to none is round-off
+SETTLED = 1e-14  # of a shape's size: what the next step would change
+SLOW = 0.1  # of a step, the next one: derivatives are taken again
+STRAIGHT = 1e-3  # of the size of modes, below which a shape counts as none
+INDEPENDENT = 1e-7  # of the largest row, what others must leave of one that has a multiplier
+MISSED = 1e-6  # rad, sizes of the robot: constraint equations that are off by more are the cause
+SLACKEST = 1e-12  # of the largest stiffness over its natural size: less is round-off
+TINY = 1e-300
 
 
 def initial_state(model: Model) -> State:
@@ -59,61 +73,233 @@ def hanging_joints(model: Model, start: State) -> Iterator[str]:
             f"starts in the equilibrium in which joints {quoted(moved)} hang, away from [initial]: nothing holds them"
             ' there; state = "undeformed" starts from [initial]'
         )
-    yield from unstable_ways(model, start.q, holding_multipliers(model, start.q))
+    yield from Statics(model).unstable_ways(start.q)
 
 
-def holding_multipliers(model: Model, q: Array) -> Array:
-    """λ (rows,) with C_vᵀλ = Q at rest at q (n_q,), t = 0; of least size where rows depend on others."""
-    C_v = row_values(model, q[None], np.zeros(1))[1][0]
-    return _least_multipliers(C_v, forces_at_rest(model, q[None])[0], natural_sizes(model), row_sizes(model))
+class Correction(NamedTuple):
+    """Newton's steps (T, n) in natural sizes, and which of the states are met once they have made them (T,)."""
+
+    step: Array
+    is_met: Booleans
+
+
+def newton(
+    correct: Callable[[Array, Indices], Correction], move: Callable[[Array, Array], Array], states: Array
+) -> tuple[Array, Booleans]:
+    """The states (T, …) that `correct` leads to, and which of them are met (T,).
+
+    `correct`(states, their numbers) is called for those that are not met yet, and `move`(states, steps) takes them on.
+    """
+    states, met, going = states.copy(), np.zeros(len(states), dtype=bool), np.arange(len(states))
+    for _ in range(MOST_ITERATIONS):
+        step, is_met = correct(states[going], going)
+        known = np.isfinite(step).all(axis=1)
+        longest = np.abs(step).max(axis=1, initial=0.0)
+        step, going = step[known] * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, TINY))[known, None], going[known]
+        states[going], met[going] = move(states[going], step), is_met[known]
+        going = going[~met[going]]
+        if not len(going):
+            break
+    return states, met
+
+
+class Balance(NamedTuple):
+    """What meets at a posture, in natural sizes: N·m, rad, sizes of the robot and of modes."""
+
+    left: Array  # (n_v,) Q − C_vᵀ λ
+    missed: Array  # (rows,) C
+    gradient: Array  # (rows, n_v) C_v, 0 of equations that depend on others
+    multipliers: Array  # (rows,) λ in N·m, with 0 of these
+    independent: list[int]  # numbers of the other equations
+    size: float  # N·m, of the largest force that meets others there
+
+
+class Statics:
+    """A model at rest at time t (s), with Newton's method for its equilibria; made once for many postures."""
+
+    def __init__(self, model: Model, t: float = 0.0) -> None:
+        self.model, self.t, self.system = model, t, MultibodySystem(model)
+        self.sizes, self.row_sizes, self.length = natural_sizes(model), row_sizes(model), robot_size(model)
+
+    def equilibrium(self, q: Array, held: Indices | None = None) -> Array:
+        """The equilibrium (n_q,) that Newton's method reaches from q (n_q,), with the coordinates v[`held`] kept.
+
+        Raises `SolveError` that says what is left where it reaches none.
+        """
+        tree = self.model.tree
+        free = np.delete(np.arange(tree.n_v), [] if held is None else held)
+        cause = ""
+
+        def correct(states: Array, _: Indices) -> Correction:
+            nonlocal cause
+            at, step = self.balance(states[0], free), np.zeros((1, tree.n_v))
+            if not np.isfinite(at.size):
+                step[:] = np.nan
+                return Correction(step, np.zeros(1, dtype=bool))
+            K = self.stiffness(states[0], at)
+            rounding = ROUNDING * (np.abs(K) @ self._natural(states[0]))
+            excess = (np.abs(at.left) / (TOLERANCE * at.size + rounding + TINY))[free]
+            is_met = excess.max(initial=0.0) <= 1.0 and np.abs(at.missed).max(initial=0.0) <= TOLERANCE
+            if not is_met:
+                step[0, free] = _step(at, K, free)
+                cause = self._cause(at, int(free[excess.argmax()]))
+            return Correction(step, np.array([is_met]))
+
+        found, is_met = newton(correct, lambda at, step: tree.integrate(at, step * self.sizes), q[None])
+        for node in tree.nodes if is_met[0] else ():
+            if np.sum(found[0, node.p_q] ** 2) > node.body.largest_moment:
+                is_met, cause = np.array([False]), f'"{node.body.name}" bends by more than its length there'
+        if not is_met[0]:
+            raise SolveError(
+                f"{self.model.scene.path}: no static equilibrium was found near the initial posture: {cause}. Without"
+                " motors or trajectories, or with links too soft for their loads, there may be none; else give joint"
+                " coordinates closer to it"
+            )
+        return as_floats(found[0])
+
+    def balance(self, q: Array, free: Indices) -> Balance:
+        """Forces at q (n_q,), with multipliers that leave least along v[`free`]."""
+        at, J = self._at_rest(q)
+        independent = _independent(J[:, free])
+        J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
+        Q, missed = at.Q * self.sizes, self.system.row_signs * at.value / self.row_sizes
+        multipliers = np.linalg.lstsq(J[:, free].T, Q[free], rcond=DEPENDENT)[0]
+        elastic = np.zeros_like(Q)
+        for node in self.model.tree.nodes:
+            elastic[node.p_v] = node.body.stiffness * q[node.p_q]
+        terms = (
+            Q,
+            Q + elastic * self.sizes,
+            elastic * self.sizes,
+            J * multipliers[:, None],
+            np.array([at.force * self.length, at.moment]),
+        )
+        size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
+        return Balance(Q - multipliers @ J, missed, J, multipliers, independent, size)
+
+    def stiffness(self, q: Array, at: Balance) -> Array:
+        """∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), exact."""
+        multipliers = at.multipliers / self.row_sizes * self.system.row_signs
+        core, scene = self.system.core, self.system.scene
+        K = core.stiffness_at_rest(scene, self.t, q, multipliers, at.independent)
+        return as_floats(K * self.sizes * self.sizes[:, None])
+
+    def holding_multipliers(self, q: Array) -> Array:
+        """λ (rows,) with C_vᵀ λ = Q at q (n_q,), those of least work on natural motions where rows depend on others."""
+        at, J = self._at_rest(q)
+        return as_floats(np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes)
+
+    def unstable_ways(self, q: Array) -> Iterator[str]:
+        """A warning where the equilibrium q (n_q,) is left at the slightest push.
+
+        There the forces that lead back have a derivative with a negative eigenvalue on what the rows leave free.
+        """
+        tree = self.model.tree
+        at = self.balance(q, np.arange(tree.n_v))
+        K = self.stiffness(q, at)
+        scale = _scales(K, at.size)
+        free = null_space(at.gradient * scale, DEPENDENT) if len(at.gradient) else np.eye(tree.n_v)
+        found, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
+        if not len(found) or found.real.min() > UNSTABLE:
+            return
+        moved = np.abs(free @ shapes[:, found.real.argmin()])
+        node = max(tree.nodes, key=lambda node: float(moved[np.r_[node.v, node.p_v]].max(initial=0.0)))
+        bends = moved[node.p_v].max(initial=0.0) > moved[node.v].max(initial=0.0)
+        what = (
+            f'"{node.body.name}" buckles' if bends else f'joint "{node.joint.name}" leaves it; start near another one'
+        )
+        yield f"the equilibrium is unstable: at the slightest push {what}"
+
+    def _at_rest(self, q: Array) -> tuple[_core.ForcesAtRest, Array]:
+        """What the core finds at q (n_q,), and C_v (rows, n_v) in natural sizes."""
+        at = self.system.core.forces_at_rest(self.system.scene, self.t, q)
+        return at, as_floats((self.system.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes)
+
+    def _natural(self, q: Array) -> Array:
+        """|q| (n_v,) in natural sizes, 1 of orientations."""
+        found = np.ones(self.model.tree.n_v)
+        for node in self.model.tree.nodes:
+            if node.joint.q_count == node.joint.freedoms:
+                found[node.v] = np.abs(q[node.q]) / self.sizes[node.v]
+            found[node.p_v] = np.abs(q[node.p_q]) / self.sizes[node.p_v]
+        return found
+
+    def _cause(self, at: Balance, worst: int) -> str:
+        """What is left at a posture that is none in equilibrium, `worst` along v."""
+        if at.missed.size and np.abs(at.missed).max() > MISSED:
+            return f'"{self.model.rows[int(np.abs(at.missed).argmax())].owner}" cannot be met with links that bend so'
+        node = next(
+            node
+            for node in self.model.tree.nodes
+            if worst in (*range(node.v.start, node.v.stop), *range(node.p_v.start, node.p_v.stop))
+        )
+        what = f'joint "{node.joint.name}"' if worst < node.p_v.start else f'"{node.body.name}"'
+        return f"after {MOST_ITERATIONS} steps of Newton's method {abs(at.left[worst]):.3g} N·m are left at {what}"
+
+
+def _independent(J: Array) -> list[int]:
+    """Which rows of J (m, k) do not depend on others: of each set of those that do, the largest."""
+    from scipy.linalg import qr
+
+    if not J.size:
+        return []
+    R, order = qr(J.T, mode="r", pivoting=True)
+    return sorted(order[: np.count_nonzero(np.abs(np.diag(R)) > INDEPENDENT * np.abs(R[0, 0]))].tolist())
+
+
+def _scales(K: Array, size: float) -> Array:
+    """Increments (n,) that single stiffnesses make of one size."""
+    return as_floats(1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, SLACKEST * np.abs(K).max(), TINY))))
+
+
+def _step(at: Balance, K: Array, free: Indices) -> Array:
+    """Newton's step along v[`free`], the least where nothing resists."""
+    K, J = K[np.ix_(free, free)], at.gradient[np.ix_(at.independent, free)]
+    scale = _scales(K, at.size)
+    J = J * scale
+    of_rows = np.linalg.norm(J, axis=1)
+    J, m = J / of_rows[:, None], len(J)
+    matrix = np.block([[K * scale * scale[:, None], J.T], [J, np.zeros((m, m))]])
+    right = np.concatenate([at.left[free] * scale, -at.missed[at.independent] / of_rows])
+    return as_floats(np.linalg.lstsq(matrix, right, rcond=SINGULAR)[0][: len(free)] * scale)
 
 
 def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
-    """Solve Q(q, t) − C_vᵀλ = 0, C(q, t) = 0 by Newton from `start`; v is kept on Ċ = 0.
+    """The equilibrium at time t near `start`; v is kept on Ċ = 0. Raises `SolveError` where there is none near it."""
+    return with_rates(model, Statics(model, t).equilibrium(start.q), start.v, t)
 
-    Raises `SolveError` where there is no equilibrium near the start.
+
+def static_shapes(
+    omega: Array,
+    sizes: Array,
+    forces: Callable[[Array, Indices], Array],
+    stiffness: Callable[[Array, Indices], Array],
+    count: int,
+) -> tuple[Array, Booleans]:
+    """Shapes p (T, n) of all bodies on which `forces` leave nothing, at T = `count` times, and which are met (T,).
+
+    Joints follow the shapes: `forces`(p, numbers of times) are those on modes (k, n), `stiffness` is their derivative
+    (k, n, n), which is taken again where steps shrink slowly. `omega` (n,) are frequencies, rad/s. Modes bend their
+    links by about the length at `sizes` (n,): shapes beyond are not met.
     """
-    tree, n, m = model.tree, model.tree.n_v, len(model.rows)
-    sizes, row_scales = natural_sizes(model), row_sizes(model)
-    q = start.q
-    C_v = row_values(model, q[None], np.array([t]))[1][0]
-    multipliers = _least_multipliers(C_v, forces_at_rest(model, q[None], t)[0], sizes, row_scales)
-    for _ in range(MOST_ITERATIONS):
-        residual, size = _residual(model, q[None], t, multipliers, row_scales)
-        if np.abs(residual[0, :n] * sizes).max(initial=0.0) <= TOLERANCE * size and (
-            not m or np.abs(residual[0, n:]).max() <= TOLERANCE
-        ):
-            return with_rates(model, q, start.v, t)
-        jacobian = _jacobian(model, q, t, multipliers, sizes, row_scales)
-        step = -_equilibrated_solution(jacobian, residual[0] * np.concatenate([sizes, np.ones(m)]))
-        if not np.all(np.isfinite(step)):
-            break
-        step *= min(1.0, LARGEST_STEP / max(float(np.abs(step[:n]).max()), 1e-300))
-        q, multipliers = tree.integrate(q, step[:n] * sizes), multipliers + step[n:] * _force_scale(size, row_scales)
-    raise SolveError(
-        f"{model.scene.path}: no static equilibrium was found near the initial posture. Without motors or trajectories,"
-        " or with links too soft for their loads, there may be none; else give joint coordinates closer to it"
-    )
+    K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, np.inf), np.full(count, np.inf)
+    least = STRAIGHT * float((omega * sizes).min(initial=np.inf))
 
+    def correct(p: Array, going: Indices) -> Correction:
+        r, slow = forces(p, going), ratio[going] > SLOW
+        if slow.any():
+            K[going[slow]] = stiffness(p[slow], going[slow])
+        known = np.isfinite(r).all(axis=1) & np.isfinite(K[going]).all(axis=(1, 2))
+        step = np.full_like(p, np.nan)
+        step[known] = -np.linalg.solve(K[going[known]], r[known, :, None])[:, :, 0]
+        size = np.linalg.norm(omega * step, axis=1) / (np.linalg.norm(omega * (p + step), axis=1) + least)
+        is_seen = (before[going] < np.inf) & (size > 10 * SETTLED)  # steps below that are round-off
+        ratio[going] = np.where(is_seen, size / before[going], np.minimum(ratio[going], SLOW))
+        before[going] = size
+        return Correction(step / sizes, size * np.minimum(ratio[going], 1.0) <= SETTLED)
 
-def unstable_ways(model: Model, q: Array, multipliers: Array) -> Iterator[str]:
-    """A warning where the equilibrium at q (n_q,), t = 0, with λ (rows,) is left at the slightest push.
-
-    There the derivative of the forces that lead back has a negative eigenvalue on what the rows leave free.
-    """
-    tree, n, row_scales = model.tree, model.tree.n_v, row_sizes(model)
-    jacobian = _jacobian(model, q, 0.0, multipliers, natural_sizes(model), row_scales)
-    K, size = -jacobian[:n, :n], _residual(model, q[None], 0.0, multipliers, row_scales)[1]
-    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, 1e-300)))
-    free = null_space(jacobian[n:, :n] * scale, DEPENDENT) if len(model.rows) else np.eye(n)
-    found, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
-    if not len(found) or found.real.min() > UNSTABLE:
-        return
-    moved = np.abs(free @ shapes[:, found.real.argmin()])
-    node = max(tree.nodes, key=lambda node: float(moved[np.r_[node.v, node.p_v]].max(initial=0.0)))
-    bends = moved[node.p_v].max(initial=0.0) > moved[node.v].max(initial=0.0)
-    what = f'"{node.body.name}" buckles' if bends else f'joint "{node.joint.name}" leaves it; start near another one'
-    yield f"the equilibrium is unstable: at the slightest push {what}"
+    p, is_met = newton(correct, lambda p, step: p + step * sizes, np.zeros((count, len(omega))))
+    return p, is_met & (np.abs(p) <= sizes).all(axis=1)
 
 
 def natural_sizes(model: Model) -> Array:
@@ -122,52 +308,3 @@ def natural_sizes(model: Model) -> Array:
     for node in model.tree.nodes:
         sizes[node.p_v] = np.sqrt(node.body.largest_moment)
     return sizes
-
-
-def _least_multipliers(C_v: Array, Q: Array, sizes: Array, row_scales: Array) -> Array:
-    """λ (rows,) with C_vᵀλ = Q (n_v,), of least work on natural motions where rows depend on others."""
-    work = (C_v / row_scales[:, None] * sizes).T
-    return np.asarray(np.linalg.lstsq(work, Q * sizes, rcond=1e-12)[0] / row_scales)
-
-
-def _equilibrated_solution(A: Array, b: Array) -> Array:
-    """Solution of A x = b, the least where A is singular; rows and columns scaled to 1, since forces have a unit."""
-    rows = np.abs(A).max(axis=1, initial=0.0)
-    rows[rows == 0.0] = 1.0
-    columns = np.linalg.norm(A / rows[:, None], axis=0)
-    columns[columns == 0.0] = 1.0
-    scaled = A / rows[:, None] / columns
-    return np.asarray(np.linalg.lstsq(scaled, b / rows, rcond=1e-14)[0] / columns)
-
-
-def _force_scale(size: float, row_scales: Array) -> Array:
-    return as_floats(max(size, 1e-300) / row_scales)
-
-
-def _residual(model: Model, q: Array, t: float, multipliers: Array, row_scales: Array) -> tuple[Array, float]:
-    """(T, n_v + rows): forces left, and C over its natural sizes; and the size of the largest force term."""
-    C, C_v = row_values(model, q, np.full(len(q), t))
-    Q, held, sizes = forces_at_rest(model, q, t), np.einsum("tij,i->tj", C_v, multipliers), natural_sizes(model)
-    elastic = np.zeros_like(Q)  # in equilibrium Q is nothing but rounding where no row holds anything
-    for node in model.tree.nodes:
-        elastic[:, node.p_v] = node.body.stiffness * q[:, node.p_q]
-    size = max(float(np.abs(force * sizes).max(initial=0.0)) for force in (Q + elastic, elastic, held))
-    if not any(node.body.n_modes for node in model.tree.nodes):  # where rigid bodies hang, all of them are
-        weight = float(np.linalg.norm(model.scene.gravity)) * sum(node.body.mass for node in model.tree.nodes)
-        size = max(size, weight * robot_size(model))
-    return np.concatenate([Q - held, C / row_scales], axis=1), size
-
-
-def _jacobian(model: Model, q: Array, t: float, multipliers: Array, sizes: Array, row_scales: Array) -> Array:
-    """Derivative of the residual, forces times `sizes`, by steps in natural sizes (differences) and multipliers."""
-    n, m, tree = model.tree.n_v, len(model.rows), model.tree
-    ahead, behind = (
-        _residual(model, tree.integrate(q, sign * DIFFERENCE * np.diag(sizes)), t, multipliers, row_scales)[0]
-        for sign in (1.0, -1.0)
-    )
-    by_q = ((ahead - behind) / (2 * DIFFERENCE)).T
-    C_v = row_values(model, q[None], np.array([t]))[1][0]
-    _, size = _residual(model, q[None], t, multipliers, row_scales)
-    by_multipliers = np.concatenate([-C_v.T * _force_scale(size, row_scales), np.zeros((m, m))])
-    scaled = np.concatenate([by_q[:n] * sizes[:, None], by_q[n:]])
-    return np.hstack([scaled, np.concatenate([by_multipliers[:n] * sizes[:, None], by_multipliers[n:]])])

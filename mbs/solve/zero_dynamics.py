@@ -19,11 +19,10 @@ from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
 from ...common.errors import SolveError
 from ...common.structs import struct
 from ..model.system import MultibodySystem
-from .servo import Servo, stiffness
+from .servo import Servo
 from .start import shape_in_redundant_loops
+from .statics import static_shapes
 
-MOST_ITERATIONS = 50
-TOLERANCE = 1e-12  # of the last Newton step to an equilibrium, relative
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
 
 
@@ -53,20 +52,23 @@ def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) ->
 
 def equilibrium(servo: Servo, t: float) -> Array:
     """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
-    p: Array = np.zeros((1, len(servo.scale)))
-    rest, now = np.zeros_like(p), np.array([t])
-    for _ in range(MOST_ITERATIONS):
-        r = servo.residuals(now, p, rest, rest)[0]
-        K = stiffness(servo, now, p)[0]
-        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(K))):
-            break
-        step = np.linalg.solve(K, r)
-        p = p - step
-        if np.linalg.norm(step) <= TOLERANCE * (np.linalg.norm(p) + 1e-12):
-            return np.asarray(p[0])
+    p, is_met = _shapes(servo, np.array([t]))
+    if is_met[0]:
+        return p[0]
     soft = "the links are too soft for their loads there: stiffen them, or take less payload"
     cause = cause_in_posture(servo) or soft
     raise SolveError(f"{servo.where}: no equilibrium under the motors was found at t = {t:g} s: {cause}")
+
+
+def _shapes(servo: Servo, times: Array) -> tuple[Array, Booleans]:
+    """Shapes p (N, n) at `times` (N,) with which motors alone bear the loads: r(t, p, 0, 0) = 0; which are met (N,)."""
+    return static_shapes(
+        servo.scale,
+        servo.mode_sizes,
+        lambda p, at: servo.residuals(times[at], p, 0 * p, 0 * p),
+        lambda p, at: servo.slopes(times[at], p, 0 * p, 0 * p)[2][:, : p.shape[1]],
+        len(times),
+    )
 
 
 def cause_in_posture(servo: Servo) -> str:
@@ -103,7 +105,6 @@ SAMPLES = 33  # of the linear dynamics along the path
 LIGHT = 0.1  # |Re s| / |s| of a lightly damped vibration
 GROWTH = 1.0  # ln of what it may grow by along a path and count as bounded
 JUMP = 0.5  # of the size of a zero, between two samples: it passed through infinity
-SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links that are not very soft
 TINY = 1e-300
 
 
@@ -186,14 +187,8 @@ def shape_along(servo: Servo, times: Array) -> Array:
 
     Raises `SolveError` where they are too soft for that.
     """
-    rest: Array = np.zeros((len(times), len(servo.scale)))
-    p, K = rest, stiffness(servo, times, rest)
-    for _ in range(SHAPE_ITERATIONS):
-        _check_numbers(servo, times, K, p)
-        step = np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
-        p = p - step
-        if np.abs(servo.scale * step).max() <= TOLERANCE * np.abs(servo.scale * p).max():
-            break
+    p, is_met = _shapes(servo, times)
+    _check(servo, times, is_met)
     return p
 
 
@@ -202,14 +197,14 @@ def linearise(servo: Servo, end: float, samples: int = SAMPLES) -> Linearisation
     times = as_floats(np.linspace(0.0, end, samples))
     p = shape_along(servo, times)
     dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
-    _check_numbers(servo, times, dynamics.M, dynamics.D, dynamics.K)
+    matrices = np.concatenate([dynamics.M, dynamics.D, dynamics.K], axis=1)
+    _check(servo, times, np.isfinite(matrices).all(axis=(1, 2)))
     return Linearisation(dynamics, p, servo.scale)
 
 
-def _check_numbers(servo: Servo, times: Array, *found: Array) -> None:
-    """Raise `SolveError` for the first of the times (N,) at which one of `found` (N, …) is no number."""
-    lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
-    if lost.any():
+def _check(servo: Servo, times: Array, is_met: Booleans) -> None:
+    """Raise `SolveError` for the first of the times (N,) at which there is no shape."""
+    if not is_met.all():
         cause = cause_in_posture(servo) or "the links are too soft for their loads there; slow the path down"
-        t = times[lost.argmax()]
+        t = times[is_met.argmin()]
         raise SolveError(f"{servo.where}: motor torques alone cannot follow the path at t = {t:g} s: {cause}")

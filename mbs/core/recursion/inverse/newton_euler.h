@@ -27,6 +27,8 @@ public:
 
   explicit NewtonEuler(const Mechanism<Space> &mechanism); // which must outlive this
 
+  const Mechanism<Space> &mechanism() const { return mechanism_; }
+
   // What accelerations() leaves in `w` of a state, accelerations and multipliers aside. generalized (n_v) may be null.
   void prepare(const double *q, const double *v, const double *generalized, Workspace<Space, double> &w);
 

@@ -1,6 +1,6 @@
 // How a prescribed motion and its forces answer to small changes of the modes: by dual numbers, without differences.
 #include "core/linear/products.h"
-#include "core/recursion/constrained_aba/derivatives.h"
+#include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/inverse/prescribed_motion.h"
 
 #include <algorithm>
@@ -12,43 +12,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-namespace {
-
-// Of what the scene does along joints, by increments of q and by v
-void add_slopes(const Scene &scene, const double *q, const double *v, MatrixXd &by_q, MatrixXd &by_v) {
-  for (const JointForce &joint : scene.joint_forces) {
-    by_q(joint.v, joint.v) += joint.stiffness;
-    by_v(joint.v, joint.v) += joint.friction.slope(v[joint.v]);
-  }
-  for (const auto &[a, b, ratio, spring, damping] : scene.gears) {
-    const double stiffness = spring.slope(q[a.q] - ratio * q[b.q]);
-    for (const auto &[i, of_i] : {std::pair{a.v, 1.}, std::pair{b.v, -ratio}})
-      for (const auto &[j, of_j] : {std::pair{a.v, 1.}, std::pair{b.v, -ratio}})
-        by_q(i, j) += of_i * of_j * stiffness, by_v(i, j) += of_i * of_j * damping;
-  }
-}
-
-} // namespace
-
 // Of accelerations that the generalized forces (n_v) lead to, which are those of the motion, while the constraint
 // equations `active` keep the second derivatives that they have.
 template <class Space>
 Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, const std::vector<int> &active) {
-  const Mechanism<Space> &m = driven_.mechanism;
-  const Scene &scene = driven_.scene;
-  const double t = std::clamp(time_, first_, last_);
-  VectorXd wrench = VectorXd::Zero(Space::dim * static_cast<Index>(m.wrenches.size()));
-  VectorXd along_cuts = VectorXd::Zero(static_cast<Index>(scene.cut_joints.size())), target(lambda_.size());
-  for (const PointLoad &load : scene.point_loads)
-    wrench[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
-  for (const CutLoad &load : scene.cut_loads)
-    along_cuts[load.joint] += load.share * load.magnitude(t).value;
-  for (std::size_t r = 0; r < m.constraints.size(); ++r)
-    target[static_cast<Index>(r)] = forces_.of_constraint(r, a_.data(), w_).value;
+  VectorXd target(lambda_.size());
+  for (Index r = 0; r < target.size(); ++r)
+    target[r] = forces_.of_constraint(static_cast<std::size_t>(r), a_.data(), w_).value;
   w_.keep(active);
-  return derivatives(m, w_, q(), v(), Forces<double>{forces.data(), wrench.data()},
-                     {scene.cut_joints, along_cuts.data(), scene.point_forces, t, NaturalSizes<Space>(m).length()},
-                     target.data());
+  const double t = std::clamp(time_, first_, last_);
+  return recursion::derivatives_under(driven_.mechanism, driven_.scene, t, state_, forces, target, w_);
 }
 
 // With all constraint equations C_ddot stays what it is: its derivatives at given a are -C_v a_q and -C_v a_v.
@@ -71,39 +44,39 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
   return to;
 }
 
-// M a - Q + C_c^T lambda_c = f with the loops' multipliers leads to f_q = -(M a_q + C_c^T lambda_q) at given a.
+// M a - Q + C^T lambda = f leads to f_q = -(M a_q + C^T lambda_q) at given a and multipliers: those of loops with
+// motors, else of all constraint equations. Without motors the joints' motion J by p, C J = 0, has the forces left as
+// J^T f.
 template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const JointSlopes &joints) {
-  if (!motors_ || std::ranges::any_of(driven_.motors, &Motor::turns_frames))
+  if (std::ranges::any_of(driven_.motors, &Motor::turns_frames))
     throw std::invalid_argument("derivatives: expected motors along joint coordinates");
-  motors_->split(q(), required_, w_);
-  VectorXd forces = VectorXd::Zero(a_.size()), unit = forces, f = forces;
+  VectorXd forces = VectorXd::Zero(a_.size());
   if (acting_.generalized)
     forces += Eigen::Map<const VectorXd>(acting_.generalized, a_.size());
-  forces(driven_.of_modes) += motors_->left()(driven_.of_modes);
-  for (std::size_t k = 0; k < driven_.motors.size(); ++k)
-    forces[driven_.motors[k].coordinate] += driven_.motors[k].sign * motors_->tau()[static_cast<Index>(k)];
-  std::vector<int> loops = motion_.workspace().active;
-  std::erase_if(loops, [&](int r) { return driven_.is_path[static_cast<std::size_t>(r)]; });
-  const Derivatives found = derivatives_under(forces, loops);
-  MatrixXd M(a_.size(), a_.size());
-  forces_.load(nullptr, nullptr, w_);
-  forces_.accelerate(q(), unit.data(), w_);
-  forces_.require(q(), unit.data(), w_, f.data());
-  for (Index j = 0; j < unit.size(); ++j) {
-    unit[j] = 1;
-    forces_.accelerate(q(), unit.data(), w_);
-    forces_.require(q(), unit.data(), w_, M.col(j).data());
-    M.col(j) -= f;
-    unit[j] = 0;
-  }
+  std::vector<int> active = motion_.workspace().active;
+  if (const Motors<Space> *found = motors()) {
+    forces(driven_.of_modes) += found->left()(driven_.of_modes);
+    for (std::size_t k = 0; k < driven_.motors.size(); ++k)
+      forces[driven_.motors[k].coordinate] += driven_.motors[k].sign * found->tau()[static_cast<Index>(k)];
+    std::erase_if(active, [&](int r) { return driven_.is_path[static_cast<std::size_t>(r)]; });
+  } else
+    forces(driven_.of_modes) += shape_force();
+  const auto shares_of = [&](const MatrixXd &of_forces) {
+    if (motors_)
+      return motors_->shares_of(of_forces);
+    MatrixXd found = MatrixXd::Zero(modes(), modes());
+    add_transposed_product(joints.q, of_forces, found);
+    return found;
+  };
+  const Derivatives found = derivatives_under(forces, active);
+  const MatrixXd M = mass_matrix(q(), forces_, w_);
   MatrixXd by_q = -matrix_product(M, found.a_q), by_v = -matrix_product(M, found.a_v);
   add_transposed_product(found.value_q, found.lambda_q, by_q, -1);
   add_transposed_product(found.value_q, found.lambda_v, by_v, -1);
   add_slopes(driven_.scene, q(), v(), by_q, by_v);
-  return {motors_->shares_of(matrix_product(M, joints.q)),
-          motors_->shares_of(matrix_product(by_v, joints.q) + matrix_product(M, joints.a_v)),
-          motors_->shares_of(matrix_product(by_q, joints.q) + matrix_product(by_v, joints.v) +
-                             matrix_product(M, joints.a_p))};
+  return {shares_of(matrix_product(M, joints.q)),
+          shares_of(matrix_product(by_v, joints.q) + matrix_product(M, joints.a_v)),
+          shares_of(matrix_product(by_q, joints.q) + matrix_product(by_v, joints.v) + matrix_product(M, joints.a_p))};
 }
 
 template <class Space> LeftSlopes RedefinedMotion<Space>::slopes() {
