@@ -20,6 +20,8 @@ from ..patches.link_patches import LinkPatches
 from .linear_model import LinearModel, Reach, Zeros, controllability, observability, robot_modes, state_space, zeros
 from .margins import Suggestion, unhurried_gains
 
+MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some seconds
+
 
 @struct
 class LinearModels(Details):
@@ -69,10 +71,12 @@ def analyse(models: tuple[LinearModel, ...]) -> LinearModels:
 
 
 def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
-    """(inputs …, outputs …), as many of each."""
+    """(inputs …, outputs …), as many of each; where all would take minutes, without those to other outputs."""
     motors = [name for name in model.input_names if name.startswith("joint/")]
     places = [name for name in model.output_names if name.startswith("point/")]
+    own = [(motor, motor) for motor in motors]
     single = [(motor, output) for motor in motors for output in (motor, *places)]
+    single = next((pairs for pairs in (single, own) if len(pairs) * model.freedom**3 <= MOST_WORK), [])
     together = [(*motors, *motors)] if len(motors) > 1 else []
     if len(motors) > 1:
         for of_point in _by_point(places).values():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +63,7 @@ class LinearModel:
         """Number f of independent coordinates."""
         return len(self.mass)
 
-    @property
+    @cached_property
     def second_order(self) -> tuple[Array, Array, Array, Array]:
         """K̂, D̂ (f, f), inputs (f, …) and outputs (…, f) where the mass is the identity: s = L⁻ᵀ z, mass = L Lᵀ."""
         f, L = self.freedom, np.linalg.cholesky(self.mass)
