@@ -285,7 +285,33 @@ def _turn_3d(
     ax.text(*(on_page(at) + where), text, fontsize=8, color=color)
 
 
+def pipeline(ax: Axes) -> None:
+    """From link and scene files to results: files as boxes, the two stages between them."""
+    boxes = (
+        (0.0, 0.62, "link file", "arm.toml, STEP, mesh", INK),
+        (1.45, 0.62, "stage 1", "elements → modes", LINK),
+        (2.9, 0.62, "modal body", "arm.h5", INK),
+        (2.9, 0.0, "scene file", "joints, path, motors", INK),
+        (4.35, 0.31, "stage 2", "multibody dynamics", LINK),
+        (5.8, 0.31, "results", "scene.results.h5", INK),
+        (7.25, 0.31, "answers", "summary, page, Python", MOTOR),
+    )
+    for x, y, name, about, color in boxes:
+        ax.add_patch(Rectangle((x, y), 1.15, 0.44, facecolor="white", edgecolor=color, linewidth=1.2))
+        ax.text(x + 0.575, y + 0.28, name, ha="center", va="center", fontsize=7.5, color=color, weight="bold")
+        ax.text(x + 0.575, y + 0.12, about, ha="center", va="center", fontsize=4.8, color=INK)
+    for begin, end in (
+        ((1.15, 0.84), (1.45, 0.84)), ((2.6, 0.84), (2.9, 0.84)), ((4.05, 0.84), (4.35, 0.62)),
+        ((4.05, 0.22), (4.35, 0.44)), ((5.5, 0.53), (5.8, 0.53)), ((6.95, 0.53), (7.25, 0.53)),
+    ):  # fmt: skip
+        _arrow(ax, np.array(begin), np.array(end), INK, "", (0.0, 0.0))
+    ax.text(2.02, 1.16, "ffrobot link", ha="center", fontsize=5.5, color=LINK, family="monospace")
+    ax.text(4.92, 0.85, "ffrobot solve", ha="center", fontsize=5.5, color=LINK, family="monospace")
+    ax.text(7.82, 0.85, "report, plot", ha="center", fontsize=5.5, color=MOTOR, family="monospace")
+
+
 SKETCHES: dict[str, tuple[Callable[[Axes], None], float, tuple[float, float, float, float], str | None]] = {
+    "pipeline": (pipeline, 6.4 * 1.4 / 8.6, (-0.1, 8.5, -0.1, 1.3), "white"),
     "theory/floating_frame": (floating_frame, 6.4 * 2.2 / 3.8, (-0.5, 3.3, -0.45, 1.75), "white"),
     "theory/attachment_modes": (attachment_modes, 6.4 * 1.8 / 4.9, (-0.15, 4.75, -1.05, 0.75), "white"),
     "theory/gear": (gear, 6.4 * 1.9 / 4.7, (-0.2, 4.5, -0.75, 1.15), "white"),

@@ -44,7 +44,8 @@ class Command:
     @property
     def environment(self):
         """Without what MPI leaves behind in a process that has loaded dolfinx: a nested mpirun trips over it."""
-        return environment_without_mpi() | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
+        own = {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb", "COLUMNS": "120"}  # readline sets the last one to 80
+        return environment_without_mpi() | own
 
     def __call__(self, *arguments, cwd=None, timeout=LIMIT, env=None, **options):
         arguments = [str(argument) for argument in arguments]

@@ -238,8 +238,9 @@ def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: Mod
     if not modes.served:
         families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
         raise InputError(
-            f'{_key(path, layout.label)}: bends: expected eigenmodes of the link that patches for "{layout.acts_in}" reach,'
-            f" found eigenmodes in {families}: add such modes ([modes] family, or a larger count), or move the patches"
+            f"{_key(path, layout.label)}: bends: expected eigenmodes of the link that patches for"
+            f' "{layout.acts_in}" reach, found eigenmodes in {families}: add such modes ([modes] family, a'
+            " larger count), or move the patches"
         )
 
 

@@ -249,7 +249,7 @@ def test_patches_that_do_not_fit_their_link():
     assert "torsion" in few.family
     assert "torsion" not in few.family[: few.eigenmode_count]
     twisting = layout(bends="twist", face="both", fibre_angle=np.pi / 4)
-    with pytest.raises(InputError, match=r"found eigenmodes in (?!.*torsion).*: add such modes .* a larger count"):
+    with pytest.raises(InputError, match=r"found eigenmodes in (?!.*torsion).*: add such modes .*a larger count"):
         link_patches(SCENE, [twisting], few, from_modal_body("link", few))
     link_patches(SCENE, [twisting], body, spatial)  # the remedy: a larger count
     with pytest.raises(InputError, match="expected no weights with other layouts"):

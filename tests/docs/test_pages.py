@@ -18,7 +18,7 @@ sys.path.insert(0, str(DOCS))
 from palette import SAME, WIDEST, difference, pictures, reduced  # noqa: E402
 
 # What their commands do has tests of its own: studies, solids, resumed runs, paths.
-LONG = {"design", "long_runs", "machine_paths", "motor_sizing", "solid"}
+LONG = {"design", "drive", "long_runs", "machine_paths", "motor_sizing", "solid"}
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
