@@ -77,8 +77,8 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Fe
     P, D, difference, integral = (np.zeros((len(inputs), len(model.output_names))) for _ in range(4))
     for record in records:
         for joint, motor in [(name, motor) for name in record.joints for motor in _motors_of(name, inputs)]:
-            output = motor.replace("joint/", f"{record.side}/", 1)
-            at = inputs.index(motor), model.outputs(output)[0]
+            output = motor.replace("joint/", f"{record.side}/", 1)  # with a rigid gear the motor turns as the joint
+            at = inputs.index(motor), model.outputs(output if output in model.output_names else motor)[0]
             P[at] += record.proportional.get(joint, 0.0)
             (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
             integral[at] += record.integral.get(joint, 0.0)
