@@ -63,6 +63,10 @@ def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sens
             for joint in robot.motor_joints:
                 yield Sensor(joint=joint)
                 yield Sensor(joint=joint, measure="rate")
+        if isinstance(record, Lqr):
+            for joint in robot.elastic_joints:
+                yield Sensor(motor=joint)
+                yield Sensor(motor=joint, measure="rate")
         if isinstance(record, ModalVelocity | Lqr):
             bending = robot.patches if record.sensor == "pzt" else robot.links
             bodies = record.bodies if isinstance(record, ModalVelocity) else tuple(bending)

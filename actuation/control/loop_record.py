@@ -14,7 +14,7 @@ from ...mbs.analysis.samples import in_order
 from .controllers import Controller, Loop, Setup
 from .margins import Loops, Margins, advice, margins
 from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched
-from .records import ComputedTorque, JointPid, Lqr, SampledAnalysis
+from .records import ComputedTorque, JointPid, SampledAnalysis
 
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
@@ -119,7 +119,7 @@ def _warnings(
             f"sampling at {sampling / (2 * np.pi):.4g} Hz is slow for a controller that acts up to"
             f" {fastest / (2 * np.pi):.4g} Hz: expected at least {SAMPLES_PER_PERIOD} samples a period"
         )
-    if gears and any(isinstance(record, Lqr | ComputedTorque) for record in analysis.controller):
+    if gears and any(isinstance(record, ComputedTorque) for record in analysis.controller):
         lines.append("the controller is designed for rigid gears, but some are compliant")
     if metrics.verdict not in CALM:
         by_model = "" if found is None else f" (largest |eigenvalue| of the sampled linear loop: {found.radius:.6g})"

@@ -108,13 +108,9 @@ def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> Linea
     mechanism = _restricted(mechanism, keep)
     for pid in beside:
         for joint, name in setup.robot_coordinates(pid.joints):
-            along = mechanism.inputs[f"joint/{name}"]
+            held = np.outer(mechanism.inputs[f"joint/{name}"], mechanism.outputs[f"{pid.side}/{name}"])
             spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
-            mechanism = replace(
-                mechanism,
-                K=mechanism.K + spring * np.outer(along, along),
-                D=mechanism.D + damper * np.outer(along, along),
-            )
+            mechanism = replace(mechanism, K=mechanism.K + spring * held, D=mechanism.D + damper * held)
     return state_space(mechanism, {name: column[keep] for name, column in voltages.items()})
 
 
@@ -161,10 +157,10 @@ def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Ar
     """(f, outputs) that give coordinates, measured rates, and rates by differences (times T)."""
     values, rates, differences = np.zeros((3, model.freedom, len(setup.outputs)))
     names = list(model.state_names[: model.freedom])
-    for joint in setup.robot.motors:
-        i = names.index(f"joint/{joint}")
-        values[i, setup.columns(f"joint/{joint}")] = 1.0
-        rates[i, setup.columns(f"joint/{joint}/rate")] = 1.0
+    for name in _rigid_outputs(setup):
+        i = names.index(name)
+        values[i, setup.columns(name)] = 1.0
+        rates[i, setup.columns(f"{name}/rate")] = 1.0
     for body in setup.robot.links:
         rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body}/")], dtype=int)
         m = len(rows)
@@ -182,10 +178,16 @@ def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequenc
     """Modes that no input of the design reaches, or no sensor sees."""
     lost = controllability(model, list(inputs)).lost
     lines = [f"LQR: uncontrollable: {', '.join(lost)}"] if lost else []
-    seen = [f"joint/{name}" for name in setup.robot.motors]
+    seen = _rigid_outputs(setup)
     seen += [name for name in model.output_names if name.startswith("modal/") and _is_read(record, setup, name)]
     hidden = observability(model, seen).lost
     return (*lines, *([f"LQR: unobservable: {', '.join(hidden)}"] if hidden else []))
+
+
+def _rigid_outputs(setup: Setup) -> list[str]:
+    """Joints with motors, and these motors behind gears that give."""
+    joints = [f"joint/{name}" for name in setup.robot.motors]
+    return [*joints, *(f"motor/{name}" for name in setup.robot.elastic_joints)]
 
 
 def _is_read(record: Lqr, setup: Setup, name: str) -> bool:

@@ -13,9 +13,10 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.structs import struct
+from ...mbs.analysis.gears import with_motor_coordinates
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
-from ...mbs.model.gears import resistance
+from ...mbs.model.gears import elastic_joints, resistance, with_compliance
 from ...mbs.model.model import Model, build_model, row_values
 from ...mbs.model.rows import rows_of_joint
 from ...mbs.model.system import ZERO, MultibodySystem
@@ -144,7 +145,7 @@ class PatchedLink:
 class Robot:
     """A robot about the motion of an inverse analysis."""
 
-    model: Model  # its constraint equations are those of loops alone, its gears do not give
+    model: Model  # its constraint equations are those of loops alone, its gears do not give: see `linear`
     of_links: Mapping[str, LinkPatches]  # patches by link
     source: Outcome  # the inverse analysis
 
@@ -167,6 +168,11 @@ class Robot:
         """Of a joint: its name, or "NAME 1", "NAME 2" where there are several."""
         check_joint(self.model, joint)
         return tuple(name.removeprefix("joint/") for name, _ in labelled(self.model, joint))
+
+    @property
+    def elastic_joints(self) -> tuple[str, ...]:
+        """Names of joints with compliant gears."""
+        return tuple(node.joint.name for node in elastic_joints(self.model))
 
     @property
     def motors_fit(self) -> bool:
@@ -195,11 +201,12 @@ class Robot:
         )  # fmt: skip
 
     def linear(self, row: int) -> tuple[LinearMechanism, Mapping[str, Array]]:
-        """About output `row` of the motion, and what a unit of each voltage does along its s."""
-        source = self.source
-        linearisation = LinearEquations(self.model, source.q[row])
-        found = linearisation.at(float(source.time[row]), source.q[row], source.v[row], source.a[row])
-        return found, voltages_at(self.model, found, self.of_links)
+        """About output `row` of the motion, and what a unit of each voltage does along its s; with gears that give."""
+        plant = with_compliance(self.model)
+        moved = with_motor_coordinates(self.source, plant)
+        linearisation = LinearEquations(plant, moved.q[row])
+        found = linearisation.at(float(self.source.time[row]), moved.q[row], moved.v[row], moved.a[row])
+        return found, voltages_at(plant, found, self.of_links)
 
     def rigid(self) -> RigidArm:
         """With rigid links. Raises `InputError` where the motors do not fit the mechanism."""

@@ -195,6 +195,15 @@ def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     np.testing.assert_allclose(moments, tau, atol=1e-8 * np.abs(tau).max())
 
 
+def test_gains_on_the_motors_side_stand_beside_a_rigid_gear():
+    """Also where advice for the loop, which is not stable, tries gains for all motors."""
+    still = {"O": {"joint": "O", "value": "0.4"}, "A": {"joint": "A", "value": "-1.1"}}
+    wild = ON_MOTORS | {"derivative": {"O": 1e5}}
+    record = solve_scene(two_rods(loop(controller=[wild]), first=GIVES, paths=still)).outcomes["loop"].details
+    assert record.margins.radius > 1.0
+    assert record.advice
+
+
 def test_computed_torque_follows_without_any_feed_forward_better_the_faster_it_samples():
     def error(sample_time):
         control = [{"kind": "computed-torque", "bandwidth": 20.0}]

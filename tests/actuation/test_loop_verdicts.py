@@ -19,7 +19,7 @@ class Case:
         self.delay = float(rng.choice([0.0, 0.3, 1.0, 1.7])) * self.T
         self.inertia, self.spring = float(rng.uniform(0.2, 1.0)), None
         self.kind = ("pid", "lqr", "observer", "pid")[seed % 4]
-        if self.kind != "lqr" and rng.random() < 0.5:
+        if rng.random() < 0.5:
             self.spring = float(rng.uniform(0.05, 0.5)), float(10 ** rng.uniform(2, 3.5)), float(rng.uniform(0.0, 2.0))
         self.limit = float(rng.uniform(0.3, 3.0)) if rng.random() < 0.5 else np.inf
         self.noise = 1e-5 if rng.random() < 0.2 else 0.0
@@ -48,11 +48,9 @@ class Case:
 
     @property
     def reads(self):
-        """Rows of angle and rate of the motor's coordinate, where the torque acts."""
-        n = len(self.A) // 2
-        rows = np.zeros((2, 2 * n))
-        rows[0, 0] = rows[1, n] = 1.0
-        return rows
+        """Rows of angle and rate of the motor's coordinate, where the torque acts; of LQR all states."""
+        n = len(self.A)
+        return np.eye(n) if self.kind == "lqr" else np.eye(n)[[0, n // 2]]
 
     def pid(self):
         """Critical damping of all inertia, by random factors; its states are the last angle and the sum, where used."""
@@ -103,10 +101,11 @@ class Case:
         angle, rate, torque = 10 ** self.rng.uniform([-3, -2, -0.5], [-1, 0, 1.5])
         self.record = {"kind": "lqr", "angle": angle, "rate": rate, "moment": torque, "inputs": "motors"}
         K = self.gains(angle, rate, torque)
-        late = K.shape[1] - 2
+        n = len(self.A)
+        late = K.shape[1] - n
         shift, last = np.eye(late, k=1), np.zeros((late, 1))
         last[-1:] = 1.0
-        return shift - last @ K[:, 2:], -last @ K[:, :2], -K[:, 2:], -K[:, :2]
+        return shift - last @ K[:, n:], -last @ K[:, :n], -K[:, n:], -K[:, :n]
 
     def observer(self):
         """Of the angle alone, by random weights; half of them scaled by more than their margin."""
@@ -138,7 +137,7 @@ class Case:
         """Of the sampled loop: plant and commands on their way, and the controller."""
         F, G = self.waiting()
         A, B, C, D = self.controller
-        y = np.hstack([self.reads, np.zeros((2, len(F) - len(self.A)))])
+        y = np.hstack([self.reads, np.zeros((len(self.reads), len(F) - len(self.A)))])
         return np.abs(np.linalg.eigvals(np.block([[F + G @ D @ y, G @ C], [B @ y, A]]))).max()
 
     def run(self):
@@ -201,7 +200,7 @@ class Case:
         }  # fmt: skip
         return ffrobot.make_scene(
             name="case", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}], joint=[joint],
-            trajectory=[{"name": "stand", "joint": "O", "value": "0"}],
+            trajectory=[{"name": "stand", subject: "O", "value": "0"}],
             analysis=[{"name": "still", "kind": "pcid", "end": END, "output_step": 0.01}, loop],
         )  # fmt: skip
 
