@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ...common.errors import InputError
+from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from ...mbs.analysis.gears import with_motor_coordinates
 from ...mbs.analysis.outcome import Outcome
@@ -73,7 +73,10 @@ class RigidArm:
         return row_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
-        """Coordinates q (n_q,) and C_v at motor angles gamma, by Newton from the last place."""
+        """Coordinates q (n_q,) and C_v at motor angles gamma, by Newton from the last place.
+
+        Raises `SolveError` where the links do not reach these angles.
+        """
         q = self._q
         for _ in range(MOST_ITERATIONS):
             values, gradients = row_values(self._model, q[None], np.zeros(1))
@@ -81,10 +84,14 @@ class RigidArm:
             C[self._motors] -= gamma
             C[self._turns] -= 2 * np.pi * np.round(C[self._turns] / (2 * np.pi))
             if np.abs(C).max() < TOLERANCE:
-                break
+                self._q = q
+                return q, C_v
             q = self._model.tree.integrate(q, -np.linalg.pinv(C_v) @ C)
-        self._q = q
-        return q, C_v
+        raise SolveError(
+            f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have, found"
+            f" {np.round(gamma, 6)}, {np.abs(C).max():.2g} (rad, m) from such after {MOST_ITERATIONS} steps: smaller"
+            " steps of the path, or a loop that stays nearer to it"
+        )
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
         """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""

@@ -195,6 +195,32 @@ def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     np.testing.assert_allclose(moments, tau, atol=1e-8 * np.abs(tau).max())
 
 
+def test_the_rigid_arm_says_where_its_links_do_not_reach():
+    """A slider driven at 0.35 m from the crank's axis; crank and rod are 0.4 m long in all."""
+
+    def bar(length):
+        return {"mass": 1.0, "inertia": 0.01, "center": [0.0, 0.0], "points": {"a": [0.0, 0.0], "b": [length, 0.0]}}
+
+    def joint(name, kind, *between, **keys):
+        return {"name": name, "type": kind, "between": between} | keys
+
+    scene = make_scene(
+        name="slider", gravity=[0.0, 0.0],
+        body=[{"name": name, "rigid": bar(length)} for name, length in (("c", 0.1), ("r", 0.3), ("s", 0.1))],
+        joint=[joint("O", "revolute", "ground", "c.a"), joint("A", "revolute", "c.b", "r.a"),
+               joint("B", "revolute", "r.b", "s.a"),
+               joint("S", "prismatic", "ground", "s.a", axis=[1.0, 0.0], motor=True)],
+        initial={"angles": {"c": 1.0, "r": -0.3, "s": 0.0}}, trajectory=[{"name": "t", "joint": "S", "value": "0.35"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.1}],
+    )  # fmt: skip
+    solution = solve_scene(scene)
+    arm = RigidArm(without_paths(solution.model), solution.outcomes["inverse"].q[0])
+    (crank,) = arm.place(np.array([0.36]))[0][:1]
+    assert np.cos(crank) == pytest.approx((0.36**2 + 0.1**2 - 0.3**2) / (2 * 0.36 * 0.1), abs=1e-9)  # law of cosines
+    with pytest.raises(SolveError, match="expected joint angles that the rigid links can have, found"):
+        arm.place(np.array([0.45]))
+
+
 def test_gains_on_the_motors_side_stand_beside_a_rigid_gear():
     """Also where advice for the loop, which is not stable, tries gains for all motors."""
     still = {"O": {"joint": "O", "value": "0.4"}, "A": {"joint": "A", "value": "-1.1"}}
