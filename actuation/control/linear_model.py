@@ -89,7 +89,7 @@ class LinearModel:
 
     def arrays(self) -> dict[str, Any]:
         """Everything of the model by name, as files hold it."""
-        return dict(vars(self))
+        return {name: getattr(self, name) for name in type(self).__annotations__}
 
     def save(self, path: Path) -> None:
         """Write to a .npz or .mat file (MATLAB's). Raises `InputError` for another suffix."""
