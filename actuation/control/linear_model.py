@@ -208,6 +208,7 @@ def _zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     return block[:n, :n], block[:n, n:] * scale
 
 
+STILL = 1e-10  # of the largest effect on its kind of output: less is round-off
 OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mode
 
 
@@ -240,20 +241,35 @@ class Reach:
 def controllability(model: LinearModel, inputs: Names) -> Reach:
     """By mode, from [λ² I + λ D̂ + K̂, b̂] (Popov–Belevitch–Hautus, for second-order equations)."""
     _, _, B, _ = model.second_order
-    return _reach(model, B[:, model.inputs(inputs)], left=True)
+    return _reach(model, _scaled(B, model.input_names)[:, model.inputs(inputs)], left=True)
 
 
 def observability(model: LinearModel, outputs: Names) -> Reach:
     """By mode, as `controllability` with the outputs' rows."""
     _, _, _, C = model.second_order
-    return _reach(model, C[model.outputs(outputs)].T, left=False)
+    return _reach(model, _scaled(C.T, model.output_names)[:, model.outputs(outputs)], left=False)
+
+
+def _scaled(columns: Array, names: Sequence[str]) -> Array:
+    """Columns (f, names) over their size, of a point over that of all its directions: axes do not matter.
+
+    None of what is still to round-off next to the largest of its kind.
+    """
+    groups = [name.rpartition("/")[0] if name.startswith(("point/", "force/")) else name for name in names]
+    found, largest = np.zeros_like(columns), dict[str, float]()
+    sizes = {of: float(np.linalg.norm(columns[:, [of == other for other in groups]], 2)) for of in groups}
+    for of, size in sizes.items():
+        kind = of.partition("/")[0]
+        largest[kind] = max(largest.get(kind, 0.0), size)
+    for k, of in enumerate(groups):
+        if sizes[of] > STILL * largest[of.partition("/")[0]]:
+            found[:, k] = columns[:, k] / sizes[of]
+    return found
 
 
 def _reach(model: LinearModel, columns: Array, left: bool) -> Reach:
     K, D, _, _ = model.second_order
     modes, unit = robot_modes(model), np.eye(model.freedom)
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0.0] / size[size > 0.0]
     scale = np.abs(modes.poles).max(initial=0.0) ** 2
     measure = np.zeros(model.freedom)
     for k, pole in enumerate(modes.poles[:, 0]):

@@ -139,3 +139,17 @@ def test_modes_without_reach_are_named():
     straight = arm(gravity=(0.0, 0.0), initial={"angles": {"link1": 0.0, "link2": 0.0}}, trajectory=())
     along = observability(at_rest(straight), "point/link2.tip/x")
     assert len(along.lost) == model.freedom
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.7, np.pi])
+def test_measures_do_not_depend_on_the_axes(turned):
+    """A robot turned as a whole; straight, its tip moves along one axis, or across both, and not along it."""
+    found = []
+    for way in (0.0, turned):
+        for bent in (0.0, 0.4):
+            angles = {"link1": way, "link2": way + bent}
+            model = at_rest(arm(gravity=(0.0, 0.0), initial={"angles": angles}, trajectory=()))
+            outputs = [name for name in model.output_names if name.startswith("point/")]
+            inputs = [name for name in model.input_names if name.startswith("force/")]
+            found.append([observability(model, outputs).measure, controllability(model, inputs).measure])
+    np.testing.assert_allclose(found[:2], found[2:], rtol=1e-6, atol=1e-9)
