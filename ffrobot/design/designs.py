@@ -66,14 +66,11 @@ def may_repeat(keys: Sequence[Key]) -> bool:
     return not any(key[0] == "analysis" for key in keys)
 
 
-def repeated_steps(results: Results, readings: Iterable[Reading]) -> dict[Key, Any] | None:
+def repeated_steps(results: Results) -> dict[Key, Any] | None:
     """Changes of a scene with which its integrations take the steps of a run again, whose `results` these are.
 
-    None where one of them cannot be repeated, or one of the `readings` lies between outputs, as runs that repeat steps
-    have outputs alone; nothing where none is integrated, and differences are smooth anyway.
+    None where one of them cannot be repeated; nothing where none is integrated, and differences are smooth anyway.
     """
-    if any(reading.is_between for reading in readings):
-        return None
     about = {name: results.attributes(name) for name in results.analyses}
     stepping = [name for name in about if about[name]["steps"]]
     repeated = all(results.has(f"{name}/{DATASET}") for name in stepping)

@@ -109,7 +109,7 @@ class Evaluations:
         try:
             with design.results() as results:
                 readings = tuple(goal.read(results) for goal in self.problem.goals)
-                found = Evaluated(place, design, readings, again=repeated_steps(results, readings))
+                found = Evaluated(place, design, readings, again=repeated_steps(results))
         except InputError as error:
             if first:  # a goal that means nothing
                 raise

@@ -209,7 +209,7 @@ def _start(
         designs = Designs(runs, keys, point, fixed)
         with designs.run_first(point).results() as results:
             readings = tuple(goal.read(results) for goal in goals)
-            again = repeated_steps(results, readings) if repeats else None
+            again = repeated_steps(results) if repeats else None
         if again:
             break
     return designs, Base(goals, readings, keys, point, steps, repeats if again else 0.0, again or {})

@@ -19,6 +19,7 @@ from ..solve.posture import misfits
 
 FEWEST = 2000  # intervals of a run
 KEPT = 16_384  # states of an integration at most
+PARTS_OF_STEP = 4  # of integrations that others repeat
 LOOKED_AT = 2000  # of these, those at which steps have to end, and all others next to the largest values
 HIGHEST = 4  # local maxima of each quantity
 MOST = 20_000  # times of a prescribed motion
@@ -36,10 +37,10 @@ DENSE, HUMP, FEW = 8, 0.02, 0.1  # times within an interval, of the range, of th
 def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | None:
     """Samples for an integration over the output `times` (T,), s; None where there is nothing to integrate.
 
-    And of one that is repeated: how its outputs differ from those of another run is all that it is for.
+    Runs whose differences count have more: peaks of theirs are to be known as well as their derivatives.
     """
-    duration = float(times[-1] - times[0])
-    return _core.Samples(duration / FEWEST, KEPT) if duration > 0.0 and not analysis.is_repeated else None
+    duration, parts = float(times[-1] - times[0]), PARTS_OF_STEP if analysis.keep_steps or analysis.is_repeated else 1
+    return _core.Samples(duration / FEWEST, parts * KEPT, parts) if duration > 0.0 else None
 
 
 def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:

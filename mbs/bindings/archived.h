@@ -27,7 +27,7 @@ template <class Archive> void fields(Archive &a, Recording &x) {
   archived_all(a, x.times, x.states, x.tolerance, x.methods);
 }
 template <class Archive> void fields(Archive &a, Samples &x) {
-  archived_all(a, x.longest, x.most, x.times, x.states, x.steps, x.every);
+  archived_all(a, x.longest, x.most, x.parts, x.times, x.states, x.steps, x.every);
 }
 
 namespace recursion {

@@ -62,8 +62,10 @@ void bind_integrate(nb::module_ &m) {
                                      "States within a run, closer than its outputs: mbs/core/integrate/integrate.h.");
   samples
       .def(
-          "__init__", [](Samples *s, double longest, std::size_t most) { new (s) Samples{longest, most}; }, "longest"_a,
-          "most"_a, "longest: s between two of them, where steps are longer; most: of them.")
+          "__init__",
+          [](Samples *s, double longest, std::size_t most, int parts) { new (s) Samples{longest, most, parts}; },
+          "longest"_a, "most"_a, "parts"_a = 1,
+          "longest: s between two of them, where steps are longer; most: of them; parts: of each step, at least.")
       .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
       .def_prop_ro(
           "states", [](const Samples &s) { return as_vector(s.states); }, "(q, v) of each, one after the other.");

@@ -29,7 +29,7 @@ void Delivery::record(double t, const double *z) {
 void Delivery::sample_step(Method &method, double t, const double *z, double h, double end) {
   if (!samples_)
     return;
-  const int parts = static_cast<int>(std::ceil(h / samples_->longest));
+  const int parts = std::max(samples_->parts, static_cast<int>(std::ceil(h / samples_->longest)));
   if (parts > 1) {
     method.prepare_dense(t, z, h);
     for (int i = 1; i < parts; ++i) {
@@ -46,7 +46,7 @@ void Delivery::sample_step(Method &method, double t, const double *z, double h, 
 void Delivery::sample(double t, const double *z) {
   if (!samples_)
     return;
-  auto &[longest, most, times, states, steps, every] = *samples_;
+  auto &[longest, most, parts, times, states, steps, every] = *samples_;
   const std::size_t n = static_cast<std::size_t>(system_.local().state_size());
   if (times.size() >= most) {
     std::size_t kept = 0;

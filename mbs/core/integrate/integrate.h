@@ -24,11 +24,13 @@ struct Recording {
 };
 
 // States within a run, closer than its outputs: ends of steps, and times between them where steps are longer than
-// `longest`. With more than `most` of them every other one is dropped, and of later steps every second end taken, then
-// every fourth. A run that goes on with an earlier one goes on with its samples.
+// `longest`, so that each step has `parts` at least. With more than `most` of them every other one is dropped, and of
+// later steps every second end taken, then every fourth. A run that goes on with an earlier one goes on with its
+// samples.
 struct Samples {
   double longest;                     // s
   std::size_t most;                   // at least 2
+  int parts = 1;                      // of each step, at least
   std::vector<double> times{};        // s
   std::vector<double> states{};       // (q, v) of each, one after the other
   unsigned long steps = 0, every = 1; // made so far; of them, the ends that are taken
