@@ -8,8 +8,8 @@ import pytest
 from rigid_robots import of_rpy
 
 from ffrobot import InputError
+from ffrobot.common.rotations import of_quaternion, rpy_of
 from ffrobot.common.rotations import of_rpy as of_rpy_here
-from ffrobot.common.rotations import rpy_of
 from ffrobot.common.validation import validate
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.mbs.scene.mechanism import MechanismKeys
@@ -99,6 +99,46 @@ def test_welds_are_merged_and_their_frames_stay_as_points(imported):
     np.testing.assert_allclose(body["rigid"]["inertia"], [0.04 + 4 * 0.2**2, 0.04 + 4 * 0.2**2, 0.02])
     np.testing.assert_allclose(body["rigid"]["points"]["tip"], [0.1, 0, 0.4])
     assert '"base" (mass 2 kg) is fixed to the ground' in out
+
+
+def test_quaternions_turn_as_angles_do(tmp_path):
+    """URDF 1.1: `quat_xyzw`, scalar last, of joints and of inertias; by any length that digits leave."""
+    e = np.array([0.3, -0.2, 0.5, 0.7]) / np.linalg.norm([0.3, -0.2, 0.5, 0.7])
+    rpy = " ".join(map(repr, rpy_of(of_quaternion(e[[3, 0, 1, 2]]))))
+    found, urdf = [], tmp_path / "robot.urdf"
+    for turn in (f'rpy="{rpy}"', f'quat_xyzw="{" ".join(f"{0.99 * x:.17g}" for x in e)}"'):
+        arm = link("arm", INERTIAL.replace("<mass", f'<origin xyz="0.1 0 0" {turn}/><mass'))
+        text = robot(BASE, arm, joint("j", "base", "arm").replace('xyz="0 0 0.3"', f'xyz="0 0 0.3" {turn}'))
+        urdf.write_text(text)
+        keys = import_urdf(urdf, tmp_path / "scene", {}, force=True).scene
+        found.append([keys["body"][0]["rigid"]["inertia"], keys["joint"][0]["axis"], keys["joint"][0]["rpy"]])
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-14)
+
+
+LEFT = {
+    '<limit lower="-1" upper="2" acceleration="5" jerk="9"/>': '<limit acceleration="5" jerk="9"> of joint "j" left',
+    '<dynamics damping="0.1" spring_stiffness="50"/>': '<dynamics spring_stiffness="50"> of joint "j" left out',
+    "<safety_controller/>": '<safety_controller> of joint "j" left out; likewise of "k"',
+    '<limit effort="1"/>': 'joint "j": no <limit> with a range: it moves without end',
+    "": 'joint "j": no <limit> with a range: it moves without end',
+}
+
+
+@pytest.mark.parametrize("inside", LEFT)
+def test_all_that_is_left_out_is_told(inside, tmp_path):
+    limit = '<limit lower="-1" upper="2" effort="30" velocity="4"/>'
+    joints = (joint(*ends).replace(limit, inside) for ends in (("j", "base", "arm"), ("k", "arm", "hand")))
+    bent = link("hand", INERTIAL.replace('ixy="0"', 'ixy="0" iyx="0.001" izx="0"'))
+    ball = link("arm", INERTIAL + "<collision><geometry><ellipsoid/></geometry></collision>")
+    transmission = '<transmission><joint name="k"/></transmission>'
+    (tmp_path / "robot.urdf").write_text(robot(BASE, ball, bent, *joints, transmission, "<material/>"))
+    remarks = import_urdf(tmp_path / "robot.urdf", tmp_path / "scene", {}).remarks
+    told = (LEFT[inside], '<inertia iyx="0.001"> of link "hand" left out', '<ellipsoid> in <collision> of link "arm"',
+            '1 <transmission> left out, of "k"')  # fmt: skip
+    for text in told:
+        assert sum(remark.startswith(text) for remark in remarks) == 1, text
+    assert not any("material" in remark for remark in remarks)
 
 
 def test_mimic_limits_of_zero_and_masses_of_zero_are_told(imported):
@@ -192,6 +232,10 @@ WRONG = {
         robot(BASE, ARM, joint("j", "base", "arm").replace("0 1 0", "0 0 0")),
         "<axis>: expected a direction, found 0 0 0",
     ),
+    "two orientations": (robot(BASE, ARM, joint("j", "base", "arm", at='0 0 1" rpy="0 0 0" quat_xyzw="0 0 0 1')),
+                         "expected rpy or quat_xyzw, found both"),
+    "a quaternion of length 0": (robot(BASE, ARM, joint("j", "base", "arm", at='0 0 1" quat_xyzw="0 0 0 0')),
+                                 "expected a quaternion of length 1, found length 0"),
     "the same name twice": (robot(BASE, BASE), 'found several of the name "base"'),
 }  # fmt: skip
 
@@ -213,6 +257,9 @@ def test_units_in_a_wrong_scale_are_told(imported):
     heavy = INERTIAL.replace("0.02", "20000").replace("0.01", "10000")
     _, out = imported(robot(BASE, link("arm", heavy), joint("j", "base", "arm")), "--force")
     assert 'link "arm": radius of gyration 100 m, in a robot whose joints span 0.3 m' in out
+    base_axes = INERTIAL.replace("<mass", '<origin xyz="0.9 0 1.2"/><mass')
+    _, out = imported(robot(BASE, link("arm", base_axes), joint("j", "base", "arm")), "--force")
+    assert 'link "arm": its center of mass is 1.5 m from its frame, its inertia within 0.1 m' in out
 
 
 CUBE = """solid cube

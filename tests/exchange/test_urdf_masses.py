@@ -32,6 +32,7 @@ def body_of(found):
 MESHES = {
     '<box size="0.1 0.2 0.3"/>': trimesh.creation.box((0.1, 0.2, 0.3)),
     '<cylinder radius="0.05" length="0.4"/>': trimesh.creation.cylinder(0.05, 0.4, sections=2000),
+    '<capsule radius="0.05" length="0.2"/>': trimesh.creation.capsule(0.2, 0.05, count=[400, 400]),
     '<sphere radius="0.07"/>': trimesh.creation.icosphere(6, 0.07),
 }
 

@@ -94,6 +94,7 @@ SHORTEST = 1e-3  # m, the whole robot
 # Radius of gyration over the robot's reach. Links of the robots of example-robot-data lie between 2e-3 and 0.6;
 # kg·cm² in place of kg·m² is a factor of 100, kg·mm² of 1000.
 WIDEST, NARROWEST = 3.0, 1e-4
+FAR, APART = 2.0, 10.0  # a center of mass from its frame: times the way to the next joints, and the radius of gyration
 TURNS = 4 * np.pi  # rad: limits of joints that turn are within; a full turn in degrees is 360
 
 
@@ -116,11 +117,19 @@ def remarks_on_scale(robot: Robot) -> Iterator[str]:
     for link in robot.links.values():
         if (part := link.inertial) is None or part.mass == 0 or reach == 0:
             continue
+        label = f'link "{shown(link.name)}"'
         gyration = float(np.sqrt(np.abs(np.linalg.eigvalsh(part.inertia)).max() / part.mass))
         if not NARROWEST * reach <= gyration <= WIDEST * reach:
             yield (
-                f'link "{shown(link.name)}": radius of gyration {gyration:.3g} m, in a robot whose joints span'
+                f"{label}: radius of gyration {gyration:.3g} m, in a robot whose joints span"
                 f" {reach:.3g} m: URDF is in kg m²; is this inertia in another unit, or a placeholder?"
+            )
+        beside = [ways[joint.name] for joint in robot.joints.values() if link.name in (joint.parent, joint.child)]
+        away = float(np.linalg.norm(part.center))
+        if away > FAR * max(beside, default=np.inf) and away > APART * gyration:
+            yield (
+                f"{label}: its center of mass is {away:.3g} m from its frame, its inertia within {gyration:.3g} m: the"
+                " <origin> of <inertial> is in axes of the link; is this one in those of the base?"
             )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -13,7 +13,7 @@ from xml.parsers import expat
 import numpy as np
 
 from ...common.errors import InputError, did_you_mean, quoted
-from ...common.rotations import of_rpy
+from ...common.rotations import of_quaternion, of_rpy, rpy_of
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_bytes
 from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink, three
@@ -25,6 +25,15 @@ ONCE = {
     "inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic",
 }  # fmt: skip
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+READ: Mapping[str, Container[str]] = {
+    "robot": {"name", "version"}, "link": {"name"}, "joint": {"name", "type"}, "inertial": (), "mass": {"value"},
+    "inertia": ENTRIES, "origin": {"xyz", "rpy", "quat_xyzw"}, "parent": {"link"}, "child": {"link"}, "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity"}, "dynamics": {"damping", "friction"},
+    "mimic": {"joint", "multiplier", "offset"},
+}  # fmt: skip
+"""Attributes that are read, by element; of elements that are not here the import leaves out all."""
+UNIT = 0.1  # how far from 1 the length of a quaternion may be by its digits
+SHAPES = ("visual", "collision", "material")  # for the eye, or read as far as masses and pictures need them
 
 
 def read_urdf(path: Path) -> Robot:
@@ -79,7 +88,8 @@ def robot_of(root: Element) -> Robot:
     check_mimics(by_name)
     base = root_of([link.name for link in links], joints)
     name = root.get("name", "").strip() or base
-    return Robot(name, {link.name: link for link in links}, by_name, base, (*_turned(root), *_repeated(root)))
+    odd = (*_turned(root), *_repeated(root), *_not_read(root))
+    return Robot(name, {link.name: link for link in links}, by_name, base, odd)
 
 
 def _turned(root: Element) -> Iterable[str]:
@@ -102,6 +112,57 @@ def _repeated(root: Element) -> Iterable[str]:
                 if count > 1:
                     told = f"{count} <{tag}>{inside}: the first counts, the others do not"
                     yield f'{each.tag} "{shown(_name(each))}": {told}'
+
+
+def _not_read(root: Element) -> Iterator[str]:
+    """Remarks on elements and attributes that have no place in a scene; on alike ones of several links one remark."""
+    known = {child.get("name", "") for child in root if child.tag in ("link", "joint")}
+    beside = [child for child in root if child.tag not in (*READ, *SHAPES)]
+    for tag, count in Counter(child.tag for child in beside).items():
+        named = (each.get(key, "") for child in beside if child.tag == tag for each in child.iter() for key in NAMING)
+        about = dict.fromkeys(name for name in named if name in known)
+        extra = ": rotor_inertia and gear_ratio of a joint say what motors add" if tag == "transmission" else ""
+        yield f"{count} <{shown(tag)}> left out{f', of {_listed(about)}' if about else ''}{extra}"
+    alike = dict[tuple[str, ...], dict[str, str]]()
+    for each in (root, *root.findall("link"), *root.findall("joint")):
+        for kind, text in _left_of(each):
+            alike.setdefault((each.tag, *kind), {})[_name(each) if each is not root else ""] = text
+    for (tag, *_), of in alike.items():
+        (first, text), *more = of.items()
+        likewise = f"; likewise of {_listed(name for name, _ in more)}" if more else ""
+        yield f"{text} of {tag} {quoted([shown(first)]) if first else ''} left out{likewise}".replace("  ", " ")
+
+
+NAMING = ("reference", "name")
+
+
+def _listed(names: Iterable[str]) -> str:
+    first, more = (names := list(map(shown, names)))[:6], len(names) - 6
+    return quoted(first) + (f" and {more} more" if more > 0 else "")
+
+
+def _left_of(element: Element) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is not read of an element and of those inside it: of which kind, and as it stands there.
+
+    The other product of inertia of two only where it is another one.
+    """
+    twin = {key: element.get(f"i{key[2]}{key[1]}") for key in ("iyx", "izx", "izy") if element.tag == "inertia"}
+    left = {key: value for key, value in element.items() if key not in READ[element.tag]}
+    left = {key: value for key, value in left.items() if not key.startswith("xmlns") and value != twin.get(key)}
+    if left:
+        words = " ".join(f'{shown(key)}="{shown(value)}"' for key, value in left.items())
+        yield (element.tag, *left), f"<{element.tag} {words}>"
+    for child in element if element.tag != "robot" else ():
+        if child.tag in READ:
+            yield from _left_of(child)
+        elif child.tag not in SHAPES:
+            yield (child.tag,), f"<{shown(child.tag)}>"
+        for shape in child.iterfind("geometry/*") if child.tag in SHAPES else ():
+            if shape.tag not in GEOMETRY:
+                yield (child.tag, shape.tag), f"<{shown(shape.tag)}> in <{child.tag}>"
+
+
+GEOMETRY = ("mesh", "box", "cylinder", "capsule", "sphere")
 
 
 def _check_once(kind: str, names: Iterable[str]) -> None:
@@ -151,13 +212,13 @@ def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primiti
         where = f"{label}: <{kind}>"
         for geometry in element.iterfind("geometry/*"):
             if geometry.tag == "mesh" and (filename := geometry.get("filename")):
-                scale = _triple(geometry, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>")
+                scale = three(_numbers(geometry, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>"))
                 yield MeshFile(filename, scale, _origin(element, where))
             elif geometry.tag == "box":
                 yield Primitive("box", _sizes(geometry, "size", 3), _origin(element, where))
-            elif geometry.tag == "cylinder":
+            elif geometry.tag in ("cylinder", "capsule"):
                 sizes = *_sizes(geometry, "radius"), *_sizes(geometry, "length")
-                yield Primitive("cylinder", sizes, _origin(element, where))
+                yield Primitive(geometry.tag, sizes, _origin(element, where))
             elif geometry.tag == "sphere":
                 yield Primitive("sphere", _sizes(geometry, "radius"), _origin(element, where))
 
@@ -178,13 +239,12 @@ def _joint(element: Element) -> UrdfJoint:
     if kind not in TYPES:
         raise InputError(f'{label}: type: expected one of {quoted(TYPES)}, found "{shown(kind)}"')
     axis = element.find("axis")
-    along = (1.0, 0.0, 0.0) if axis is None else _triple(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>")
+    along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>"))
     if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
         raise InputError(f"{label}: <axis>: expected a direction, found 0 0 0")
     return UrdfJoint(
         name, kind, _end(element, "parent", label), _end(element, "child", label), _origin(element, label), along,
-        _attributes(element, "limit", ("lower", "upper", "effort", "velocity"), label),
-        _attributes(element, "dynamics", ("damping", "friction"), label),
+        _attributes(element, "limit", label), _attributes(element, "dynamics", label),
         _mimic(element, label),
     )  # fmt: skip
 
@@ -206,11 +266,11 @@ def _mimic(joint: Element, label: str) -> Mimic | None:
     return Mimic(name, _number(element, "multiplier", where, 1.0), _number(element, "offset", where, 0.0))
 
 
-def _attributes(joint: Element, tag: str, keys: Iterable[str], label: str) -> dict[str, float]:
+def _attributes(joint: Element, tag: str, label: str) -> dict[str, float]:
     element = joint.find(tag)
     if element is None:
         return {}
-    return {key: _number(element, key, f"{label}: <{tag}>") for key in keys if element.get(key) is not None}
+    return {key: _number(element, key, f"{label}: <{tag}>") for key in element.attrib if key in READ[tag]}
 
 
 def _origin(element: Element, label: str) -> Origin:
@@ -218,7 +278,21 @@ def _origin(element: Element, label: str) -> Origin:
     if origin is None:
         return Origin()
     where = f"{label}: <origin>"
-    return Origin(_triple(origin, "xyz", (0.0, 0.0, 0.0), where), _triple(origin, "rpy", (0.0, 0.0, 0.0), where))
+    return Origin(three(_numbers(origin, "xyz", (0.0, 0.0, 0.0), where)), _rpy(origin, where))
+
+
+def _rpy(origin: Element, where: str) -> Numbers3:
+    """Roll, pitch and yaw of an <origin>, which URDF 1.1 may have as a quaternion, scalar last."""
+    if origin.get("quat_xyzw") is None:
+        return three(_numbers(origin, "rpy", (0.0, 0.0, 0.0), where))
+    if origin.get("rpy") is not None:
+        raise InputError(f"{where}: expected rpy or quat_xyzw, found both")
+    *vector, scalar = _numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0), where)
+    e = np.array([scalar, *vector])
+    size = float(np.linalg.norm(e))
+    if abs(size - 1.0) > UNIT:
+        raise InputError(f"{where}: quat_xyzw: expected a quaternion of length 1, found length {size:g}")
+    return three(rpy_of(of_quaternion(e / size)))
 
 
 def _number(element: Element, key: str, label: str, default: float | None = None) -> float:
@@ -230,14 +304,15 @@ def _number(element: Element, key: str, label: str, default: float | None = None
     return _finite(text, f"{label}: {key}")
 
 
-def _triple(element: Element, key: str, default: Numbers3, label: str) -> Numbers3:
+def _numbers(element: Element, key: str, default: tuple[float, ...], label: str) -> tuple[float, ...]:
+    """As many as `default` has, which stands for a missing attribute."""
     text = element.get(key)
     if text is None:
         return default
     parts = text.split()
-    if len(parts) != 3:
-        raise InputError(f'{label}: {key}: expected three numbers, found "{shown(text)}"')
-    return three(_finite(part, f"{label}: {key}") for part in parts)
+    if len(parts) != len(default):
+        raise InputError(f'{label}: {key}: expected {len(default)} numbers, found "{shown(text)}"')
+    return tuple(_finite(part, f"{label}: {key}") for part in parts)
 
 
 def _finite(text: str, label: str) -> float:

@@ -108,9 +108,12 @@ class MeshFile:
 
 @dataclass(frozen=True)
 class Primitive:
-    """A shape about its center: a box of `size` x, y, z; a cylinder along z (radius, length); a sphere (radius,). m."""
+    """A shape about its center: a box of `size` x, y, z; a cylinder along z (radius, length); a sphere (radius,). m.
 
-    shape: Literal["box", "cylinder", "sphere"]
+    A capsule (radius, length) is a cylinder with half a sphere on either end.
+    """
+
+    shape: Literal["box", "cylinder", "capsule", "sphere"]
     size: tuple[float, ...]
     origin: Origin
 
@@ -157,14 +160,14 @@ class UrdfJoint:
 class Robot:
     """Links and joints by name, in the order of the file; `root` is the link that no joint carries.
 
-    `turned` are remarks on angles of more than a turn.
+    `remarks` are on what is odd in the file, and on what is not read of it.
     """
 
     name: str
     links: Mapping[str, UrdfLink]
     joints: Mapping[str, UrdfJoint]
     root: str
-    turned: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def joints_of(self, link: str) -> list[UrdfJoint]:
         """Those whose parent is this link."""

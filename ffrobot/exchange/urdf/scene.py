@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...mbs.fields.field_types import GROUND
 from .bodies import Body, Mechanism
 from .flexible import FlexibleLink
 from .names import Names
-from .robot import HERE, MeshFile, Robot, UrdfJoint
+from .robot import HERE, MeshFile, Origin, Primitive, Robot, UrdfJoint, three
 
 GRAVITY = [0.0, 0.0, -9.81]
 SCENE_TYPE = {
@@ -38,7 +39,7 @@ class SceneOfRobot:
     ) -> None:
         """`meshes` are files from the folder of the scene on, by the names that the URDF has for them."""
         self.robot, self.found, self.flexible, self.meshes = robot, found, flexible, meshes
-        self.remarks = [*robot.turned, *found.remarks]
+        self.remarks = [*robot.remarks, *found.remarks]
         self.bodies, self.joints = Names((GROUND,)), Names()
         self.points = {body.top: Names((ORIGIN,)) for body in found.bodies}
         joints = [self._joint(joint) for joint in found.joints]  # first: they name points
@@ -116,7 +117,7 @@ class SceneOfRobot:
     def _visuals(self, body: Body) -> Iterator[dict[str, Any]]:
         """Shapes of all its links, in the body's axes; meshes as far as their files are there."""
         for link, place in body.members.items():
-            for shape in self.robot.links[link].visual:
+            for shape in (part for whole in self.robot.links[link].visual for part in _shown(whole)):
                 at = place @ shape.origin.place
                 if isinstance(shape, MeshFile):
                     if shape.filename not in self.meshes:
@@ -174,7 +175,9 @@ class SceneOfRobot:
         if lower < upper:
             keys["position_limit"] = [lower, upper]
         elif joint.type != "continuous":
-            self.remarks.append(f"{label}: range {lower:g} … {upper:g} left out: nothing lies between")
+            told = f"range {lower:g} … {upper:g} left out: nothing lies between"
+            has_range = bool({"lower", "upper"} & limits.keys())
+            self.remarks.append(f"{label}: {told if has_range else 'no <limit> with a range: it moves without end'}")
         for key, ours in (("effort", "moment_limit"), ("velocity", "speed_limit")):
             if limits.get(key, 0.0) > 0:
                 keys[ours] = limits[key]
@@ -212,6 +215,17 @@ class SceneOfRobot:
             elif value:
                 keys[ours] = value
         return keys
+
+
+def _shown(shape: MeshFile | Primitive) -> Iterator[MeshFile | Primitive]:
+    """Shapes that scenes have: of a capsule its cylinder and two spheres."""
+    if not isinstance(shape, Primitive) or shape.shape != "capsule":
+        yield shape
+        return
+    (radius, length), place = shape.size, shape.origin.place
+    yield replace(shape, shape="cylinder")
+    for end in (-length / 2, length / 2):
+        yield Primitive("sphere", (radius,), Origin(three(place.d + end * place.C[:, 2])))
 
 
 def _numbers(vector: Iterable[float]) -> list[float]:

@@ -221,15 +221,23 @@ def _name(shape: MeshFile | Primitive) -> str:
 
 
 def _of_primitive(shape: Primitive, density: float) -> Inertial:
-    """Solid box, cylinder or sphere: the textbook's moments about the center."""
+    """Solid box, cylinder, capsule or sphere: the textbook's moments about the center.
+
+    The half spheres of a capsule have their centers 3/8 of the radius beyond the ends of its cylinder.
+    """
     moments: Array
     if shape.shape == "box":
         x, y, z = shape.size
         mass, moments = density * x * y * z, np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
-    elif shape.shape == "cylinder":
+    elif shape.shape in ("cylinder", "capsule"):
         radius, length = shape.size
         across = (3 * radius**2 + length**2) / 12
         mass, moments = density * np.pi * radius**2 * length, np.array([across, across, radius**2 / 2])
+        if shape.shape == "capsule":
+            ends = density * 4 / 3 * np.pi * radius**3
+            across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * radius * length
+            moments = (mass * moments + ends * np.array([across, across, 0.4 * radius**2])) / (mass + ends)
+            mass += ends
     else:
         (radius,) = shape.size
         mass, moments = density * 4 / 3 * np.pi * radius**3, np.full(3, 0.4 * radius**2)
