@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..common.arrays import Array, Integers
+from ..common.arrays import Array, Integers, as_floats
 from ..common.structs import struct
 
 CellName = Literal["tetrahedron", "hexahedron"]
@@ -95,9 +95,7 @@ def in_gmsh_order(kind: str, cells: Integers, as_vtk: Mapping[str, list[int]] = 
 
 # Quality below which a cell is flat.
 SLIVER = 1e-3
-# Quadrature on the reference tetrahedron that is exact for cubics.
-_CUBIC_POINTS = np.array([[3, 3, 3], [2, 2, 2], [6, 2, 2], [2, 6, 2], [2, 2, 6]]) / 12
-_CUBIC_WEIGHTS = np.array([-4 / 5, *[9 / 20] * 4]) / 6
+_BLOCK = 20_000  # cells integrated at a time
 
 
 @lru_cache
@@ -119,17 +117,45 @@ def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
     return [powers for powers in all_of if cell == "hexahedron" or sum(powers) <= degree]
 
 
+def _monomials(cell: CellName, degree: int, X: Array) -> Array:
+    """(q, m) at `X` (q, 3)."""
+    return np.stack([np.prod(X**powers, axis=1) for powers in _exponents(cell, degree)], axis=1)
+
+
+def _of_nodes(cell: CellName, degree: int) -> Array:
+    """(m, v) coefficients of the monomials in the shape function of each node."""
+    return as_floats(np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree))))
+
+
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
     """(c, q, 3, 3) derivatives ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
-    at_nodes = [np.prod(reference_nodes(cell, degree) ** powers, axis=1) for powers in _exponents(cell, degree)]
-    slopes = _monomial_slopes(cell, degree, X) @ np.linalg.inv(np.stack(at_nodes, axis=1))  # (3, q, v)
+    slopes = _monomial_slopes(cell, degree, X) @ _of_nodes(cell, degree)  # (3, q, v)
     return np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
 
 
-def volume_of_tetrahedra(nodes: Array, degree: int) -> float:
-    """Of tetrahedra with `nodes` (c, v, 3): the determinant of their Jacobian is a cubic at most."""
-    determinants = np.linalg.det(jacobians(nodes, "tetrahedron", degree, _CUBIC_POINTS))
-    return float(np.sum(determinants @ _CUBIC_WEIGHTS))
+def volume_and_center(nodes: Array, cell: CellName, degree: int) -> tuple[float, Array]:
+    """Volume, and its center (3,), of cells with `nodes` (c, v, 3), warped or curved: exact but for round-off."""
+    X, weights = _gauss(cell, 2 * degree)
+    values = _monomials(cell, degree, X) @ _of_nodes(cell, degree)  # (q, v)
+    volume, moment = 0.0, np.zeros(3)
+    for some in np.array_split(nodes, len(nodes) // _BLOCK + 1):
+        parts = np.linalg.det(jacobians(some, cell, degree, X)) * weights
+        volume += float(parts.sum())
+        moment += np.einsum("cv,cvi->i", parts @ values, some)
+    return volume, as_floats(moment / volume)
+
+
+def _gauss(cell: CellName, count: int) -> tuple[Array, Array]:
+    """Gauss points (q, 3) and weights (q,): `count` along each axis of the cube, which collapses to the tetrahedron.
+
+    x = u, y = v (1 − u), z = w (1 − u)(1 − v): the determinant of that map takes two degrees (Stroud 1971).
+    """
+    of_line, weights = np.polynomial.legendre.leggauss(count)
+    u, v, w = (X := np.stack(np.meshgrid(*[(of_line + 1) / 2] * 3, indexing="ij"))).reshape(3, -1)
+    W = np.einsum("i,j,k->ijk", *[weights / 2] * 3).ravel()
+    if cell == "hexahedron":
+        return X.reshape(3, -1).T, W
+    return np.stack([u, v * (1 - u), w * (1 - u) * (1 - v)], axis=1), W * (1 - u) ** 2 * (1 - v)
 
 
 def cell_quality(corners: Array, cell: CellName) -> Array:

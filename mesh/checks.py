@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
-from .cells import KUHN, SLIVER, cell_quality, jacobians, reference_nodes, volume_of_tetrahedra
+from .cells import KUHN, SLIVER, cell_quality, jacobians, reference_nodes, volume_and_center
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import SolidGeometry
 
@@ -197,10 +197,10 @@ def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
 
     Else cells are too long for a thin curved wall, and the link would not have its mass.
     """
-    if curved.degree == 1:
+    if np.array_equal(part.points, curved.points):
         return
-    volume = volume_of_tetrahedra(curved.points[curved.cells], curved.degree)
-    change = volume_of_tetrahedra(part.points[part.cells], part.degree) / volume - 1
+    volume, after = (volume_and_center(each.points[each.cells], each.cell, each.degree)[0] for each in (curved, part))
+    change = after / volume - 1
     if abs(change) > _VOLUME:
         raise InputError(
             f"{where}: expected a mesh.size at which cells follow curved faces, found a volume {100 * change:+.1f} %"

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from ..common.arrays import Array, Integers, as_floats
 from ..common.errors import InputError
 from ..common.structs import struct
-from .cells import volume_of_tetrahedra
+from .cells import volume_and_center
 from .checks import METRES, check_connected, check_neighbours, check_quality, oriented, straightened
 from .faces import Boundary, SmoothFace
 from .part import is_step, source_of_file
@@ -53,7 +53,7 @@ class Inspection:
     low: Array
     high: Array
     volume: float  # m³, of the mesh, whose cells may be curved
-    center: Array  # (3,) of the volume within straight facets
+    center: Array  # (3,) of the volume
     faces: Sequence[PartFace]  # largest first
     # points, facets: (p, 3), (b, 3 or 4) of the boundary; `face_of` (b,) is the number of each facet's face
     points: Array
@@ -85,9 +85,7 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
     faces, face_of = boundary.smooth_faces, np.zeros(len(boundary.facets), dtype=np.int64)
     for k, face in enumerate(faces):
         face_of[face.facets] = k
-    volume, center = _volume(boundary)
-    if part.degree == 2 and part.cell == "tetrahedron":
-        volume = volume_of_tetrahedra(part.points[part.cells], part.degree)
+    volume, center = volume_and_center(part.points[part.cells], part.cell, part.degree)
     return Inspection(
         known, unit is not None or declared is not None,
         part.points.min(axis=0), part.points.max(axis=0), volume, center,
@@ -147,13 +145,3 @@ def _cylinder(points: Array, face: SmoothFace) -> tuple[Array, Array, float] | N
     on_axis = face.center + size * found.x[2:4] @ across
     along = (points - on_axis) @ axis
     return as_floats(on_axis + (along.min() + along.max()) / 2 * axis), axis, radius
-
-
-def _volume(boundary: Boundary) -> tuple[float, Array]:
-    """Volume and center (3,) by the divergence theorem over the boundary's triangles."""
-    corners = boundary.points[boundary.facets]
-    fan = [corners[:, [0, k, k + 1]] for k in range(1, corners.shape[1] - 1)]
-    parts = [(np.linalg.det(triangles) / 6, triangles.sum(axis=1) / 4) for triangles in fan]
-    volume = float(sum(part.sum() for part, _ in parts))
-    moment = sum(part @ center for part, center in parts)
-    return volume, as_floats(moment / volume)

@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from ffrobot.exchange.part_draft import draft_link
 from ffrobot.fe_models.link import computed_modal_body
+from ffrobot.mesh.cells import reference_nodes, volume_and_center
 from ffrobot.mesh.gmsh_session import gmsh_session
 from ffrobot.mesh.inspection import inspect_part
+from ffrobot.mesh.structured import structured_box
 
 LENGTH, HEIGHT, THICKNESS, RADIUS = 300.0, 40.0, 10.0, 12.0
 BORES = (25.0, 150.0, 275.0)
@@ -49,6 +51,38 @@ def test_a_step_file(tmp_path):
     planes = [face for face in part.faces if face.kind == "plane"]
     assert len(planes) == 6
     assert sum(face.area for face in planes[2:4]) == pytest.approx(2 * 0.3 * 0.01, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 3, 4, 5, 6, 7], [3, 0, 1, 2, 7, 4, 5, 6]])
+def test_a_bar_of_hexahedra_that_twists(order, tmp_path):
+    """By φ over its length, n cells of length L/n: each slice is an affine image, of area bh ((2 + cos φ/n)/3)."""
+    import meshio
+
+    length, height, width, turn, count = 0.3, 0.04, 0.02, 1.2, 6
+    bar = structured_box(length, (height, width), (height, width), (count, 2, 1), "hexahedron")
+    x, y, z = bar.points.T
+    a = turn * x / length
+    points = np.column_stack([x, np.cos(a) * y - np.sin(a) * z, np.sin(a) * y + np.cos(a) * z])
+    meshio.Mesh(points, [("hexahedron", bar.cells[:, order])]).write(tmp_path / "bar.vtk")
+    part = inspect_part(tmp_path / "bar.vtk", "m")
+    assert part.volume == pytest.approx(length * height * width * (2 + np.cos(turn / count)) / 3, rel=1e-12)
+    np.testing.assert_allclose(part.center, [length / 2, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
+def test_volumes_of_curved_cells(cell):
+    """A box sheared by squares, which cells of degree 2 follow exactly: its volume stays, its center is known."""
+    sides = np.array([0.3, 0.2, 0.5])
+    box = structured_box(1.0, (1.0, 1.0), (1.0, 1.0), (1, 1, 1), cell)
+    corners = (box.points + [0, 0.5, 0.5])[box.cells]
+    edges = (corners[:, [1, 3, 4] if cell == "hexahedron" else [1, 2, 3]] - corners[:, :1]).transpose(0, 2, 1)
+    nodes = (corners[:, :1] + np.einsum("cij,vj->cvi", edges, reference_nodes(cell, 2))) * sides
+    x, y, z = np.moveaxis(nodes, 2, 0)
+    bent = np.stack([x + 2 * y**2 - z**2, y + z**2, z], axis=2)
+    volume, center = volume_and_center(bent, cell, 2)
+    assert volume == pytest.approx(sides.prod(), rel=1e-13)
+    _, y2, z2 = sides**2 / 3
+    np.testing.assert_allclose(center, sides / 2 + [2 * y2 - z2, z2, 0], rtol=1e-13)
 
 
 def test_shafts_are_not_bores(tmp_path):
