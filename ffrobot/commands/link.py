@@ -79,7 +79,7 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
     print_inspection(file, part, density, console)
     if output is None:
         return
-    draft = draft_link(part, file, output.stem, output.absolute().parent)
+    draft = draft_link(part, file, output.stem, output.absolute().parent, density)
     from ..pictures.figures.body_shape import draw_part
     from ..pictures.figures.plot import write_figure
 

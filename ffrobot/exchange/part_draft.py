@@ -15,19 +15,23 @@ from ..mesh.checks import METRES
 from ..mesh.inspection import Inspection, PartFace
 from .urdf.names import toml_text
 
-ALUMINIUM = {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0}
+MATERIALS = (("aluminum", 70e9, 0.33, 2700.0), ("steel", 210e9, 0.3, 7850.0), ("titanium", 114e9, 0.34, 4430.0))
+"""Name, Young's modulus (Pa), Poisson's ratio and density (kg/m³)."""
+LIKE = 0.1  # densities of one material, relative
 AT_END = 1e-3  # of the length: how far a plane end is from the end of the bounding box
 ROUND_JOINT = 0.1  # least radius of a bore for a joint, of the part's extent across
 SQUARE = 0.1  # largest cosine between the axis of such a bore and the part
+ALIKE = 0.02  # extents across that differ by less, relative: principal axes there are as good as any others
 NEARLY = 0.98  # cosine between a normal and a direction that may be the same
 DIGITS = 9
 
 
-def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
-    """The text of a link file in `folder`, of aluminum: root and tip are the faces that joints most likely take.
+def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: float | None = None) -> str:
+    """The text of a link file in `folder`: root and tip are the faces that joints most likely take.
 
     These are two bores across the part, else its plane ends. All other plane faces and bores are there as comments.
-    Concentrated masses of a file in m are on the nearest of all these faces.
+    Concentrated masses of a file in m are on the nearest of all these faces. The material is aluminum, or the one of
+    the `density` (kg/m³) that is given; a comment says whose stiffness it has.
 
     Raises:
         InputError: the part has no two such faces.
@@ -53,9 +57,10 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
         keys = {"name": label, "position": _numbers(place), "normal": _numbers(axes @ face.direction)}
         return keys | ({"mass": mass_on[face]} if face in mass_on else {})
 
+    material, about = _material(density)
     keys = {
         "name": name,
-        "material": ALUMINIUM,
+        "material": material,
         "geometry": {
             "kind": "solid",
             "file": os.path.relpath(file.resolve(), folder.resolve()),
@@ -71,8 +76,18 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
         "interface": [interface("root", root), interface("tip", tip)],
     }
     tables = [interface(label, face) for label, face in others.items()]
-    head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n\n"
+    head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n{about}\n"
     return head + toml_text(keys) + "".join(_commented(tables))
+
+
+def _material(density: float | None) -> tuple[dict[str, float], str]:
+    """Keys of the material, and a comment on it."""
+    wanted = MATERIALS[0][-1] if density is None else density
+    name, E, nu, rho = min(MATERIALS, key=lambda one: abs(one[-1] / wanted - 1.0))
+    keys = {"youngs_modulus": E, "poissons_ratio": nu, "density": wanted}
+    if abs(rho / wanted - 1.0) < LIKE:
+        return keys, f"# Stiffness of {name}.\n"
+    return keys, f"# Stiffness of {name}, which is not the material of {wanted:g} kg/m3: replace it.\n"
 
 
 def _principal(part: Inspection) -> tuple[Array, Array]:
@@ -123,7 +138,7 @@ def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
 
 def _across(part: Inspection, root: PartFace, x: Array) -> Array:
     """The link's y axis: square to the axis of the root's bore, else the direction in which the part is thinnest."""
-    z = root.direction if root.kind == "bore" else _squared(part, _principal(part)[0][1])
+    z = root.direction if root.kind == "bore" else _squared(part, x)
     z = z - (z @ x) * x
     if np.linalg.norm(z) < SQUARE:
         z = np.eye(3)[np.abs(x).argmin()]
@@ -131,10 +146,19 @@ def _across(part: Inspection, root: PartFace, x: Array) -> Array:
     return np.cross(z / np.linalg.norm(z), x)
 
 
-def _squared(part: Inspection, direction: Array) -> Array:
-    """The normal of the largest plane face that nearly has `direction`, which nodes of a mesh show roughly."""
-    near = (face.direction for face in part.faces if face.kind == "plane" and abs(face.direction @ direction) > NEARLY)
-    return next(near, direction)
+def _squared(part: Inspection, x: Array) -> Array:
+    """The direction in which the part is wide: the normal of the largest plane face that nearly has it, if any.
+
+    Nodes of a mesh show it roughly; where the part is as thick as it is wide, of any large face along x, that of the
+    last axis of the file first.
+    """
+    axes, extent = _principal(part)
+    planes = [face for face in part.faces if face.kind == "plane"]
+    if extent[2] < (1 - ALIKE) * extent[1]:
+        return next((face.direction for face in planes if abs(face.direction @ axes[1]) > NEARLY), axes[1])
+    along = [face for face in planes if abs(face.direction @ x) < SQUARE]
+    large = [face.direction for face in along if face.area > (1 - ALIKE) * along[0].area]
+    return max(large, key=lambda normal: as_list(normal[::-1].round(3)), default=axes[1])
 
 
 def _commented(tables: list[dict[str, Any]]) -> Iterator[str]:

@@ -69,12 +69,29 @@ def test_a_bar_of_hexahedra_that_twists(order, tmp_path):
     np.testing.assert_allclose(part.center, [length / 2, 0, 0], atol=1e-12)
 
 
+@pytest.mark.parametrize("divisions", [(10, 1, 1), (12, 2, 1), (9, 3, 2)])
+def test_a_square_bar_gets_axes_along_its_faces(divisions, tmp_path):
+    """Both transverse axes are principal, any is right. The draft has the density that is given, and its stiffness."""
+    import meshio
+
+    bar = structured_box(0.4, (0.04, 0.04), (0.04, 0.04), divisions, "tetrahedron")
+    meshio.Mesh(bar.points, [("tetra", bar.cells)]).write(tmp_path / "bar.vtk")
+    part = inspect_part(tmp_path / "bar.vtk", "m")
+    for density, modulus, word in ((None, 70e9, "aluminum."), (7800.0, 210e9, "steel."), (1200.0, 70e9, "replace it")):
+        text = draft_link(part, tmp_path / "bar.vtk", "bar", tmp_path, density)
+        draft = tomllib.loads(text)
+        np.testing.assert_allclose(draft["geometry"]["y_axis"], [0, 1, 0], atol=1e-9)
+        assert draft["material"]["density"] == (density or 2700.0)
+        assert draft["material"]["youngs_modulus"] == modulus
+        assert word in text.splitlines()[1]
+
+
 @pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
 def test_volumes_of_curved_cells(cell):
     """A box sheared by squares, which cells of degree 2 follow exactly: its volume stays, its center is known."""
     sides = np.array([0.3, 0.2, 0.5])
     box = structured_box(1.0, (1.0, 1.0), (1.0, 1.0), (1, 1, 1), cell)
-    corners = (box.points + [0, 0.5, 0.5])[box.cells]
+    corners = (box.points + np.array([0, 0.5, 0.5]))[box.cells]
     edges = (corners[:, [1, 3, 4] if cell == "hexahedron" else [1, 2, 3]] - corners[:, :1]).transpose(0, 2, 1)
     nodes = (corners[:, :1] + np.einsum("cij,vj->cvi", edges, reference_nodes(cell, 2))) * sides
     x, y, z = np.moveaxis(nodes, 2, 0)
