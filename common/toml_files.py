@@ -1,7 +1,8 @@
-"""Reading TOML files: whatever is wrong with one comes as an `InputError` in its name."""
+"""TOML files: whatever is wrong with one that is read comes as an `InputError` in its name; text for readers."""
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -66,3 +67,48 @@ def check_limits(data: dict[str, Any], path: Path) -> None:
     """Raise `InputError`, a line for each, for what no key of any file may hold: see `tables.beyond_limits`."""
     if found := list(beyond_limits(data)):
         raise InputError("\n".join(f"{path}: {line}" for line in found[:10]))
+
+
+def toml_text(data: Mapping[str, Any]) -> str:
+    """The text of a file: plain keys first, then tables, then lists of tables."""
+    plain = {key: value for key, value in data.items() if not isinstance(value, Mapping) and not _is_tables(value)}
+    parts = ["\n".join(_lines(plain))] if plain else []
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            parts.append("\n".join([f"[{toml_key(key)}]", *_lines(value)]))
+        elif _is_tables(value):
+            parts += ["\n".join([f"[[{toml_key(key)}]]", *_lines(entry)]) for entry in value]
+    return "\n\n".join(parts) + "\n"
+
+
+def toml_line(key: str, value: object) -> str:
+    """A key with its value, in one line."""
+    return f"{toml_key(key)} = {_value(value)}"
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(entry, Mapping) for entry in value)
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [toml_line(key, value) for key, value in table.items()]
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(_lines(value))} }}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    raise TypeError(f"no TOML for {type(value).__name__}")
+
+
+def toml_key(key: str) -> str:
+    """A key, in quotes where it has to be."""
+    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if bare else _value(key)

@@ -22,6 +22,7 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.structs import struct
+from ...common.toml_files import toml_key
 from .linear_model import LinearModel, locked_frequencies, sampled
 from .records import ControllerRecord, JointPid, ModalVelocity
 
@@ -215,7 +216,7 @@ class Suggestion:
     def in_words(self) -> str:
         """As keys of a scene file."""
         P, D = (
-            ", ".join(f"{name} = {value:.2g}" for name, value in of.items())
+            ", ".join(f"{toml_key(name)} = {value:.2g}" for name, value in of.items())
             for of in (self.proportional, self.derivative)
         )
         return f"proportional = {{ {P} }}, derivative = {{ {D} }} (bandwidth {self.bandwidth:.2g} Hz)"

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..common.arrays import Array, as_list
 from ..common.errors import InputError
+from ..common.toml_files import toml_text
 from ..mesh.checks import METRES
 from ..mesh.inspection import Inspection, PartFace
-from .urdf.names import toml_text
 
 MATERIALS = (("aluminum", 70e9, 0.33, 2700.0), ("steel", 210e9, 0.3, 7850.0), ("titanium", 114e9, 0.34, 4430.0))
 """Name, Young's modulus (Pa), Poisson's ratio and density (kg/m³)."""

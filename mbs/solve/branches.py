@@ -14,7 +14,6 @@ robots, IEEE Transactions on Aerospace and Electronic Systems 20 (1984) 695–70
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import NamedTuple
@@ -23,6 +22,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...common.toml_files import toml_line
 from ..model.model import Model
 from ..model.tree import Node, Section
 from ..scene.mechanism import Word
@@ -38,21 +38,15 @@ SAME = 1e-6  # rad: angles that differ by less
 class StartPosture(NamedTuple):
     """One of them.
 
-    `q` (n_q,); `guess`, the line of [initial] that chooses it; `away` (rad), the largest turn to it; `branch`, how
-    its joints stand, by name (see `branch_names`).
+    `q` (n_q,); `guess`, the line of [initial] that chooses it, and `guesses`, its coordinates by joint; `away` (rad),
+    the largest turn to it; `branch`, how its joints stand, by name (see `branch_names`).
     """
 
     q: Array
     guess: str
+    guesses: dict[str, tuple[float, ...]]
     away: float
     branch: dict[str, Word]
-
-    @property
-    def guesses(self) -> dict[str, tuple[float, ...]]:
-        """The coordinates of that line by joint, rad."""
-        joints = tomllib.loads(self.guess)["joints"]
-        read = {name: value if isinstance(value, list) else [value] for name, value in joints.items()}
-        return {name: tuple(map(_number, values)) for name, values in read.items()}
 
 
 def start_postures(model: Model) -> list[StartPosture]:
@@ -63,8 +57,8 @@ def start_postures(model: Model) -> list[StartPosture]:
     Raises `InputError` where the scene has no start.
     """
     start = undeformed_posture(model).q
-    nodes, columns = turning_joints(model)
-    found = [StartPosture(start, as_guess(nodes, start), 0.0, branch_names(model, start))]
+    columns = turning_joints(model)[1]
+    found = [_posture(model, start, start)]
     state = mobility(model, start)
     if not columns.size or not model.rows or state.followed < state.freedom:
         return found
@@ -72,10 +66,17 @@ def start_postures(model: Model) -> list[StartPosture]:
     for q in others:
         if all(_turn(q, one.q, columns) > SAME for one in found):
             q[columns] = np.angle(np.exp(1j * q[columns]))
-            found.append(StartPosture(q, as_guess(nodes, q), _turn(q, start, columns), branch_names(model, q)))
+            found.append(_posture(model, q, start))
     found.sort(key=lambda one: one.away)
     names = [one.branch for one in found]
     return [one if one.branch not in names[:k] else one._replace(branch={}) for k, one in enumerate(found)]
+
+
+def _posture(model: Model, q: Array, start: Array) -> StartPosture:
+    nodes, columns = turning_joints(model)
+    guesses = {node.joint.name: tuple(node.coordinates(q).tolist()) for node in nodes}
+    away = _turn(q, start, columns) if columns.size else 0.0
+    return StartPosture(q, as_guess(nodes, q), guesses, away, branch_names(model, q))
 
 
 def chosen_start(model: Model) -> StartPosture | None:
@@ -94,15 +95,11 @@ def chosen_start(model: Model) -> StartPosture | None:
     for one in found:
         if all(is_so(model, one.q, tree.nodes[tree.carried[joint]], word) for joint, word in wanted.items()):
             return one
-    asked = ", ".join(f'{joint} = "{word}"' for joint, word in wanted.items())
     raise InputError(
-        f"{model.scene.path}: initial.branch: expected one of the {len(found)} postures that were found, found {asked},"
+        f"{model.scene.path}: initial.branch: expected one of the {len(found)} postures that were found, found"
+        f" {in_words(wanted)},"
         " which none of them is: see ffrobot pose without this key"
     )
-
-
-def _number(text: str | float) -> float:
-    return float(np.radians(float(text.removesuffix("*deg")))) if isinstance(text, str) else text
 
 
 def _turn(q: Array, other: Array, columns: Indices) -> float:
@@ -136,8 +133,7 @@ def branch_names(model: Model, q: Array) -> dict[str, Word]:
 
 def in_words(branch: Mapping[str, Word]) -> str:
     """A line of [initial]."""
-    inside = ", ".join(f'{joint} = "{word}"' for joint, word in branch.items())
-    return f"branch = {{ {inside} }}"
+    return toml_line("branch", branch)
 
 
 def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices, as_floats
 from ...common.errors import InputError
+from ...common.toml_files import toml_line
 from ..fields.field_types import split_point
 from ..model.model import Model, row_values
 from ..model.tree import Node
@@ -142,18 +143,16 @@ def are_regular(model: Model, q: Array, times: Array) -> Booleans:
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:
-    """The coordinates of joints at q (n_q,) as [initial] has them: "joints = { … }"."""
-    return f"joints = {{ {', '.join(_written(nodes, q))} }}"
+    """The coordinates of joints at q (n_q,) as a line of [initial] has them: "joints = { … }"."""
+    return toml_line("joints", {node.joint.name: _written(node, q) for node in nodes})
 
 
-def _written(nodes: Sequence[Node], q: Array) -> Iterator[str]:
-    for node in nodes:
-        x = node.coordinates(q)
-        numbers = [
-            f'"{round(np.degrees(value), 4) + 0.0:.6g}*deg"' if unit == "rad" else f"{value:.6g}"
-            for value, unit in zip(x.tolist(), node.joint.units, strict=True)
-        ]
-        yield f"{node.joint.name} = " + (numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]")
+def _written(node: Node, q: Array) -> object:
+    numbers = [
+        f"{round(np.degrees(value), 4) + 0.0:.6g}*deg" if unit == "rad" else float(f"{value:.6g}")
+        for value, unit in zip(node.coordinates(q).tolist(), node.joint.units, strict=True)
+    ]
+    return numbers[0] if len(numbers) == 1 else numbers
 
 
 def turned_guesses(scene: MechanismKeys) -> list[str]:

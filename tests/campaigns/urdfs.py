@@ -25,8 +25,9 @@ from record import options, record
 from rigid_robots import moments, with_motion
 
 from ffrobot import FfrobotError
+from ffrobot.common.toml_files import toml_text
 from ffrobot.exchange.urdf.import_urdf import import_urdf
-from ffrobot.exchange.urdf.names import FORBIDDEN, toml_text
+from ffrobot.exchange.urdf.names import FORBIDDEN
 from ffrobot.present.progress import Display
 from ffrobot.results.write import write_results
 from ffrobot.run.solve import solve_scene

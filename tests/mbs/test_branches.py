@@ -9,7 +9,7 @@ from rods import arm_of_rods
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.solve.branches import start_postures
+from ffrobot.mbs.solve.branches import in_words, start_postures
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
@@ -137,6 +137,20 @@ def test_an_elbow_by_name(word, side):
         assert results["rest/joints/A/coordinate"][0] == pytest.approx(-side * angle, abs=1e-6)
         y = results["rest/points/a.tip/position"][0, 1]
         assert (y > 0.1 * 0.5) == (side == 1)
+
+
+@pytest.mark.parametrize("name", ["elbow 1", "épaule", "関節", "a^b", "x = 1, y", 'a "quoted" #1', "a'b"])
+def test_joints_of_any_name(name):
+    """Lines for [initial] are TOML whatever joints are called, and choose the posture that they were printed for."""
+    tables = tomllib.loads(two_rods(branch={"A": "up"}).text)
+    tables["joint"][1]["name"], tables["initial"] = name, {"branch": {name: "up"}}
+    prepared = prepare_scene(make_scene(**tables))
+    for one in start_postures(prepared.model):
+        assert tomllib.loads(in_words(one.branch)) == {"branch": one.branch}
+        read = tomllib.loads(one.guess)["joints"]
+        assert read.keys() == one.guesses.keys() == {"O", name}
+        degrees = float(read[name].removesuffix("*deg"))
+        assert np.radians(degrees) == pytest.approx(one.guesses[name][0], abs=1e-5)
 
 
 def test_a_branch_that_is_not_there():

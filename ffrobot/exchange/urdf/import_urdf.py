@@ -13,12 +13,13 @@ import numpy as np
 from ...common.errors import FfrobotError, InputError, of_file
 from ...common.files import check_folder, write_atomically
 from ...common.tables import beyond_limits, shown
+from ...common.toml_files import toml_text
 from ...fe_models.link import cached_modal_body
 from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import Body, from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
-from .names import Names, toml_text
+from .names import Names
 from .read import read_urdf
 from .robot import Inertial, MeshFile, Robot, inertial_of
 from .scene import SceneOfRobot
