@@ -18,13 +18,15 @@ PIECE = 1 << 22  # bytes
 AnyPath = str | PathLike[str]
 
 
-def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False, ours: bool = False) -> None:
+def write_atomically(
+    path: Path, content: bytes, what: str, *, make_folder: bool = False, ours: bool = False, private: bool = False
+) -> None:
     """Write `content` to a temporary name in the same folder, then rename it to `path`.
 
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
     itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason; `InputError` where an
     input of the command (see `outputs.protected`) would be lost, or a file of another kind, unless the name is `ours`
-    alone, as in the cache.
+    alone, as in the cache. `private` files are for this user alone.
     """
     check_not_an_input(path)
     if not ours:
@@ -34,7 +36,7 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
     try:
         if make_folder:
             target.parent.mkdir(parents=True, exist_ok=True)
-        with _without_name(temporary) as stream:
+        with _without_name(temporary, 0o600 if private else 0o666) as stream:
             for start in range(0, len(content), PIECE):  # Ctrl-C is answered between two
                 stream.write(content[start : start + PIECE])
             stream.flush()
@@ -48,12 +50,12 @@ def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool
             temporary.unlink(missing_ok=True)
 
 
-def _without_name(temporary: Path) -> BinaryIO:
+def _without_name(temporary: Path, mode: int) -> BinaryIO:
     """A file in the folder of `temporary` that is gone with this process, however that ends; named where need be."""
     if hasattr(os, "O_TMPFILE") and os.path.isdir("/proc/self/fd"):
         with suppress(OSError):  # not on this file system
-            return os.fdopen(os.open(temporary.parent, os.O_TMPFILE | os.O_RDWR, 0o666), "wb")
-    return temporary.open("xb")
+            return os.fdopen(os.open(temporary.parent, os.O_TMPFILE | os.O_RDWR, mode), "wb")
+    return os.fdopen(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_RDWR, mode), "wb")
 
 
 def _name(stream: BinaryIO, temporary: Path) -> None:

@@ -13,7 +13,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..mesh.form_cache import folder_of_forms, installed_forms
+from ..common.cache import cache_folder
+from ..mesh.form_cache import installed_forms
 from .link import computed_modal_body
 from .link_source import LinkTable
 
@@ -41,12 +42,14 @@ def main() -> None:
     """Compile into the installation or, where nothing can be written there, into the user's cache."""
     target = installed_forms()
     if not os.access(next(folder for folder in target.parents if folder.exists()), os.W_OK):
-        target = folder_of_forms()
+        target = cache_folder("forms")
     with TemporaryDirectory() as own:
         os.environ["XDG_CACHE_HOME"] = own  # neither what is compiled already nor meshes of these links are to be seen
         for keys in links():
             computed_modal_body(LinkTable(keys, Path("<forms>")))
-        shutil.copytree(folder_of_forms(), target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.o", "*.lock"))
+        ignored = shutil.ignore_patterns("*.o", "*.lock")
+        forms = cache_folder("forms")
+        shutil.copytree(forms, target, dirs_exist_ok=True, ignore=ignored, copy_function=shutil.copyfile)
     sys.stdout.write(f"{len(list(target.glob('*/*.so')))} forms compiled in {target}\n")
 
 

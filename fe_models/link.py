@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from platformdirs import user_cache_path
 
+from ..common.cache import cache_folder, is_own
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import AnyPath, check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
@@ -96,13 +96,14 @@ def make_link(
     start, source = time.perf_counter(), _source(link)
     checked = read_link(source)
     digest, beside = input_hash(checked), _beside(source)
-    path = Path(output) if output is not None else beside[0] if beside else _cached(checked)
-    if not force and on_first(lambda: _up_to_date(path, digest) is not None):
+    cached = _cached(checked)
+    path = Path(output) if output is not None else [*beside, cached][0]
+    if not force and on_first(lambda: _up_to_date(path, digest, cached) is not None):
         return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
-    if path.parent != _cache_folder():
+    if path != cached:
         on_first(lambda: check_output(path, FORMAT))
     earlier = [] if force else [path, *beside]
-    return _compute(checked, link_path(source), path, digest, start, progress, earlier, force=force)
+    return _compute(checked, link_path(source), path, digest, start, progress, earlier, cached, force=force)
 
 
 def _source(link: AnyPath | LinkTable | Mapping[str, Any]) -> LinkSource:
@@ -122,9 +123,9 @@ def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> L
     link = read_link(source)
     digest, beside, path = input_hash(link), _beside(source), _cached(link)
     for candidate in (*beside, path):
-        if (body := _up_to_date(candidate, digest)) is not None:
+        if (body := _up_to_date(candidate, digest, path)) is not None:
             return LinkOutcome(candidate, body, False, time.perf_counter() - start)
-    return _compute(link, link_path(source), path, digest, start, progress, beside)
+    return _compute(link, link_path(source), path, digest, start, progress, beside, path)
 
 
 def computed_modal_body(source: LinkSource) -> ModalBody:
@@ -145,11 +146,8 @@ def _beside(source: LinkSource) -> list[Path]:
 
 
 def _cached(link: Link) -> Path:
-    return _cache_folder() / f"{modes_hash(link)}-{input_hash(link)}.h5"
-
-
-def _cache_folder() -> Path:
-    return user_cache_path("ffrobot") / "links"
+    """Where the cache has the modal body of a link, or would have it. Collective."""
+    return on_first(lambda: cache_folder("links")) / f"{modes_hash(link)}-{input_hash(link)}.h5"
 
 
 def _compute(
@@ -160,16 +158,17 @@ def _compute(
     start: float,
     progress: Progress | None,
     earlier: Sequence[Path],
+    cached: Path,
     *,
     force: bool = False,
 ) -> LinkOutcome:
     """Make the file at `path`: of the same modes where one of `earlier` or the cache has them, unless `force`."""
 
     def write(body: ModalBody) -> None:
-        write_modal_body(path, body, make_folder=path.parent == _cache_folder())
+        write_modal_body(path, body, in_cache=path == cached)
 
     def from_same_modes() -> bool:
-        body = None if force else _with_same_modes(link, earlier)
+        body = None if force else _with_same_modes(link, earlier, cached.parent)
         if body is not None:
             write(body)
         return body is not None
@@ -197,10 +196,10 @@ def _compute(
     return LinkOutcome(path, body, True, time.perf_counter() - start, "mesh" if meshed else "")
 
 
-def _with_same_modes(link: Link, earlier: Sequence[Path]) -> ModalBody | None:
+def _with_same_modes(link: Link, earlier: Sequence[Path], cache: Path) -> ModalBody | None:
     """The modal body of `link` from one with the same modes, among `earlier` files and the cache."""
     wanted = modes_hash(link)
-    for path in (*earlier, *sorted(_cache_folder().glob(f"{wanted}-*.h5"))):
+    for path in (*earlier, *filter(is_own, sorted(cache.glob(f"{wanted}-*.h5")))):
         with suppress(FfrobotError):
             body = read_modal_body(path)
             if body.modes_hash == wanted and (same := restated(body, link)) is not None:
@@ -228,8 +227,10 @@ def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., M
         ) from None
 
 
-def _up_to_date(path: Path, digest: str) -> ModalBody | None:
-    """The modal body in `path` if it is sound and made from the same input."""
+def _up_to_date(path: Path, digest: str, cached: Path) -> ModalBody | None:
+    """The modal body in `path` if it is sound and made from the same input; if it is `cached`, by this user."""
+    if path == cached and not is_own(path):
+        return None
     try:
         body = read_modal_body(path)
     except FfrobotError:

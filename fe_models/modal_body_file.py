@@ -58,12 +58,13 @@ _KINDS = {"c": "complex ones", "O": "text", "S": "text", "V": "records"}
 _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": "kg m2", "modes/frequency": "Hz"}
 
 
-def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) -> None:
-    """Write `body` to `path`, replacing what is there only once the new file is complete; `make_folder` in the cache.
+def write_modal_body(path: Path, body: ModalBody, *, in_cache: bool = False) -> None:
+    """Write `body` to `path`, replacing what is there only once the new file is complete.
 
+    A file `in_cache` is for this user alone.
     Raises `SolveError`, with file and reason, where it cannot be written.
     """
-    write_atomically(path, sealed(_image(body)), "modal body file", make_folder=make_folder, ours=make_folder)
+    write_atomically(path, sealed(_image(body)), "modal body file", ours=in_cache, private=in_cache)
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

@@ -8,7 +8,6 @@ Forms that came with the installation (`fe_models.forms`) are taken into the cac
 
 from __future__ import annotations
 
-import atexit
 import os
 import platform
 import shutil
@@ -22,8 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from platformdirs import user_cache_path
-
+from ..common.cache import cache_folder, is_own, own_folder
 from ..common.errors import SolveError
 from ..common.locks import held
 
@@ -48,12 +46,10 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
         yield Path(comm.bcast(None))
         return
     of = f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
-    folder = folder_of_forms() / of
-    with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
+    folder = cache_folder("forms", of)
     with held(folder / "compiling.lock", PATIENCE) as is_alone:  # others wait, and find what this process compiles
         if not is_alone or shutil.disk_usage(folder).free < ROOM:
-            folder = _own_folder()
+            folder = own_folder("forms")
         _take(installed_forms() / of, folder)
         _forget_unsound(folder)
         if comm.size > 1:
@@ -67,16 +63,13 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
         with suppress(OSError):  # a form without its checksum is compiled again
             for ready in set(folder.glob(f"*{READY}")) - _sound:
                 ready.write_text(_checksum(ready), encoding="ascii")
+                for file in _files(folder, ready):
+                    file.chmod(0o600)
                 _sound.add(ready)
 
 
-def folder_of_forms() -> Path:
-    """Those of the user, in a folder for each kind."""
-    return user_cache_path("ffrobot") / "forms"
-
-
 def installed_forms() -> Path:
-    """Those of the installation, likewise."""
+    """Those of the installation, in a folder for each kind."""
     return Path(sys.prefix, "share", "ffrobot", "forms")
 
 
@@ -86,25 +79,24 @@ def _take(installed: Path, folder: Path) -> None:
     with suppress(OSError):  # what is incomplete is unsound
         for file in installed.iterdir():
             if not (folder / file.name).exists():
-                shutil.copy(file, folder / file.name)
-
-
-@cache
-def _own_folder() -> Path:
-    """A new folder, gone when this process ends."""
-    own = tempfile.mkdtemp(prefix="ffrobot-forms-")
-    atexit.register(shutil.rmtree, own, ignore_errors=True)
-    return Path(own)
+                shutil.copyfile(file, folder / file.name)
+                (folder / file.name).chmod(0o600)
 
 
 def _forget_unsound(folder: Path) -> None:
-    """Remove forms that nobody has finished, and damaged ones."""
+    """Remove forms that nobody has finished, damaged ones, and those that another user has made or may change."""
     for ready in {source.with_suffix(READY) for source in folder.glob("*.c")} - _sound:
-        if ready.is_file() and ready.read_bytes() == _checksum(ready).encode():
+        files = _files(folder, ready)
+        if ready in files and all(map(is_own, files)) and ready.read_bytes() == _checksum(ready).encode():
             _sound.add(ready)
         else:
-            for file in folder.glob(f"{ready.name.removesuffix(READY)}.*"):
+            for file in files:
                 file.unlink()
+
+
+def _files(folder: Path, ready: Path) -> list[Path]:
+    """Of a form, by the file that says it is ready."""
+    return list(folder.glob(f"{ready.name.removesuffix(READY)}.*"))
 
 
 def _checksum(ready: Path) -> str:

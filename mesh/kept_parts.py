@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from platformdirs import user_cache_path
 
+from ..common.cache import cache_folder, is_own
 from ..common.errors import SolveError
 from ..common.files import write_atomically
 from ..common.version import digest_of_code
@@ -59,14 +59,16 @@ def kept_path(tables: PartTables) -> Path:
         "outlines": asdict(tables.outlines) if tables.outlines else None,
     }
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    return user_cache_path("ffrobot") / "meshes" / f"{digest}.npz"
+    return cache_folder("meshes") / f"{digest}.npz"
 
 
 def kept_part(path: Path) -> PartMesh | None:
-    """The mesh kept at `path`; None where there is none, or it is damaged."""
+    """The mesh kept at `path`; None where there is none, or it is damaged, or of another user."""
     from .cells import CELLS, CellName
     from .part_mesh import PartMesh
 
+    if not is_own(path):
+        return None
     try:
         with np.load(path, allow_pickle=False) as file:
             if str(file["cell"]) not in CELLS:
@@ -97,4 +99,4 @@ def keep_part(path: Path, part: PartMesh) -> None:
     image = BytesIO()
     np.savez(image, **arrays)
     with suppress(SolveError):
-        write_atomically(path, image.getvalue(), "mesh", make_folder=True, ours=True)
+        write_atomically(path, image.getvalue(), "mesh", ours=True, private=True)

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from forked_commands import LIMIT, Commands
 
+from ffrobot.common.cache import cache_folder
 from ffrobot.common.parallel import environment_without_mpi
 from ffrobot.mesh import form_cache
 
@@ -139,6 +140,11 @@ def shared_folder(tmp_path_factory):
     return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
 
+def own_made(folder):
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(shared_folder):
     """Nothing that tests compute goes to the user's cache or comes from there; returns the cache of the test run.
@@ -148,7 +154,8 @@ def own_cache(shared_folder):
     cache = shared_folder / "cache"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
-        patch.setattr(form_cache, "user_cache_path", lambda name: cache / name)
+        forms = cache_folder("forms")
+        patch.setattr(form_cache, "cache_folder", lambda _, name: own_made(forms / name))
         yield cache
 
 

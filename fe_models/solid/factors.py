@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 from petsc4py import PETSc
-from platformdirs import user_cache_path
 
 from ...common.arrays import Array
+from ...common.cache import cache_folder
 from ...common.errors import SolveError
 from ...common.locks import is_running, this_process
 
@@ -91,9 +91,8 @@ def _new_folder() -> Path | None:
 
     Those of processes that were killed are removed.
     """
-    shared = user_cache_path("ffrobot") / "factors"
     with suppress(OSError):
-        shared.mkdir(parents=True, exist_ok=True)
+        shared = cache_folder("factors")
         for folder in shared.iterdir():
             if not is_running(folder.name.rpartition(".")[0]):
                 shutil.rmtree(folder, ignore_errors=True)

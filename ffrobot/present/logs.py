@@ -18,6 +18,7 @@ from typing import TextIO, TypeVar
 
 import click
 
+from ..common.errors import FfrobotWarning
 from ..common.outputs import check_file_name
 
 
@@ -116,7 +117,9 @@ def log_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """What libraries warn of, as `warnings.showwarning`: it is for developers, and for the log."""
+    """As `warnings.showwarning`: warnings of libraries are for developers, in the log; those of this one for users."""
+    if issubclass(category, FfrobotWarning):
+        click.echo(f"ffrobot: {message}", err=True)
     LOGGER.info("%s line %d: %s: %s", filename, lineno, category.__name__, message)
 
 

@@ -60,6 +60,11 @@ def test_kept_for_the_next_run_and_whole(tmp_path):
     library.write_bytes(content[:1000])
     run(tmp_path)
     assert library.stat().st_size == len(content)
+    library.chmod(0o666)  # anybody may have changed it since
+    written = library.stat().st_mtime_ns
+    run(tmp_path)
+    assert library.stat().st_mtime_ns > written
+    assert library.stat().st_mode & 0o077 == 0
 
 
 def test_process_killed_while_it_compiles(tmp_path):
