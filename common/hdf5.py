@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import h5py
 import numpy as np
@@ -52,6 +53,20 @@ def check_links(file: h5py.File, path: Path) -> None:
     if found is not None:
         where = found.decode(errors="replace")
         raise InputError(f"{path}: expected members in the file itself, found a link at {where}")
+
+
+@contextmanager
+def in_memory() -> Iterator[h5py.File]:
+    """A new file in memory, for `image_of`: with a name of its own, for HDF5 opens none of a name twice."""
+    with h5py.File(uuid4().hex, "w", driver="core", backing_store=False) as file:
+        yield file
+
+
+def image_of(file: h5py.File) -> bytes:
+    """The content of such a file."""
+    file.flush()
+    image: bytes = file.id.get_file_image()
+    return image
 
 
 def read(dataset: h5py.Dataset) -> Any:  # noqa: ANN401 (as h5py)

@@ -14,7 +14,7 @@ from ..common.arrays import Array, Integers, NDArray
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import AnyPath, write_atomically
-from ..common.hdf5 import numbers, open_checked, read
+from ..common.hdf5 import image_of, in_memory, numbers, open_checked, read
 from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def _texts(file: h5py.File, name: str) -> tuple[str, ...]:
 
 def _image(body: ModalBody) -> bytes:
     """The HDF5 file as bytes; the same body always gives the same bytes."""
-    with h5py.File("modal body", "w", driver="core", backing_store=False) as file:
+    with in_memory() as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
         file.attrs[MARK] = METHOD
@@ -244,8 +244,7 @@ def _image(body: ModalBody) -> bytes:
                 _write_names(file, path, names)
         if body.reference_condition == "craig-bampton":
             _write_craig_bampton(file.create_group("craig_bampton"), body)
-        file.flush()
-        return file.id.get_file_image()
+        return image_of(file)
 
 
 def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | None]) -> None:

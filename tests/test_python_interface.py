@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 
 import numpy as np
@@ -52,6 +53,22 @@ def test_scene_made_in_python_is_the_scene_of_a_file(folder, results):
     assert results.columns("inverse").keys() >= KEYS
     for name, values in from_file.columns("inverse").items():
         np.testing.assert_array_equal(values, results.columns("inverse")[name])
+
+
+def test_several_solves_at_once(folder):
+    """From threads, links of their own included: to the last bit what one after the other computes."""
+
+    def solved(k):
+        link = LINK | {"geometry": LINK["geometry"] | {"length": 0.6 + 0.01 * k}}
+        body = [{"name": "arm", "link": link} if k else {"name": "arm", "modal": folder / "arm.h5"}]
+        return ffrobot.solve(swing(folder, body=body)).columns("inverse")
+
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(solved, [0, 1, 2, 0, 1, 2]))
+    for k in range(3):
+        for name, values in solved(k).items():
+            np.testing.assert_array_equal(values, together[k][name])
+            np.testing.assert_array_equal(values, together[k + 3][name])
 
 
 def test_link_in_the_scene_is_that_of_its_file(folder, results):

@@ -54,6 +54,15 @@ class Frozen:
                 value = MappingProxyType({key: _frozen(entry) for key, entry in value.items()})
             object.__setattr__(self, name, _frozen(value))
 
+    def __getstate__(self) -> dict[str, object]:
+        """For copies and other processes, where views of mappings cannot go."""
+        state = {name: value for name, value in vars(self).items() if name in self.__dataclass_fields__}
+        return {name: dict(value) if isinstance(value, Mapping) else value for name, value in state.items()}
+
+    def __setstate__(self, state: Mapping[str, object]) -> None:
+        vars(self).update(state)
+        Frozen.__post_init__(self)
+
 
 def _frozen(value: object) -> object:
     if not isinstance(value, np.ndarray):

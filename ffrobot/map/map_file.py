@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-import h5py
 import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
+from ..common.hdf5 import image_of, in_memory
 from ..common.tables import as_csv
 from ..common.version import VERSION
 from .pose_map import STATUS, PoseMap
@@ -34,7 +34,7 @@ def torque_share(found: PoseMap) -> Array:
 def write_map(found: PoseMap) -> Path:
     """Both files in the folder of the plan; the HDF5 file."""
     plan = found.plan
-    with h5py.File("map", "w", driver="core", backing_store=False) as file:
+    with in_memory() as file:
         file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, MARK: CHECKSUM})
         file.attrs.update({"ffrobot_version": VERSION, "scene": str(plan.scene), "point": plan.point})
         file.attrs["axes"], file.attrs["motors"] = [axis.name for axis in plan.axes], list(found.motors)
@@ -46,8 +46,7 @@ def write_map(found: PoseMap) -> Path:
         for name, values in {**found.values, "torque_share": torque_share(found), "q": found.q}.items():
             file[name] = values.reshape(*plan.shape, *values.shape[1:])
             file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
-        file.flush()
-        image: bytes = file.id.get_file_image()
+        image = image_of(file)
     write_atomically(plan.folder / FILE, sealed(image), "map", make_folder=True, ours=True)
     write_atomically(plan.folder / TABLE, _table(found).encode(), "table of the map", ours=True)
     return plan.folder / FILE

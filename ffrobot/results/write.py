@@ -12,6 +12,7 @@ import h5py
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
+from ..common.hdf5 import image_of, in_memory
 from ..common.version import VERSION
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.steps import DATASET, METHOD
@@ -44,16 +45,14 @@ def write_results(solution: Solution, path: Path) -> None:
 
 def results_image(solution: Solution) -> bytes:
     """The content of the results file of a solution."""
-    with h5py.File("results", "w", driver="core", backing_store=False) as file:
+    with in_memory() as file:
         _write_head(file, solution)
         for name, result in solution.analyses.items():
             _write_analysis(file.create_group(name), solution, result)
         if (run := solution.unread) is not None:
             _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
         write_state(file, solution)
-        file.flush()
-        image: bytes = file.id.get_file_image()
-    return image
+        return image_of(file)
 
 
 def _write_head(file: h5py.File, solution: Solution) -> None:

@@ -1,5 +1,7 @@
 """The modal body by itself: immutable, checked, interpolated; no finite element library is involved."""
 
+import copy
+import pickle
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
@@ -100,6 +102,20 @@ def test_immutable(body):
         body.mass = 1.0
     with pytest.raises(TypeError):
         body.interfaces["grip"] = body.interfaces["tip"]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda body: pickle.loads(pickle.dumps(body))])
+def test_copies_are_whole_and_immutable(copied, body):
+    """As other processes get them."""
+    other = copied(body)
+    assert vars(other).keys() == vars(body).keys()
+    assert list(other.interfaces) == list(body.interfaces)
+    np.testing.assert_array_equal(other.interfaces["tip"].rotation, body.interfaces["tip"].rotation)
+    np.testing.assert_array_equal(other.S_bar, body.S_bar)
+    with pytest.raises(ValueError, match="read-only"):
+        other.S_bar[...] = 0.0
+    with pytest.raises(TypeError):
+        other.interfaces["grip"] = other.interfaces["tip"]
 
 
 WRONG = {

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, Integers, NDArray
 from ...common.errors import InputError
+from ...common.hdf5 import image_of, in_memory
 from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
@@ -46,7 +47,7 @@ class Grid:
 
 def vtkhdf_image(grid: Grid) -> bytes:
     """The file as bytes; the same grid always gives the same. Numbers of points have 7 digits."""
-    with h5py.File("grid", "w", driver="core", backing_store=False) as file:
+    with in_memory() as file:
         root = file.create_group(ROOT)
         root.attrs["Version"] = np.array([2, 0])
         root.attrs["Type"] = np.bytes_("UnstructuredGrid")
@@ -58,8 +59,7 @@ def vtkhdf_image(grid: Grid) -> bytes:
             _write(root, f"CellData/{name}", cell_values)
         if grid.time is not None:
             _write_steps(root, grid, grid.time)
-        file.flush()
-        return file.id.get_file_image()
+        return image_of(file)
 
 
 def _write_cells(root: h5py.Group, grid: Grid) -> None:
