@@ -14,7 +14,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.keys import NotNegative, Positive
 from ..common.peaks import root_mean_square
-from ..common.tables import shown
+from ..common.tables import parse_csv
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import Record, validate
 
@@ -82,22 +82,28 @@ class Choice(NamedTuple):
 def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
     """From a TOML file with [[motor]] tables, or a CSV file whose columns are their keys.
 
-    Several gear ratios of a CSV line are separated by spaces. Raises `InputError` for wrong keys or numbers.
+    Several gear ratios of a CSV line are separated by spaces; see `parse_csv`. Raises `InputError` for wrong keys or
+    numbers.
     """
     if path.suffix.lower() == ".toml":
         return validate(_Catalog, load_toml(path, "catalog of motors"), path).motor
-    lines = list(csv.DictReader(read_text(path, "catalog of motors").splitlines(), skipinitialspace=True))
-    if not lines:
+    try:
+        header, rows = parse_csv(read_text(path, "catalog of motors"))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot read the catalog of motors: {error}") from None
+    if not rows:
         raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below, found none")
-    if len(lines[0]) < 2:
-        raise InputError(f"{path}: line 1: expected columns with commas between them, found {shown(str(*lines[0]))}")
-    return validate(_Catalog, {"motor": [_of_line(line, path, k) for k, line in enumerate(lines, 2)]}, path).motor
+    for number, row in rows:
+        if len(row) != len(header):
+            raise InputError(
+                f"{path}: line {number}: expected {len(header)} cells with commas, semicolons or tabs between them, as"
+                f" the header has, found {len(row)}"
+            )
+    return validate(_Catalog, {"motor": [_of_line(dict(zip(header, row, strict=True))) for _, row in rows]}, path).motor
 
 
-def _of_line(line: dict[str | None, Any], path: Path, number: int) -> dict[str, Any]:
-    if None in line or None in line.values():
-        raise InputError(f"{path}: line {number}: expected as many cells as there are columns, found others")
-    given = {str(key): text.strip() for key, text in line.items() if text.strip()}
+def _of_line(line: dict[str, str]) -> dict[str, Any]:
+    given: dict[str, Any] = {key: text for key, text in line.items() if text}
     if "gear_ratio" in given:
         given["gear_ratio"] = tuple(given["gear_ratio"].split())
     return {key: text if key == "name" else _numbers(text) for key, text in given.items()}

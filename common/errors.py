@@ -75,10 +75,11 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """` (did you mean "…"?)`, or nothing when no known word is close, or begins with this one and an underscore."""
     from difflib import get_close_matches
 
-    words = list(known)
-    close = [one for one in (ELSEWHERE.get(word.lower().replace("_", "-")),) if one in words]
-    close = close or get_close_matches(word, words, n=1) or [one for one in words if one.startswith(f"{word}_")]
-    return f' (did you mean "{close[0]}"?)' if close else ""
+    words = {one.casefold(): one for one in known}
+    small = word.casefold()
+    close = [one for one in (ELSEWHERE.get(small.replace("_", "-")),) if one in words]
+    close = close or get_close_matches(small, words, n=1) or [one for one in words if one.startswith(f"{small}_")]
+    return f' (did you mean "{words[close[0]]}"?)' if close else ""
 
 
 def quoted(words: Iterable[str]) -> str:

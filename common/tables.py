@@ -4,15 +4,49 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, time
-from typing import Any
+from typing import Any, NamedTuple
 
 DEEPEST = 32  # tables and lists within each other
 LONGEST_TEXT = 20_000  # characters; expressions have a limit of their own below this
 LARGEST = 1e30  # of any number: products of a few of them are still finite
 SMALLEST = 1e-30  # of what has to be positive
 LARGEST_INTEGER = 2**63 - 1  # TOML promises no more
+
+
+class CsvTable(NamedTuple):
+    """Cells of a CSV file, without blanks around them: the header, and the rows below it with their lines."""
+
+    header: list[str]
+    rows: list[tuple[int, list[str]]]
+
+
+COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?|[-+]?\d+,([eE][-+]?\d+)?")
+
+
+def parse_csv(text: str) -> CsvTable:
+    """Cells with commas, semicolons or tabs between them, whichever the header has; of the latter decimal commas, too.
+
+    Empty lines and comments (#) do not count, but for a header that is one, as NumPy writes it. Raises `csv.Error`.
+    """
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("sep=")]
+    comments = [(k, line.lstrip("# ")) for k, line in lines if line.startswith("#")]
+    lines = [(k, line) for k, line in lines if not line.startswith("#")]
+    separator = next((each for each in ";\t" if lines and each in lines[0][1]), ",")
+    if comments and lines and not any(c.isalpha() for c in lines[0][1].replace("e", "").replace("E", "")):
+        lines.insert(0, comments[-1])
+    reader = csv.reader((line for _, line in lines), delimiter=separator, skipinitialspace=True)
+    rows = [(lines[reader.line_num - 1][0], [cell.strip() for cell in row]) for row in reader]
+    if separator != ",":
+        rows = [(k, [" ".join(map(_with_point, cell.split(" "))) for cell in row]) for k, row in rows]
+    rows = [(k, row) for k, row in rows if any(row)]
+    return CsvTable(rows[0][1] if rows else [], rows[1:])
+
+
+def _with_point(word: str) -> str:
+    return word.replace(",", ".") if COMMA.fullmatch(word) else word
 
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")

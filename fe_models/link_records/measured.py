@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.structs import struct
-from ...common.tables import LARGEST, shown
+from ...common.tables import LARGEST, parse_csv, shown
 from ...common.toml_files import read_text
 from ...common.validation import InputFile, Record
 
@@ -46,14 +46,12 @@ def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMo
 
     Raises `InputError` naming file and line.
     """
-    reader = csv.DictReader(read_text(path, "table of measured modes").splitlines(), skipinitialspace=True)
     try:
-        header = [name.strip() for name in reader.fieldnames or ()]
-        _check_header(path, header)
-        reader.fieldnames = header
-        rows = [_row(path, reader.line_num, values, families) for values in reader if any(values.values())]
+        header, table = parse_csv(read_text(path, "table of measured modes"))
     except csv.Error as error:
         raise InputError(f"{path}: cannot read the table of measured modes: {error}") from None
+    _check_header(path, header)
+    rows = [_row(path, line, header, row, families) for line, row in table]
     if not rows:
         raise InputError(f"{path}: expected at least one measured mode below the header, found none")
     seen = set[tuple[str, int]]()
@@ -75,11 +73,11 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio, found {found!r}")
 
 
-def _row(path: Path, line: int, values: Mapping[str | None, str | None], families: tuple[str, ...]) -> MeasuredMode:
+def _row(path: Path, line: int, header: list[str], row: list[str], families: tuple[str, ...]) -> MeasuredMode:
     where = f"{path}: line {line}"
-    if None in values or None in values.values():
+    if len(row) != len(header):
         raise InputError(f"{where}: expected as many entries as the header has, found more or fewer")
-    texts = {str(name): (text or "").strip() for name, text in values.items()}
+    texts = dict(zip(header, row, strict=True))
     number = texts["mode"]
     if not (number.isascii() and number.isdecimal() and int(number[:9]) > 0):
         raise InputError(f'{where}: mode: expected a whole number from 1 on, found "{shown(number)}"')

@@ -28,6 +28,7 @@ from .motion.read_motion import (
     csv_text,
     joint_trajectory_bag,
     joint_trajectory_text,
+    path_text,
     read_motion,
     robot_motion,
 )
@@ -170,9 +171,10 @@ def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
     """
     motion = read_motion(path)
     _check(output, force=force)
-    _write(output, motion.csv_text())
-    what = f"{len(motion.time)} points of {len(motion.joints)} joints over {motion.time[-1] - motion.time[0]:.6g} s"
-    use = f'a [[trajectory]] with joint = "{shown(motion.joints[0])}" takes waypoints = "{output.name}"'
+    _write(output, path_text(motion))
+    whole = motion.times[-1] - motion.times[0]
+    what = f"{len(motion.times)} points of {len(motion.columns)} joints over {whole:.6g} s"
+    use = f'a [[trajectory]] with joint = "{shown(motion.columns[0])}" takes waypoints = "{output.name}"'
     return Exported(output, what, (*motion.remarks, use))
 
 

@@ -13,9 +13,9 @@ from ...common.rotations import exponential, logarithm, of_quaternion, quaternio
 from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
+from .waypoints import QUATERNION as QUATERNION
 from .waypoints import Waypoints
 
-QUATERNION = ("qw", "qx", "qy", "qz")
 UNIT = 1e-3  # how far from 1 the length of a quaternion in a table may be
 Reference = tuple[float, float, float]
 """A rotation vector, rad."""

@@ -5,15 +5,16 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
-from ...common.errors import InputError
-from ...common.tables import LARGEST, shown
+from ...common.errors import InputError, quoted
+from ...common.tables import LARGEST, parse_csv, shown
+from ...common.toml_files import read_text
 from .._core import TimeFunction
 from .piecewise import Piecewise, superposed
 
@@ -24,12 +25,20 @@ NANOSECONDS = re.compile(r"_*(nano|n)secs?(onds?)?", re.IGNORECASE)
 UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 """Clocks of computers by their number now: from so many on, and the unit in s that this then is."""
-OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "position", "positions", "angle")
-"""Names of the column of a joint, {0} being the joint's, the first that is there."""
+OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "{0}/position", "position", "positions", "angle")
+"""Names of the column of a joint, {0} being the joint's, the first that is there; a topic may stand before it."""
+QUATERNION = ("qw", "qx", "qy", "qz")
+TURN = 1.0  # rad, of steps next to one of a whole turn, and of that from a whole turn
+UNIT = re.compile(r"(.+?)[ _]*(?:\[(\S+)\]|\((\S+)\))")
+FACTORS = {"rad": 1.0, "deg": math.pi / 180, "degree": math.pi / 180, "degrees": math.pi / 180, "°": math.pi / 180,
+           "m": 1.0, "cm": 1e-2, "mm": 1e-3}  # fmt: skip
+"""Units behind the names of columns."""
 MANY, GAP = 20, 20.0  # intervals of a table with a usual step; how many times this a gap is
 ABRUPT = 3.0  # times the accelerations of a record: what its spline needs next to an end, where it rests
 STOPPING, DENSE = 2.0, 9  # likewise next to a hold; times in an interval at which that is looked at
 SAMPLES, LOST = 6, 2.5  # the same where at least three of four steps are equal, as those of records are
+JUMP, SUDDEN, FAST, UNLIKE = 0.02, 2000.0, 300.0, 30.0  # rad or m, beside the line through the rows next to it
+"""A row jumps if it is as far off, by such an acceleration; or by less, if so many times that of nearly all others."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +54,19 @@ class Waypoints:
     remarks: tuple[str, ...] = ()
 
     def of_joint(self, joint: str) -> Waypoints:
-        """The column of a joint, as "value": see `OF_A_JOINT`. The whole table where it has none."""
-        for name in (pattern.format(joint) for pattern in OF_A_JOINT):
-            if name in self.columns:
-                k = self.columns.index(name)
-                return replace(self, columns=("value",), values=self.values[:, [k]])
+        """The column of a joint, as "value": see `OF_A_JOINT`. The whole table where it has none.
+
+        Raises `ValueError` where two topics have the joint.
+        """
+        for pattern in OF_A_JOINT:
+            name = pattern.format(joint)
+            ends = (f"/{name}",) if name != pattern else ()
+            found = [k for k, column in enumerate(self.columns) if column == name or column.endswith(ends)]
+            if len(found) > 1:
+                names = quoted(self.columns[k] for k in found)
+                raise ValueError(f'expected one column of joint "{joint}", found {names}')
+            if found:
+                return replace(self, columns=("value",), values=self.values[:, found])
         return self
 
     def spline(self) -> Piecewise:
@@ -113,20 +130,40 @@ def load_waypoints(path: Path) -> Waypoints:
     if len(columns) > 2 and NANOSECONDS.fullmatch(columns[1]):
         times = times + 1e-9 * (table[:, 1] - (table[0, 1] if remarks else 0.0))
         columns, table = [columns[0], *columns[2:]], np.delete(table, 1, axis=1)
-    again = np.append(False, (np.diff(table, axis=0) == 0).all(axis=1))
+    names, values = columns[1:], table[:, 1:]
+    for k, name in enumerate(names):
+        unit = UNIT.fullmatch(name)
+        if unit is not None and (factor := FACTORS.get(unit[2] or unit[3])) is not None:
+            names[k], values[:, k] = unit[1], factor * values[:, k]
+            if factor != 1.0:
+                remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in (unit[2] or unit[3]) else "rad"}')
+    try:
+        found = waypoints_of(names, times, values, lambda k: f"line {lines[k]}")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return replace(found, remarks=tuple(f"{path.name}: {remark}" for remark in (*remarks, *found.remarks)))
+
+
+def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Callable[[int], str]) -> Waypoints:
+    """A table of `values` (T, columns) at `times` (T,), s; rows that repeat the one before count once.
+
+    `place` of a row is where messages say that it is. Remarks are on what is odd. Raises `InputError` for times that do
+    not increase, and fewer than two rows.
+    """
+    remarks, rows, again = list[str](), np.arange(len(times)), np.zeros(len(times), dtype=bool)
+    again[1:] = (np.diff(times) == 0) & (np.diff(values, axis=0) == 0).all(axis=1)
     if again.any():
-        remarks.append(f"line {lines[int(again.argmax())]}: {again.sum()} rows that repeat the one before count once")
-    times, values, lines = times[~again], table[~again, 1:], lines[~again]
+        remarks.append(f"{place(int(again.argmax()))}: {again.sum()} rows that repeat the one before count once")
+    times, values, rows = times[~again], values[~again], rows[~again]
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if late.size:
         before, after = times[late[0]], times[late[0] + 1]
-        raise InputError(
-            f"{path}: line {lines[late[0] + 1]}: expected times that increase, found t = {after:g} after {before:g}"
-        )
+        where = place(int(rows[late[0] + 1]))
+        raise InputError(f"{where}: expected times that increase, found t = {after:g} after {before:g}")
     if len(times) < 2:
-        raise InputError(f"{path}: expected at least 2 waypoints, found {len(times)}")
+        raise InputError(f"expected at least 2 waypoints, found {len(times)}")
     remarks += [*_gaps(times, np.any(np.diff(values, axis=0), axis=1)), *_moving_ends(times, values)]
-    return Waypoints(tuple(columns[1:]), times, values, tuple(f"{path.name}: {remark}" for remark in remarks))
+    return Waypoints(tuple(columns), times, values, (*remarks, *_jumps(columns, times, values)))
 
 
 def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:
@@ -156,6 +193,39 @@ def _gaps(times: Array, moves: Booleans) -> list[str]:
         f"no rows between t = {times[k]:g} and {times[k + 1]:g} s, where others are {usual:.3g} s apart: the path there"
         " is the spline's alone"
     ]
+
+
+def _jumps(columns: Sequence[str], times: Array, values: Array) -> Iterator[str]:
+    """A remark on each column with rows that no robot gets to between the rows next to them, and on whole turns."""
+    if len(times) < 3:
+        return
+    accelerations = _accelerations(times, values)
+    between = (times[1:-1] - times[:-2]) / (times[2:] - times[:-2])
+    off = np.abs(values[1:-1] - values[:-2] - between[:, None] * (values[2:] - values[:-2]))
+    steps = np.abs(np.diff(values, axis=0))
+    for k, name in enumerate(columns):
+        if name in QUATERNION:
+            continue
+        beside = np.maximum(np.append(0.0, steps[:-1, k]), np.append(steps[1:, k], 0.0))
+        turns = (np.abs(steps[:, k] - 2 * np.pi) < TURN) & (beside < TURN) & (len(times) >= MANY)
+        if turns.any():
+            at = times[int(turns.argmax()) + 1]
+            more = f", and at {turns.sum() - 1} more" if turns.sum() > 1 else ""
+            yield (
+                f"{shown(name)} jumps by a turn at t = {at:g} s{more}: an angle within ±π is counted anew there; add"
+                " whole turns from there on"
+            )
+            continue
+        usual = float(np.quantile(accelerations[:, k], 0.9)) if len(times) >= MANY else np.inf
+        sudden = accelerations[:, k] > min(SUDDEN, max(FAST, UNLIKE * usual))
+        odd = sudden & (off[:, k] > JUMP)
+        if odd.any():
+            most = int(np.where(odd, off[:, k], 0.0).argmax())
+            more = f", and at {odd.sum() - 1} more rows" if odd.sum() > 1 else ""
+            yield (
+                f"{shown(name)} jumps by {off[most, k]:.3g} at t = {times[most + 1]:g} s{more}: do two programs write"
+                " this joint? Leave such rows out"
+            )
 
 
 def _moving_ends(times: Array, values: Array) -> Iterator[str]:
@@ -190,25 +260,21 @@ def _from_zero(part: Piecewise, first: Array) -> Array:
 def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
     """Column names, numbers (rows, columns) and lines (rows,) of the CSV table at `path`."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, skipinitialspace=True)
-            rows = [(reader.line_num, row) for row in reader if any(row)]
-    except FileNotFoundError:
-        raise InputError(f"{path}: waypoint table not found") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        about = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot read the waypoint table: {about}") from None
-    header = [name.strip() for name in rows[0][1]] if rows else []
+        header, rows = parse_csv(read_text(path, "waypoint table"))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot read the waypoint table: {error}") from None
+    if len(header) > 2 and not header[0] and TIME.fullmatch(header[1]):  # row numbers, as pandas writes them
+        header, rows = header[1:], [(line, row[1:]) for line, row in rows]
     if header and header[0].startswith(("{", "[")):
         raise InputError(
             f"{path}: expected a table, found JSON: ffrobot import {path.name} -o path.csv makes one of it"
         )
     if len(header) < 2 or TIME.fullmatch(header[0]) is None or not all(header) or len(set(header)) < len(header):
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value, found {','.join(header)!r}")
-    table = np.array([_numbers(path, line, row, len(header)) for line, row in rows[1:]])
-    if len(rows) < 3:
-        raise InputError(f"{path}: expected at least 2 waypoints, found {len(rows) - 1}")
-    return header, table, np.array([line for line, _ in rows[1:]])
+    if len(rows) < 2:
+        raise InputError(f"{path}: expected at least 2 waypoints, found {len(rows)}")
+    table = np.array([_numbers(path, line, row, len(header)) for line, row in rows])
+    return header, table, np.array([line for line, _ in rows])
 
 
 def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationInfo, model_validator
 
 from ...common.arrays import Array, as_rows
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import of_rpy, smallest_turn
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
@@ -109,7 +109,10 @@ class Trajectory(MotionKeys):
         if not set(columns) <= set(wanted) or (turned and turned != set(QUATERNION)):
             header = ",".join(("t", *places))
             header += " or t,JOINT" if allowed == ("value",) else " or t,x,y,z,qw,qx,qy,qz" if "z" in allowed else ""
-            raise ValueError(f'expected waypoints with the header {header}, found "{",".join(("t", *columns))}"')
+            of = self.joint or self.motor
+            missing = f': no column of "{of}"{did_you_mean(of, columns)}' if allowed == ("value",) and of else ""
+            found = ",".join(("t", *columns))
+            raise ValueError(f'expected waypoints with the header {header}, found "{found}"{missing}')
         if turned:
             try:
                 orientation_of(self.waypoints)

@@ -63,6 +63,69 @@ def test_the_column_of_a_joint(names, column, tmp_path):
             validate(Trajectory, keys | {"joint": "toe"}, tmp_path / "scene.toml")
 
 
+COLUMNS = {
+    "plotjuggler": ("__time,/joint_states/hip/position,/joint_states/knee/position", 1.0, ","),
+    "a topic": ("t,hip/position,knee/position", 1.0, ","),
+    "degrees": ("t [s],hip [deg],knee (deg)", 180 / np.pi, ","),
+    "pandas": ("#", 1.0, ","),
+    "NumPy": ("# t,hip,knee", 1.0, ","),
+    "a comment before": ("# recorded\n# by hand\nt,hip,knee", 1.0, ","),
+    "Excel in Europe": ("sep=;\nt;hip;knee", 1.0, ";"),
+    "tabs": ("t\thip\tknee", 1.0, "\t"),
+}
+
+
+@pytest.mark.parametrize("kind", COLUMNS)
+def test_tables_as_programs_write_them(kind, tmp_path):
+    header, factor, separator = COLUMNS[kind]
+    rows = [[repr(t), repr(a * factor), repr(b * factor)] for t, a, b in ROWS]
+    if header == "#":
+        header, rows = ",t,hip,knee", [[str(k), *row] for k, row in enumerate(rows)]
+    text = "\n".join([header, *(separator.join(row) for row in rows)])
+    (tmp_path / "path.csv").write_text(text.replace(".", ",") if separator == ";" else text)
+    table = load_waypoints(tmp_path / "path.csv")
+    np.testing.assert_allclose(table.times, [0, 0.5, 1.25], rtol=1e-15)
+    np.testing.assert_allclose(table.of_joint("knee").values[:, 0], [row[2] for row in ROWS], rtol=1e-14)
+    assert table.of_joint("knee").columns == ("value",)
+    assert any("is converted to rad" in remark for remark in table.remarks) == (kind == "degrees")
+
+
+def test_columns_that_are_not_told_apart(tmp_path):
+    keys = {"name": "bend", "joint": "knee", "waypoints": "path.csv"}
+    write(tmp_path / "path.csv", "t,/left/knee/position,/right/knee/position", ROWS)
+    with pytest.raises(InputError, match='expected one column of joint "knee", found "/left/knee/position"'):
+        validate(Trajectory, keys, tmp_path / "scene.toml")
+    write(tmp_path / "path.csv", "t,HIP,KNEE", ROWS)
+    with pytest.raises(InputError, match=r'no column of "knee" \(did you mean "KNEE"\?\)'):
+        validate(Trajectory, keys, tmp_path / "scene.toml")
+
+
+def test_rows_that_jump_are_told(tmp_path):
+    """A second publisher of zeros, one step aside, an angle counted anew; none of a quick, noisy or coarse record."""
+    time = 0.05 * np.arange(61)
+    smooth = time * np.exp(-time)
+    zeros = [row for k, (t, a) in enumerate(zip(time, smooth, strict=True))
+             for row in ((t, a), (t + 1e-3, 0.0))[: 1 + (k % 4 == 3)]]  # fmt: skip
+    wrapped = np.angle(np.exp(1j * (2 + 3 * time)))
+    aside = np.where(np.arange(61) == 30, smooth + 0.9, smooth)
+    noise = np.random.default_rng(1).normal(scale=1e-4, size=601)
+    quick = np.sin(2 * np.pi * 5 * np.arange(601) / 500) + noise
+    rest = np.clip(np.arange(601) / 500 - 0.8, 0, None) ** 2 * 20 + 0.01 * noise
+    cases = {
+        "value jumps by 0.367 at t = 0.951 s, and at": zeros,
+        "value jumps by a turn at t = 0.4 s, and at 1 more": zip(time, wrapped, strict=True),
+        "value jumps by 0.9 at t = 1.5 s, and at 2 more rows:": zip(time, aside, strict=True),
+        "": zip(np.arange(601) / 500, quick, strict=True),
+        " ": zip(np.arange(601) / 500, rest, strict=True),
+        "  ": [(0.0, 0.0), (1.0, 6.3), (2.0, 0.0), (3.0, 6.3)],
+    }
+    for told, rows in cases.items():
+        table = load_waypoints(write(tmp_path / "path.csv", "t,value", [tuple(map(float, row)) for row in rows]))
+        found = [remark.removeprefix("path.csv: ") for remark in table.remarks if "jumps" in remark]
+        assert len(found) == bool(told.strip())
+        assert all(remark.startswith(told) for remark in found), found
+
+
 def test_rows_twice_and_gaps(tmp_path):
     rows = [(0.01 * k, 0.02 * k) for k in range(40)]
     rows = [*rows[:9], rows[8], *rows[9:], (5.0, 1.0)]
@@ -151,6 +214,20 @@ MESSAGES = {
         "joint_names": ["hip", "knee"],
         "points": points(lambda t: {"secs": int(t), "nsecs": round(t % 1 * 1e9)}),
     },
+    "protobuf": {"joint_names": ["hip", "knee"], "points": points(lambda t: f"{t}s")},
+    "segments, of which the last point is there twice": {
+        "trajectory": [
+            {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)[:2]}},
+            {
+                "joint_trajectory": {
+                    "joint_names": ["hip", "knee"],
+                    "points": [
+                        {"positions": [a, b], "time_from_start": max(t - 0.5, 0)} for t, a, b in (*ROWS[1:], ROWS[2])
+                    ],
+                }
+            },
+        ]
+    },
     "numbers": {
         "goal": {"trajectory": {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)}}}
     },
@@ -161,23 +238,27 @@ MESSAGES = {
 def test_joint_trajectories(kind, tmp_path):
     (tmp_path / "plan.json").write_text(json.dumps(MESSAGES[kind]))
     motion = read_motion(tmp_path / "plan.json")
-    assert motion.joints == ("hip", "knee")
-    np.testing.assert_array_equal(np.column_stack([motion.time, motion.positions]), ROWS)
+    assert motion.columns == ("hip", "knee")
+    np.testing.assert_array_equal(np.column_stack([motion.times, motion.values]), ROWS)
 
 
 WRONG = {
     "[1, 2]": "expected a JointTrajectory",
     "{": "expected JSON",
     '{"joint_names": ["a"], "points": 3}': "expected points",
-    '{"joint_names": ["a"], "points": []}': "at least 2 points",
+    '{"joint_names": ["a"], "points": []}': "at least 2 waypoints",
     '{"joint_names": ["a"], "points": [{"positions": [1, 2], "time_from_start": 0}]}': "expected 1 positions",
-    '{"joint_names": ["a"], "points": [{"positions": ["x"], "time_from_start": 0}]}': "expected points",
-    '{"joint_names": ["a"], "points": [{"positions": [1]}]}': "expected points",
-    f'{{"joint_names": ["a"], "points": [{{"positions": [1{400 * "0"}], "time_from_start": 0}}]}}': "expected points",
+    '{"joint_names": ["a"], "points": [{"positions": ["x"], "time_from_start": 0}]}': "expected finite numbers",
+    '{"joint_names": ["a"], "points": [{"positions": [1]}]}': "point 0: time_from_start: expected a time, found none",
+    '{"joint_names": ["a"], "points": [{"positions": [1], "time_from_start": "1 h"}]}': "expected finite numbers",
+    '{"joint_names": ["a"], "points": [{"velocities": [1], "time_from_start": 0}]}': 'positions, found "velocities"',
+    '{"joint_names": "a", "points": []}': "expected joint_names, a list",
+    '{"joint_names": ["a"], "points": [3]}': "point 0: expected positions and time_from_start, found int",
+    f'{{"joint_names": ["a"], "points": [{{"positions": [1{400 * "0"}], "time_from_start": 0}}]}}': "finite numbers",
     '{"joint_names": ["a"], "points": [{"positions": [NaN], "time_from_start": 0},'
-    ' {"positions": [1], "time_from_start": 1}]}': "finite positions",
+    ' {"positions": [1], "time_from_start": 1}]}': "finite numbers",
     '{"joint_names": ["a"], "points": [{"positions": [0], "time_from_start": 1},'
-    ' {"positions": [1], "time_from_start": 1}]}': "point 1: expected times that increase, found 1 s after 1 s",
+    ' {"positions": [1], "time_from_start": 1}]}': "point 1: expected times that increase, found t = 1 after 1",
     '{"joint_names": ["a", "a"], "points": [{"positions": [0, 1], "time_from_start": 1}]}': "joints of different names",
 }
 
@@ -219,6 +300,49 @@ def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
     (tmp_path / "bag" / "metadata.yaml").write_text("not: a bag\n")
     broken = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "other.csv")
     assert (broken.returncode, "expected a bag of ROS" in broken.stderr) == (2, True)
+
+
+def bag_of(folder, rows):
+    """A bag with JointStates of `rows`: topic, stamp (s), positions by joint."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    types, kind, topics = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/JointState", {}
+    of, none = types.types, np.zeros(0)
+    with Writer(folder, version=9) as writer:
+        for k, (topic, t, positions) in enumerate(rows):
+            if topic not in topics:
+                topics[topic] = writer.add_connection(topic, kind, typestore=types)
+            stamp = of["builtin_interfaces/msg/Time"](sec=int(t), nanosec=round(t % 1 * 1e9))
+            header = of["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+            message = of[kind](header, list(positions), np.array(list(positions.values())), none, none)
+            writer.write(topics[topic], EPOCH * 10**9 + k * 10**7, types.serialize_cdr(message, kind))
+    return folder
+
+
+@pytest.mark.parametrize("before", [0.01, -0.01])
+@pytest.mark.parametrize("topics", [("/joint_states", "/joint_states"), ("/arm/joint_states", "/hand/joint_states")])
+def test_publishers_that_take_turns(topics, before, tmp_path):
+    """Arm and gripper with messages of their own: all joints, of the gripper to the accuracy of cubic splines."""
+    times = 10 + 0.05 * np.arange(41)
+    rows = [(topics[0], t, {"j1": np.sin(t), "j2": 0.2 * t}) for t in times]
+    rows += [(topics[1], t, {"finger": np.cos(t)}) for t in times + before]
+    motion = read_motion(bag_of(tmp_path / "bag", sorted(rows, key=lambda row: row[1])))
+    assert set(motion.columns) == {"j1", "j2", "finger"}
+    found = dict(zip(motion.columns, motion.values.T, strict=True))
+    t = motion.times + 10 + (0.05 if before > 0 else 0.0)
+    assert len(t) == 40
+    np.testing.assert_allclose(found["j1"], np.sin(t), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found["finger"], np.cos(t), rtol=0, atol=2e-6)
+    assert any("finger" in remark and "cubic splines" in remark for remark in motion.remarks)
+
+
+def test_a_joint_on_two_topics(tmp_path):
+    times = 0.05 * np.arange(20)
+    rows = [(f"/{side}/joint_states", t, {"j": sign * t}) for t in times for side, sign in (("left", 1), ("right", -1))]
+    motion = read_motion(bag_of(tmp_path / "bag", [*rows, ("/right/joint_states", 1.0, {"j": -1.0})]))
+    np.testing.assert_allclose(motion.values[:, 0], -motion.times, atol=1e-12)
+    assert '/left/joint_states: "j" left out: also on /right/joint_states' in motion.remarks
 
 
 def test_motions_that_move_at_their_ends_are_told(tmp_path):

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, as_list, as_rows
+from ...common.arrays import Array, Integers, as_list, as_rows
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
-from ...common.tables import as_csv, shown
+from ...common.tables import LARGEST, as_csv, shown
 from ...common.toml_files import read_text
+from ...mbs.fields.waypoints import Waypoints, waypoints_of
 from ...results.file import Results
 
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
@@ -25,81 +28,117 @@ NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 """Keys under which messages of planners have a JointTrajectory."""
 
 
-@dataclass(frozen=True, eq=False)
-class JointPath:
-    """Positions (T, n) of n joints, rad or m, at times (T,), s; `remarks` say what was left out."""
-
-    joints: tuple[str, ...]
-    time: Array
-    positions: Array
-    remarks: tuple[str, ...] = ()
-
-    def csv_text(self) -> str:
-        """Columns t and the joints' names, with all digits."""
-        rows = ([time, *row] for time, row in zip(self.time.tolist(), as_rows(self.positions), strict=True))
-        return as_csv([["t", *self.joints], *rows])
-
-
-def read_motion(path: Path) -> JointPath:
+def read_motion(path: Path) -> Waypoints:
     """The motion in a JSON file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
+
+    Columns are joints, rad or m; `remarks` say what was left out.
 
     Raises:
         InputError: it has none, or numbers that are no motion; names the file.
         SolveError: `rosbags` is not installed.
     """
-    reader: Callable[[Path], JointPath] = _from_json if path.suffix.lower() == ".json" else _from_bag
+    reader: Callable[[Path], Waypoints] = _from_json if path.suffix.lower() == ".json" else _from_bag
     try:
-        found = reader(path)
-        _check(found)
+        return reader(path)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-    return found
 
 
-def _check(motion: JointPath) -> None:
-    if len(motion.time) < 2:
-        raise InputError(f"expected at least 2 points of a motion, found {len(motion.time)}")
-    if not np.isfinite(motion.positions).all():
-        raise InputError("expected finite positions, found others")
-    late = np.flatnonzero(np.diff(motion.time) <= 0)
-    if late.size:
-        k = int(late[0]) + 1
-        raise InputError(
-            f"point {k}: expected times that increase, found {motion.time[k]:g} s after {motion.time[k - 1]:g} s"
-        )
+def path_text(motion: Waypoints) -> str:
+    """A CSV table: columns t and the joints' names, with all digits."""
+    rows = ([time, *row] for time, row in zip(as_list(motion.times), as_rows(motion.values), strict=True))
+    return as_csv([["t", *motion.columns], *rows])
 
 
-def _from_json(path: Path) -> JointPath:
+def _from_json(path: Path) -> Waypoints:
     try:
         message = json.loads(read_text(path, "file of a motion"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON, found {error}") from None
-    while isinstance(message, Mapping) and (inner := next((key for key in NESTED if key in message), None)):
-        message = message[inner]
-    if not isinstance(message, Mapping) or not {"joint_names", "points"} <= message.keys():
+    segments = list(_segments(message))
+    if not segments:
         raise InputError('expected a JointTrajectory with "joint_names" and "points", found none')
+    joints, rows, rates, begin = _names(segments[0]["joint_names"]), list[Row](), list[Any](), 0.0
+    for k, segment in enumerate(segments):
+        if _names(segment["joint_names"]) != joints:
+            raise InputError(f"segment {k}: expected the joints of the first one, {quoted(joints)}, found others")
+        points = segment["points"]
+        if not isinstance(points, Sequence) or isinstance(points, str):
+            raise InputError(f"expected points in a list, found {type(points).__name__}")
+        rows += [_row(joints, point, k, begin) for k, point in enumerate(points)]
+        rates += [point.get("velocities") for point in points]
+        begin = rows[-1][0] if rows else 0.0
+    joined = [f"{len(segments)} segments follow each other"] if len(segments) > 1 else []
+    return _motion(joints, rows, *joined, *_moving_at_ends(joints, rates))
+
+
+def _segments(message: Any) -> Iterator[Mapping[str, Any]]:  # noqa: ANN401 (any JSON)
+    """The JointTrajectories in a message, those of a list one after the other."""
+    if isinstance(message, list):
+        for part in message:
+            yield from _segments(part)
+    elif isinstance(message, Mapping):
+        if {"joint_names", "points"} <= message.keys():
+            yield message
+        elif inner := next((key for key in NESTED if key in message), None):
+            yield from _segments(message[inner])
+
+
+def _names(names: Any) -> list[str]:  # noqa: ANN401 (any JSON)
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError("expected joint_names, a list of texts, found others")
+    return names
+
+
+Row = tuple[float, list[float]]
+"""Time (s) and positions of a point."""
+
+
+def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:  # noqa: ANN401 (any JSON)
+    if not isinstance(point, Mapping):
+        raise InputError(f"point {k}: expected positions and time_from_start, found {type(point).__name__}")
+    positions = point.get("positions")
+    if not positions:
+        others = quoted(key for key in ("velocities", "accelerations", "effort") if point.get(key))
+        raise InputError(f"point {k}: expected positions, found {others}: the path goes through positions")
+    if not isinstance(positions, list) or len(positions) != len(joints):
+        found = len(positions) if isinstance(positions, list) else type(positions).__name__
+        raise InputError(f"point {k}: expected {len(joints)} positions, one for each joint, found {found}")
+    return begin + _seconds(point.get("time_from_start"), k), [_number(value, f"point {k}") for value in positions]
+
+
+def _number(value: Any, where: str) -> float:  # noqa: ANN401 (any JSON)
     try:
-        return _of_points([str(name) for name in message["joint_names"]], message["points"])
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise InputError(f"expected points with positions and time_from_start, found others: {error!r}") from None
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not abs(number) <= LARGEST:  # False of NaN
+        raise InputError(f"{where}: expected finite numbers up to {LARGEST:g}, found {shown(str(value))}")
+    return number
 
 
-def _of_points(joints: Sequence[str], points: Sequence[Mapping[str, Any]]) -> JointPath:
-    rows = [(_seconds(point["time_from_start"]), point["positions"]) for point in points]
-    found = {len(positions) for _, positions in rows}
-    if found - {len(joints)}:
-        raise InputError(f"expected {len(joints)} positions in each point, found {sorted(found)}")
-    remarks = _moving_at_ends(joints, [point.get("velocities") for point in points])
-    return _motion(joints, [time for time, _ in rows], [positions for _, positions in rows], *remarks)
+def _seconds(duration: Any, k: int) -> float:  # noqa: ANN401 (any JSON)
+    """Of a Duration of ROS 2 (sec, nanosec), ROS 1 (secs, nsecs) or protobuf (seconds, nanos; "0.5s"), or a number."""
+    where = f"point {k}: time_from_start"
+    if duration is None:
+        raise InputError(f"{where}: expected a time, found none")
+    if isinstance(duration, Mapping):
+        whole, parts = (
+            next((duration[key] for key in keys if key in duration), 0)
+            for keys in (("sec", "secs", "seconds"), ("nanosec", "nsecs", "nanos", "nanoseconds"))
+        )
+        return _number(whole, where) + _number(parts, where) / NANO
+    return _number(duration.removesuffix("s") if isinstance(duration, str) else duration, where)
 
 
 def _moving_at_ends(joints: Sequence[str], velocities: Sequence[Any]) -> Iterator[str]:
     """Of motions that begin or end elsewhere than at rest, where all points have velocities."""
-    if any(rates is None or len(rates) != len(joints) for rates in velocities) or not len(velocities):
+    try:
+        rates = np.abs(np.array(velocities, dtype=float).reshape(-1, len(joints)))
+    except (TypeError, ValueError, OverflowError):
         return
-    rates = np.abs(np.array(velocities, dtype=float))
-    for k, end in ((0, "first"), (-1, "last")):
+    for k, end in ((0, "first"), (-1, "last")) if len(rates) else ():
         moving = [name for name, rate in zip(joints, rates[k], strict=True) if rate > MOVING * rates.max()]
         if moving:
             yield (
@@ -108,22 +147,15 @@ def _moving_at_ends(joints: Sequence[str], velocities: Sequence[Any]) -> Iterato
             )
 
 
-def _motion(joints: Sequence[str], times: Sequence[float], positions: Sequence[Any], *remarks: str) -> JointPath:
+def _motion(joints: Sequence[str], rows: Sequence[Row], *remarks: str) -> Waypoints:
     if not joints or len(set(joints)) < len(joints):
         raise InputError(f"expected joints of different names, found {len(joints)}: {shown(', '.join(joints))}")
-    values = np.array(positions, dtype=float).reshape(len(times), len(joints))
-    return JointPath(tuple(joints), np.array(times, dtype=float), values, remarks)
+    values = np.array([positions for _, positions in rows], dtype=float).reshape(len(rows), len(joints))
+    found = waypoints_of(joints, np.array([time for time, _ in rows]), values, "point {}".format)
+    return replace(found, remarks=(*remarks, *found.remarks))
 
 
-def _seconds(duration: object) -> float:
-    """Of a Duration of ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs), or a number."""
-    if isinstance(duration, Mapping):
-        sec, nanosec = (duration.get(new, duration.get(old, 0)) for new, old in (("sec", "secs"), ("nanosec", "nsecs")))
-        return float(sec) + float(nanosec) / NANO
-    return float(duration)  # type: ignore[arg-type]
-
-
-def _from_bag(path: Path) -> JointPath:
+def _from_bag(path: Path) -> Waypoints:
     if not path.exists():
         raise InputError("file of a motion not found")
     with extras():
@@ -131,45 +163,109 @@ def _from_bag(path: Path) -> JointPath:
         from rosbags.typesys import Stores, get_typestore
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
-            return _first_motion(bag)
+            return _of_bag(bag)
     except InputError:
         raise
     except Exception as error:  # whatever a reader of damaged files raises
-        raise InputError(f"expected a bag of ROS, found {type(error).__name__}: {shown(str(error))}") from None
+        is_told = type(error).__module__.startswith("rosbags")
+        reason = shown(str(error)) if is_told else "one that is damaged or not complete"
+        raise InputError(f"expected a bag of ROS, found {reason}") from None
 
 
-def _first_motion(bag: Any) -> JointPath:  # noqa: ANN401 (of a library without types)
-    """The first JointTrajectory; without one, the JointStates of the topic that has most."""
-    for kind, read in ((TRAJECTORY, _trajectory), (STATES, _states)):
-        topics = [connection for connection in bag.connections if connection.msgtype == kind]
-        if topics:
-            topic = max(topics, key=lambda connection: int(connection.msgcount))
-            messages = (bag.deserialize(raw, kind) for _, _, raw in bag.messages(connections=[topic]))
-            return read(messages, topic.topic)
-    raise InputError(f"expected messages {TRAJECTORY} or {STATES}, found none of them")
+def _of_bag(bag: Any) -> Waypoints:  # noqa: ANN401 (of a library without types)
+    """The first JointTrajectory of the topic that has most; without one, the JointStates of all topics."""
+    topics = {
+        kind: sorted((one for one in bag.connections if one.msgtype == kind), key=lambda one: -int(one.msgcount))
+        for kind in (TRAJECTORY, STATES)
+    }
+    if not any(topics.values()):
+        raise InputError(f"expected messages {TRAJECTORY} or {STATES}, found none of them")
+
+    def messages(topic: Any) -> Iterator[tuple[int, Any]]:  # noqa: ANN401
+        return ((at, bag.deserialize(raw, topic.msgtype)) for _, at, raw in bag.messages(connections=[topic]))
+
+    first, *others = topics[TRAJECTORY] or [None]
+    if first is None:
+        return _states({topic.topic: messages(topic) for topic in topics[STATES]})
+    (_, plan), *later = messages(first)
+    left = [f"{len(later)} later messages on {first.topic} left out"] if later else []
+    left += [f"{topic.topic} left out: {topic.msgcount} messages" for topic in (*others, *topics[STATES])]
+    points = [{"positions": point.positions.tolist(), "time_from_start": vars(point.time_from_start)}
+              for point in plan.points]  # fmt: skip
+    rows = [_row(plan.joint_names, point, k, 0.0) for k, point in enumerate(points)]
+    return _motion(
+        plan.joint_names, rows, *left, *_moving_at_ends(plan.joint_names, [p.velocities for p in plan.points])
+    )
 
 
-def _trajectory(messages: Iterator[Any], topic: str) -> JointPath:
-    first, *others = messages
-    times = [point.time_from_start.sec + point.time_from_start.nanosec / NANO for point in first.points]
-    remarks = [f"{len(others)} later messages on {topic} left out"] if others else []
-    remarks += _moving_at_ends(first.joint_names, [point.velocities for point in first.points])
-    return _motion(first.joint_names, times, [point.positions for point in first.points], *remarks)
+def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Waypoints:
+    """Positions by the time of their stamps, the first being zero, of all joints: see `_together`.
+
+    Of a joint on several topics that with most messages counts. Stamps that nobody has set are times of the record.
+    """
+    samples, owner, others = dict[str, list[Sample]](), dict[str, str](), dict[str, list[str]]()
+    for topic, messages in topics.items():
+        for at, message in messages:
+            if len(message.position) != len(message.name):
+                continue
+            stamp = message.header.stamp.sec * NANO + message.header.stamp.nanosec
+            for name, position in zip(message.name, message.position.tolist(), strict=True):
+                if owner.setdefault(name, topic) == topic:
+                    samples.setdefault(name, []).append((stamp, at, _number(position, f"joint {shown(name)}")))
+                elif name not in others.setdefault(topic, []):
+                    others[topic].append(name)
+    read = quoted(dict.fromkeys(owner.values())).replace('"', "")
+    remarks = [f"measured positions of {read}, as they are: not smoothed"]
+    for topic, names in others.items():
+        elsewhere = ", ".join(dict.fromkeys(owner[name] for name in names))
+        remarks.append(f"{topic}: {quoted(map(shown, names))} left out: also on {elsewhere}")
+    return _together(samples, remarks)
 
 
-def _states(messages: Iterator[Any], topic: str) -> JointPath:
-    """Positions over the time of their stamps, the first being zero; joints of the first message."""
-    rows, joints = list[tuple[int, list[float]]](), list[str]()
-    for message in messages:
-        joints = joints or list(message.name)
-        if set(joints) <= set(message.name) and len(message.position) == len(message.name):
-            at = dict(zip(message.name, message.position, strict=True))
-            rows.append(
-                (message.header.stamp.sec * NANO + message.header.stamp.nanosec, [float(at[name]) for name in joints])
-            )
-    begin = rows[0][0] if rows else 0
-    times = [(stamp - begin) / NANO for stamp, _ in rows]
-    return _motion(joints, times, [row for _, row in rows], f"measured positions of {topic}, as they are: not smoothed")
+Sample = tuple[int, int, float]
+"""Stamp of a message (ns), 0 where nobody has set it, its time in the record (ns), and a position."""
+
+
+def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Waypoints:
+    """One table of joints whose samples have times of their own (ns).
+
+    Times are those of the joints with most samples, where all joints have some before and after; others go between
+    theirs by a cubic spline.
+    """
+    series = dict[str, tuple[Integers, Array]]()
+    clock = 0 if any(stamp for rows in samples.values() for stamp, _, _ in rows) else 1
+    for name, rows in samples.items():
+        at, values = np.array([row[clock] for row in rows], dtype=np.int64), np.array([value for *_, value in rows])
+        order = np.argsort(at, kind="stable")
+        series[name] = at[order], values[order]
+    if short := [name for name, (at, _) in series.items() if len(np.unique(at)) < 2]:
+        remarks.append(f"{quoted(map(shown, short))} left out: fewer than two samples")
+    series = {name: rows for name, rows in series.items() if name not in short}
+    if not series:
+        return _motion(list(samples), [])
+    alike = Counter(at.tobytes() for at, _ in series.values())
+    stamps = max((at for at, _ in series.values()), key=lambda at: (len(at), alike[at.tobytes()]))
+    apart = [name for name, (at, _) in series.items() if not np.array_equal(at, stamps)]
+    begin, end = max(at[0] for at, _ in series.values()), min(at[-1] for at, _ in series.values())
+    times = stamps[(stamps >= begin) & (stamps <= end)]
+    if len(times) < 2:
+        raise InputError(f"expected joints that are recorded at the same time, found none for {quoted(series)}")
+    if apart:
+        from scipy.interpolate import CubicSpline
+
+        whole = (times[-1] - times[0]) / NANO
+        remarks.append(f"{quoted(map(shown, apart))}: in other messages: by cubic splines at times of the others,"
+                       f" the {whole:.6g} s that all have")  # fmt: skip
+    columns = list[Array]()
+    for name, (at, values) in series.items():
+        if name not in apart:
+            columns.append(values[np.isin(at, times)])
+            continue
+        once = np.append(True, np.diff(at) > 0)
+        own = (at[once] - times[0]) / NANO
+        columns.append(CubicSpline(own, values[once])((times - times[0]) / NANO))
+    table = np.stack([(times - times[0]) / NANO, *columns], axis=1)
+    return _motion(list(series), [(row[0], row[1:]) for row in as_rows(table)], *remarks)
 
 
 @dataclass(frozen=True, eq=False)

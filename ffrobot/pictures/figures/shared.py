@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
+from ...common.tables import parse_csv, shown
+from ...common.toml_files import read_text
 from ...mbs.joints.joint import MotorLimits
 from ...results.file import Results
 from ...results.joints import joint_coordinates
@@ -75,16 +77,14 @@ def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, A
 def read_points(path: Path, column: str) -> tuple[Array, Array]:
     """Times and values of one column of a CSV file whose first column is the time; lines with # are comments."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot read the points: {getattr(error, 'strerror', None) or error}") from None
-    if not rows or column not in rows[0]:
-        header = rows[0] if rows else []
-        raise InputError(f'{path}: expected the column "{column}", found {header}')
-    k = rows[0].index(column)
+        header, rows = parse_csv(read_text(path, "table of points"))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot read the points: {error}") from None
+    if column not in header:
+        raise InputError(f'{path}: expected the column "{column}", found {quoted(map(shown, header))}')
+    k = header.index(column)
     try:
-        return np.array([float(row[0]) for row in rows[1:]]), np.array([float(row[k]) for row in rows[1:]])
+        return np.array([float(row[0]) for _, row in rows]), np.array([float(row[k]) for _, row in rows])
     except (ValueError, IndexError) as error:
         raise InputError(f'{path}: expected numbers in the column "{column}": {error}') from None
 
