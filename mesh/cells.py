@@ -150,7 +150,7 @@ def _gauss(cell: CellName, count: int) -> tuple[Array, Array]:
 
     x = u, y = v (1 − u), z = w (1 − u)(1 − v): the determinant of that map takes two degrees (Stroud 1971).
     """
-    of_line, weights = np.polynomial.legendre.leggauss(count)
+    of_line, weights = np.polynomial.legendre.leggauss(count)  # type: ignore[no-untyped-call, unused-ignore]
     u, v, w = (X := np.stack(np.meshgrid(*[(of_line + 1) / 2] * 3, indexing="ij"))).reshape(3, -1)
     W = np.einsum("i,j,k->ijk", *[weights / 2] * 3).ravel()
     if cell == "hexahedron":

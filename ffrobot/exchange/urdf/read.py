@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -218,7 +219,8 @@ def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primiti
                 yield Primitive("box", _sizes(geometry, "size", 3), _origin(element, where))
             elif geometry.tag in ("cylinder", "capsule"):
                 sizes = *_sizes(geometry, "radius"), *_sizes(geometry, "length")
-                yield Primitive(geometry.tag, sizes, _origin(element, where))
+                shape: Literal["cylinder", "capsule"] = "capsule" if geometry.tag == "capsule" else "cylinder"
+                yield Primitive(shape, sizes, _origin(element, where))
             elif geometry.tag == "sphere":
                 yield Primitive("sphere", _sizes(geometry, "radius"), _origin(element, where))
 
