@@ -7,17 +7,21 @@ from contextlib import contextmanager
 
 from .errors import SolveError
 
-SAME = ("matplotlib", "plotly", "jinja2", "pyvista", "pandas", "xarray", "control", "rosbags")
-PACKAGES = {name: name for name in SAME} | {"imageio_ffmpeg": "imageio-ffmpeg", "trimesh": "trimesh pycollada"}
-"""What pip installs for each of these libraries."""
+PACKAGES = {"imageio_ffmpeg": "imageio-ffmpeg", "trimesh": "trimesh pycollada"}
+"""What pip installs for libraries that it does not have under their own name."""
+ELSEWHERE = ("dolfinx", "basix", "ufl", "ffcx", "petsc4py", "slepc4py", "mpi4py")
+"""Libraries of finite elements, which come with dolfinx."""
 
 
 def missing(error: ModuleNotFoundError) -> str | None:
-    """What to install where one of these libraries is not there; None for any other."""
+    """What to install where a library is not there; None for a module of this program."""
     library = (error.name or "").partition(".")[0]
-    if library not in PACKAGES:
+    if library in ("", __name__.partition(".")[0]):
         return None
-    return f"this needs {library}, which is not installed: pip install {PACKAGES[library]}"
+    how = "install dolfinx (Debian: python3-dolfinx)"
+    if library not in ELSEWHERE:
+        how = f"pip install {PACKAGES.get(library, library)}"
+    return f"this needs {library}, which is not installed: {how}"
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -179,7 +180,7 @@ def _compute(
     compute = _computation(link, source_path, force)  # on all processes: the libraries start together
 
     def make() -> ModalBody:
-        with of_file(source_path), ending_at_once():
+        with _ONE_AT_A_TIME, of_file(source_path), ending_at_once():
             body = with_measured(compute(link, source_path, progress or _silent), link)
         from ..mesh.compat import assembly
         from .modal_body.krylov_schur import eigensolver
@@ -220,10 +221,11 @@ def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., M
             from .solid.link import solid_modal_body
 
             return partial(solid_modal_body, remesh=remesh)
-    except ModuleNotFoundError as error:
+    except ImportError as error:
+        gone = f"{error.name} is not installed" if isinstance(error, ModuleNotFoundError) else str(error)
         raise SolveError(
-            f"{source_path}: computing this link needs the finite element libraries, and {error.name} is not installed:"
-            " install dolfinx (Debian: python3-dolfinx), or use a modal body file made elsewhere"
+            f"{source_path}: computing this link needs the finite element libraries, and {gone}: install dolfinx"
+            " (Debian: python3-dolfinx), or use a modal body file made elsewhere"
         ) from None
 
 
@@ -250,6 +252,7 @@ def _silent(_: str) -> None:
     pass
 
 
+_ONE_AT_A_TIME = RLock()  # gmsh and PETSc know one thread
 _AFTER_THE_MODES = ("name", "damping", "stress", "measured")
 
 

@@ -75,6 +75,7 @@ def main() -> None:
     """
     gc.set_threshold(200_000)  # what a command loads stays: searching it repeatedly costs a sixth of the start
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would read the metadata of all packages
+    os.environ["MPLBACKEND"] = "agg"  # figures are files; Jupyter names a module of its own, which is not here
     stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
     ready_streams()

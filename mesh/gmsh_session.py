@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from tempfile import TemporaryFile
@@ -36,7 +37,8 @@ def gmsh_session() -> Iterator[Callable[[], str]]:
     with _stdout_captured() as printed:
         gmsh.initialize([], False)
         try:
-            signal.signal(signal.SIGINT, interrupt)
+            if threading.current_thread() is threading.main_thread():
+                signal.signal(signal.SIGINT, interrupt)
             for name, value in (
                 ("General.Terminal", 0),
                 ("General.NumThreads", 1),

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..common.arrays import Integers, NDArray
 from ..common.errors import InputError
+from ..common.extras import missing
 from .cells import in_gmsh_order
 from .part_reader import read_apart
 from .source import MeshBlocks, RawMesh
@@ -34,6 +35,8 @@ _LAGRANGE = {
 }
 _VOXEL = [0, 1, 3, 2, 4, 5, 7, 6]  # corners of VTK's voxel, which are in order of x, then y, then z, as a hexahedron's
 _TECPLOT = re.compile(rb"^\s*ZONE\b", re.MULTILINE | re.IGNORECASE)  # other files with the ending .dat are Nastran's
+# VTK's types of cells that are neither solids nor their faces, which may stand beside solids.
+_VTK_TYPES = {2: "sets of points", 4: "polylines", 6: "strips of triangles", 7: "polygons"}
 _LEFT_OUT = "cells that meshio cannot handle"
 _ENDINGS = (".step", ".stp", ".msh", ".inp", ".bdf", ".nas", ".fem", ".dat", ".vtk", ".vtu", ".med", ".xdmf", ".mesh")
 # Integer data of cells with more values than this number cells, not groups.
@@ -77,13 +80,23 @@ def read_foreign(path: Path, where: str) -> RawMesh:
         with redirect_stdout(said), redirect_stderr(said):
             raw = _raw_mesh(_read(path, said))
     except (Exception, SystemExit) as error:  # whatever a reader meets in a corrupt file, it raises as it comes
-        reason = said.getvalue() if isinstance(error, SystemExit) else f"{said.getvalue()} {error!r}"
+        reason = said.getvalue() if isinstance(error, SystemExit) else f"{said.getvalue()} {_in_words(error)}"
         reason = " ".join(reason.replace(str(path), path.name).split())
         if isinstance(error, meshio.ReadError) and path.suffix.lower() not in meshio.extension_to_filetypes:
             reason = f"its ending is not one of {', '.join(_ENDINGS)}: another program has to convert it"
         raise InputError(f"{where}: expected a mesh that meshio can read; meshio reports: {reason}") from None
     words = " ".join(said.getvalue().replace(str(path), path.name).split())
     return replace(raw, remarks=(f"meshio on {path.name}: {words}",)) if words else raw
+
+
+def _in_words(error: BaseException) -> str:
+    """What is wrong, of whatever a reader raises."""
+    if isinstance(error, KeyError):
+        kind = _VTK_TYPES.get(error.args[0], error.args[0]) if error.args else "unknown ones"
+        return f"cells or data of a kind that it does not know: {kind}"
+    if isinstance(error, ModuleNotFoundError) and (message := missing(error)):
+        return message
+    return str(error) or f"data that end or contradict ({type(error).__name__})"
 
 
 def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
@@ -112,6 +125,10 @@ def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
     if failed:
         raise ValueError(failed[0])
     _check_ghosts(found.cell_data)
+    types = getattr(found, "celltypes", None)
+    if types is not None and (flat := np.isin(types, list(_VTK_TYPES))).any() and not flat.all():
+        found = found.extract_cells(~flat)
+        found.cell_data.pop("vtkOriginalCellIds", None)  # integers that are no groups
     return pyvista.to_meshio(found)
 
 

@@ -110,12 +110,21 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     return found
 
 
+CONVERTED = "another program has to convert it to URDF"
 ELSEWHERE = {
     ".csv": 'trajectories take tables as they are, waypoints = "PATH.csv"',
     ".toml": "ffrobot solve takes scenes, ffrobot link takes links",
     **dict.fromkeys((".step", ".stp", ".msh", ".inp", ".bdf"), "ffrobot link --inspect drafts a link file of a part"),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), f"a scene of USD: {CONVERTED}"),
+    **dict.fromkeys((".slx", ".mdl"), f"a model of Simulink: {CONVERTED}"),
+    ".sdf": f"SDF: {CONVERTED}",
+    ".mjcf": f"MJCF of MuJoCo: {CONVERTED}",
+    ".mnf": "a flexible body of Adams: export its finite element mesh, for ffrobot link --inspect, or SID",
+    ".mat": "a file of MATLAB: write its table as CSV",
+    **dict.fromkeys((".yaml", ".yml"), "YAML, as of ros2 topic echo: write the message as JSON, or a bag"),
+    ".xacro": "xacro: run `xacro FILE.xacro > ROBOT.urdf` first",
 }
-"""What takes files that need no import, by their suffix."""
+"""What takes files that are not imported, or what has to be done first, by their suffix."""
 
 
 @click.command()

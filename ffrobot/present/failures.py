@@ -18,6 +18,8 @@ def describe(error: Exception) -> str | None:
         return str(error)
     if isinstance(error, ModuleNotFoundError):
         return missing(error)
+    if isinstance(error, ImportError) and ".so" in f"{error.path} {error}":  # a library that it needs is not there
+        return f"a library cannot be loaded: {error}"
     if isinstance(error, MemoryError):
         return "not enough memory: fewer outputs, elements or modes take less"
     if isinstance(error, OSError) and error.strerror:

@@ -17,6 +17,7 @@ from ..mbs.solve.start import undeformed_posture
 from ..results.file import Results
 from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
+from ..scene.load import load_robot
 from .lines import print_table
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     """Joints with their guesses, the points of paths, and lines for [initial] that choose other postures."""
-    model = prepare_scene(path, watcher).model
+    model = prepare_scene(load_robot(path), watcher).model
     first, *others = start_postures(model)
     print_table(console, ("joint", "start", "guess in [initial]", "limits"), _joints(model, first.q))
     columns = ("point", "at (m)", "roll, pitch, yaw")[: 2 + bool(model.scene.tool)]

@@ -56,6 +56,13 @@ def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
         return validated_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
 
 
+def load_robot(path: Path) -> Scene:
+    """The scene in a file as `load_scene` reads it; without an analysis, too, as an import writes it."""
+    data, rest = load_toml(path, "scene file"), [{"name": "rest", "kind": "static"}]
+    scene = validated_scene({"analysis": rest} | data, path, read_text(path, "scene file"))
+    return scene if "analysis" in data else scene.model_copy(update={"analysis": ()})
+
+
 def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
     """Make a scene in Python, with the keys of a scene file.
 

@@ -61,9 +61,8 @@ def test_the_tool_frame_of_the_last_body(imported, tmp_path, ffrobot):
     assert found["point"] == "arm.origin"
     np.testing.assert_allclose([*found["at"], *found["rpy"]], [0.1, 0.0, 0.4, 0.2, -0.3, 0.4], atol=1e-15)
     assert keys["body"][0]["rigid"]["points"] == {"origin": [0.0, 0.0, 0.0], "lens": [0.0, 0.1, 0.0]}
-    scene = tmp_path / "scene" / "scene.toml"
-    with scene.open("a") as file:
-        file.write('\n[[analysis]]\nname = "rest"\nkind = "static"\n')
+    scene = tmp_path / "scene" / "scene.toml"  # without an analysis yet
+    assert "shoulder" in ffrobot.ok("pose", scene).stdout
     ffrobot.ok("export", scene, "--format", "urdf", "-o", tmp_path / "back.urdf")
     again, _ = imported((tmp_path / "back.urdf").read_text(), "--force")
     np.testing.assert_allclose([*again["tool"][0]["at"], *again["tool"][0]["rpy"]], [*found["at"], *found["rpy"]])
@@ -248,6 +247,21 @@ def test_wrong_files(text, expected, tmp_path):
     assert expected in str(error.value)
     assert all("robot.urdf: " in line for line in str(error.value).splitlines())
     assert not (tmp_path / "scene").exists()
+
+
+OTHERS = {
+    "a.usda": "another program has to convert it", "a.mnf": "Adams", "a.mat": "MATLAB", "a.yaml": "JSON, or a bag",
+    "a.xml": "found <mujoco> of another program", "a.urdf": "found a file that is no XML", "a.mcap": "damaged",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_files_of_other_kinds(name, tmp_path, ffrobot):
+    (tmp_path / name).write_bytes(b'<mujoco model="m"/>' if name == "a.xml" else b"\x89MCAP0\r\n")
+    done = ffrobot("import", tmp_path / name, "-o", tmp_path / "out")
+    assert done.returncode == 2
+    assert OTHERS[name] in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_units_in_a_wrong_scale_are_told(imported):

@@ -21,7 +21,7 @@ from ...mbs.model.model import build_model
 from ...mbs.model.tree import KinematicTree, Node
 from ...mbs.solve.posture import robot_size
 from ...run.bodies import LoadedBody, load_bodies
-from ...scene.load import load_scene
+from ...scene.load import load_robot
 from ...scene.scene import Scene
 from .names import Names
 from .robot import Mimic, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
@@ -93,7 +93,8 @@ def conversion_losses(
         yield f"gravity {list(scene.gravity)} left out: `ffrobot import` takes {GRAVITY}"
     tables = {"[[trajectory]]": scene.trajectory, "[[load]]": scene.load, "[[pzt]]": scene.pzt,
               "[initial]": scene.initial.model_fields_set, "[[analysis]]": scene.analysis}  # fmt: skip
-    yield f"left out: {', '.join(name for name, entries in tables.items() if entries)}"
+    if left := [name for name, entries in tables.items() if entries]:
+        yield f"left out: {', '.join(left)}"
 
 
 def _of_types(tree: KinematicTree) -> Iterator[str]:
@@ -140,7 +141,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
     Raises:
         InputError: the scene is wrong, or planar.
     """
-    scene = load_scene(path)
+    scene = load_robot(path)
     if scene.is_planar:
         raise InputError(
             f'{path}: --format urdf: expected a scene with space = "spatial", found a planar one, which has no'

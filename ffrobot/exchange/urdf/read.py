@@ -55,7 +55,9 @@ def _root_element(content: bytes) -> Element:
     try:
         root = _parsed(content)
     except (expat.ExpatError, LookupError, ValueError) as error:
-        raise InputError(f"expected a URDF file, found XML that is not well-formed: {error}") from None
+        is_xml = content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"<", b"\xff\xfe", b"\xfe\xff"))
+        what = f"XML that is not well-formed: {error}" if is_xml else "a file that is no XML"
+        raise InputError(f"expected a URDF file, found {what}") from None
     prefixes = {key.partition(":")[2] for key, value in root.items() if "ros.org/wiki/xacro" in value} | {"xacro"}
     if xacro := next((each.tag for each in root.iter() if each.tag.partition(":")[0] in prefixes), None):
         raise InputError(
@@ -63,7 +65,8 @@ def _root_element(content: bytes) -> Element:
             " in an environment with ROS or with PyPI's xacro"
         )
     if root.tag != "robot":
-        raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>")
+        of = " of another program: convert it to URDF first" if root.tag in ("mujoco", "sdf") else ""
+        raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>{of}")
     return root
 
 
@@ -122,7 +125,7 @@ def _not_read(root: Element) -> Iterator[str]:
     for tag, count in Counter(child.tag for child in beside).items():
         named = (each.get(key, "") for child in beside if child.tag == tag for each in child.iter() for key in NAMING)
         about = dict.fromkeys(name for name in named if name in known)
-        extra = ": rotor_inertia and gear_ratio of a joint say what motors add" if tag == "transmission" else ""
+        extra = ": a joint describes its motor by rotor_inertia and gear_ratio" if tag == "transmission" else ""
         yield f"{count} <{shown(tag)}> left out{f', of {_listed(about)}' if about else ''}{extra}"
     alike = dict[tuple[str, ...], dict[str, str]]()
     for each in (root, *root.findall("link"), *root.findall("joint")):
