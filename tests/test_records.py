@@ -74,9 +74,9 @@ MISTAKES = {
         put("body", rigid=RIGID | {"inertia": [1.0, 0.1, 0.1]}),
         "rigid.inertia: expected no principal moment of inertia larger than the sum of the others, found 0.1, 0.1, 1",
     ),
-    "inertia of a line": (
-        put("body", rigid=RIGID | {"inertia": [0.0, 1.0, 1.0]}),
-        "expected principal moments of inertia greater than 0, found 0",
+    "inertia below zero": (
+        put("body", rigid=RIGID | {"inertia": [-0.1, 1.0, 1.0]}),
+        "expected principal moments of inertia not below 0, found -0.1",
     ),
     "axis of a weld": (
         put("joint", type="weld", position_limit=None),

@@ -22,6 +22,7 @@ from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.solve.reach import turned_guesses
+from ..mbs.solve.start import check_turning
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .actuation import Actuation, find_actuation, missing_forces
@@ -75,6 +76,7 @@ def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Soluti
 
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve_scene` does with everything prepared; analyses go on from where `solution.earlier` has them."""
+    check_turning(solution.model)
     with Interruption(watcher) as interruption:
         judge = partial(_judged, replace(solution, earlier={}), interruption)
         scene, notes = with_paths(solution.scene, solution.model, judge, watcher.stage)

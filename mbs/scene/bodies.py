@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
 from ...common.deferred import ReadBy, Table
-from ...common.keys import MOST_MODES, SMALLEST, PathName
+from ...common.keys import MOST_MODES, PathName
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_source import LinkSource, LinkTable
 from ..fields.field_types import (
@@ -34,20 +34,18 @@ def tensor(inertia: Inertia) -> Array:
     return np.diag(array) if array.ndim == 1 else array
 
 
-def check_inertia(inertia: Inertia, least: float) -> None:
-    """Raise `ValueError` unless it is symmetric, and that of a body: no moment larger than the sum of the others."""
+def check_inertia(inertia: Inertia) -> None:
+    """Raise `ValueError` unless it is symmetric, and that of a body: no moment larger than the sum of the others.
+
+    Moments may be zero: those of a point mass, and of a rod about its axis.
+    """
     J = tensor(inertia)
     slack = ROUNDING * np.abs(J).max()
     if np.abs(J - J.T).max() > slack:
         raise ValueError(f"expected a symmetric inertia, found {J.tolist()}")
     moments = np.linalg.eigvalsh(J)
-    if moments[0] < least:
-        raise ValueError(
-            f"expected principal moments of inertia greater than 0, found {moments[0]:g}: a body without them cannot be"
-            " turned about that axis (a point mass is a [[payload]])"
-            if least > 0
-            else f"expected principal moments of inertia not below 0, found {moments[0]:g}"
-        )
+    if moments[0] < -slack:
+        raise ValueError(f"expected principal moments of inertia not below 0, found {moments[0]:g}")
     if moments[2] > moments[0] + moments[1] + slack:
         raise ValueError(
             f"expected no principal moment of inertia larger than the sum of the others, found"
@@ -57,11 +55,8 @@ def check_inertia(inertia: Inertia, least: float) -> None:
 
 def _about_center(J: float) -> Vector3:
     """Of a rigid body of a planar scene, by its moment of inertia about z."""
-    if not J >= SMALLEST:
-        raise ValueError(
-            f"expected a moment of inertia greater than 0, found {J:g}: without it the body's rotation has no"
-            " equation of motion (a point mass is a [[payload]])"
-        )
+    if not J >= 0:
+        raise ValueError(f"expected a moment of inertia not below 0, found {J:g}")
     return inertia_about_z(J)
 
 
@@ -109,7 +104,7 @@ class RigidBody(Record):
     @field_validator("inertia")
     @classmethod
     def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
-        check_inertia(inertia, SMALLEST)
+        check_inertia(inertia)
         return inertia
 
 
@@ -208,5 +203,5 @@ class Payload(Referring):
     @field_validator("inertia")
     @classmethod
     def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
-        check_inertia(inertia, 0.0)
+        check_inertia(inertia)
         return inertia

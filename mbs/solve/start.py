@@ -9,11 +9,13 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
-from ..model.known_motion import State
+from ..model.known_motion import State, mass_matrices
 from ..model.model import Model, row_values, turned_over
+from ..scene.bodies import ROUNDING, tensor
 from .posture import MET, MOST_ITERATIONS, joint_scales, mobility, row_sizes, solve_posture, solve_postures, with_rates
 from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
 
+LEAST = 1e-13  # of inertia, relative
 AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
 
 
@@ -50,6 +52,31 @@ def undeformed_posture(model: Model) -> State:
         kept = with_rates(model, q, with_rates(model, q, v, held=named).v)
         start = kept if np.allclose(kept.v[named], v[named]) else start
     return relaxed_gears(model, start)
+
+
+def check_turning(model: Model) -> None:
+    """Raise `InputError` where bodies without inertia about an axis leave a coordinate of a joint without any.
+
+    Such bodies, point masses and rods, turn by what their mass has about a joint that is away from them.
+    """
+    rigid = ((body.name, tensor(body.rigid.inertia)) for body in model.scene.body if body.rigid is not None)
+    slim = [name for name, J in rigid if np.linalg.eigvalsh(J)[0] <= ROUNDING * np.abs(J).max()]
+    if not slim:
+        return
+    M = mass_matrices(model, undeformed_posture(model).q[None])[0]
+    sizes, least = np.diag(M), LEAST * np.abs(np.trace(M))
+    for node in model.tree.nodes:
+        if (sizes[node.v] <= least).any():
+            raise InputError(
+                f"{model.scene.path}: {node.joint.label}: expected inertia about each of its axes, found none: masses"
+                f" that it turns are on an axis, and {quoted(slim)} have a moment of inertia of 0 (rigid.inertia)"
+            )
+    values = np.linalg.eigvalsh(M / np.sqrt(np.outer(sizes, sizes)))
+    if values[0] < LEAST:
+        raise InputError(
+            f"{model.scene.path}: expected bodies that all joints together turn with some inertia, found none about an"
+            f" axis: {quoted(slim)} have a moment of inertia of 0 (rigid.inertia)"
+        )
 
 
 def _turned_over(model: Model, guess: Array) -> Iterator[str]:

@@ -5,6 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import ffrobot
 from ffrobot import FfrobotError
 from ffrobot.exchange.urdf.bodies import least_change
 from ffrobot.exchange.urdf.import_urdf import import_urdf
@@ -62,10 +63,29 @@ def test_inertias_a_little_impossible(tmp_path):
     imported(tmp_path, link("base"), link("arm"), joint("j", "base", "arm"), fix_inertia=True, force=True)
 
 
-def test_inertias_that_are_not_positive_stay_refused(tmp_path):
-    nothing = 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
-    with pytest.raises(FfrobotError, match="greater than 0"):
-        imported(tmp_path, link("base"), link("arm", nothing), joint("j", "base", "arm"), fix_inertia=True)
+def test_negative_inertias_stay_refused(tmp_path):
+    negative = 'ixx="-0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"'
+    with pytest.raises(FfrobotError, match="moments of inertia not below 0"):
+        imported(tmp_path, link("base"), link("arm", negative), joint("j", "base", "arm"), fix_inertia=True)
+
+
+@pytest.mark.parametrize("inertia", ["0", "0.02"])
+def test_point_masses_and_rods(inertia, tmp_path):
+    """A mass of 1 kg at l = 0.5 m, of no inertia about x at least: m l² α + J α − m g l; none on the axis itself."""
+    J = f'ixx="0" ixy="0" ixz="0" iyy="{inertia}" iyz="0" izz="{inertia}"'
+    path = {"trajectory": [{"name": "t", "joint": "j", "value": "t**2"}]}
+    path["analysis"] = [{"name": "i", "kind": "pcid", "end": 0.02, "output_step": 0.01}]
+    for way in (0.5, 0.0):
+        arm = link("arm", J).replace("<mass", f'<origin xyz="{way} 0 0"/><mass')
+        turning = joint("j", "base", "arm").replace("0 0 1", "0 1 0" if way else "1 0 0")
+        found = imported(tmp_path, link("base"), arm, turning, force=True)
+        scene = ffrobot.make_scene(**found.scene, **path)
+        if way:
+            moment = ffrobot.solve(scene)["i/joints/j/moment"][0]
+            assert moment == pytest.approx(2 * (way**2 + float(inertia)) - 9.81 * way, rel=1e-12)
+        else:
+            with pytest.raises(FfrobotError, match='joint "j": expected inertia about each of its axes'):
+                ffrobot.solve(scene)
 
 
 ENCODINGS = ["utf-8", "utf-8-sig", "utf-16", "ISO-8859-1", "windows-1251", "GB2312", "Shift_JIS"]

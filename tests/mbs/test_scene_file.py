@@ -161,7 +161,7 @@ MISTAKES = [
     ('link = "link1.toml"', "", 'body "link1": expected exactly one of the keys "link", "modal", "rigid", found none', ""),
     ("modal =", 'link = "link1.toml"\nmodal =', 'body "link2": expected exactly one of', 'found "link", "modal"'),
     ("mass = 2", "mass = -2", 'body "hand": rigid.mass: expected a number greater than 0, found -2', ""),
-    ("inertia = 0.1", "inertia = 0.0", 'body "hand": rigid.inertia: expected a moment of inertia greater than 0', "[[payload]]"),
+    ("inertia = 0.1", "inertia = -0.1", 'body "hand": rigid.inertia: expected a moment of inertia not below 0', "-0.1"),
     ("grip =", "grab =", 'payload no. 1: point: expected one of the points "root", "grab" of "hand"', 'found "hand.grip"'),
     ('name = "hand"', 'name = "ha/nd"', 'body "ha/nd": name: expected a name without', 'found "ha/nd"'),
     ('name = "hand"', 'name = "link2"', 'body "link2": expected one body of this name, found 2', ""),

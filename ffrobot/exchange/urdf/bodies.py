@@ -9,7 +9,6 @@ import numpy as np
 
 from ...common.arrays import Array, as_rows
 from ...common.errors import InputError, quoted
-from ...common.keys import SMALLEST
 from ...common.tables import shown
 from ...mbs.scene.bodies import ROUNDING, check_inertia
 from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint
@@ -192,10 +191,10 @@ def _check_inertias(bodies: list[Body]) -> None:
             continue
         try:
             xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
-            check_inertia((xx, yy, zz), SMALLEST)
+            check_inertia((xx, yy, zz))
         except ValueError as error:
             least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
-            is_mended = not is_possible(body.inertial.inertia) and least > ROUNDING * largest
+            is_mended = not is_possible(body.inertial.inertia) and least >= -ROUNDING * largest
             way = ": --fix-inertia makes the least change" if is_mended else ""
             found.append(f"{body.label}: <inertia>: {error}{way}")
     if found:
