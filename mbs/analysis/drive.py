@@ -24,7 +24,14 @@ from ..solve.diagnosis import find_cause
 from ..solve.integrator_choice import choose_integrator
 from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
 from ..solve.limits import left_ranges, watch_limits
-from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_size, worst_posture
+from ..solve.posture import (
+    NEARLY_SINGULAR,
+    SINGULAR,
+    describe_branches,
+    describe_posture,
+    robot_size,
+    worst_posture,
+)
 from ..solve.reach import out_of_reach
 from ..solve.start import rank_of_redundant_loops
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
@@ -115,6 +122,7 @@ def drive_robot(
         ratio, worst = worst_posture(model, motion.time[some], motion.q[some], loop_rank)
         at = motion.time[some[worst]], motion.q[some[worst]]
         posture = describe_posture(model, ratio, float(at[0]), at[1], is_end=False, loop_rank=loop_rank)
+        posture = posture or describe_branches(model, motion.time[some], motion.q[some], loop_rank)
     cause = ""
     if in_posture:
         cause = f"{posture}: {out_of_reach(model, times) or 'move the path, or start in another posture'}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
 MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
 SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
+BRANCHING = 0.05  # ratio below which bent links may take redundant loops from one branch to another
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
 BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where equations of loops are distinguished
@@ -128,6 +130,24 @@ def mobility(model: Model, q: Array) -> Mobility:
     return Mobility(count - len(model.tree.gears), followed, ratio, left, J.shape[1] - count)
 
 
+def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
+    """How many rows of paths move what loops lock at q (n_q,) with rigid links, and the joints that these lock.
+
+    0 with rigid links: there nothing lets such rows move.
+    """
+    J, is_loop = _scaled_rows(model, q), model.loop_rows
+    if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
+        return 0, ()
+    free = null_space(J[is_loop], SINGULAR, 1.0)
+    moving = np.abs(free).max(axis=1, initial=0.0) > MOVES
+    rows = J[~is_loop]
+    is_locked = (np.abs(rows[:, moving]).max(axis=1, initial=0.0) <= MOVES) & (
+        np.abs(rows).max(axis=1, initial=0.0) > MOVES
+    )
+    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
+    return int(np.count_nonzero(is_locked)), tuple(dict.fromkeys(names[~moving].tolist()))
+
+
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int) -> tuple[float, int]:
     """The least ratio of `Mobility` at `times` (T,) and q (T, n_q), and at which of these.
 
@@ -158,6 +178,23 @@ def describe_posture(
     moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
     how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
+
+
+def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
+    """Where loops pass a singular posture, in which branches meet, at `times` (T,) and q (T, n_q); "" if far from one.
+
+    `loop_rank` as in `worst_posture`.
+    """
+    values = np.linalg.svd(_scaled_rows_at(model, times, q)[:, model.loop_rows], compute_uv=False)
+    ratios = values[:, loop_rank - 1] / values[:, 0] if loop_rank else np.ones(len(times))
+    worst = int(ratios.argmin())
+    if not ratios[worst] < BRANCHING or worst in (0, len(times) - 1):
+        return ""
+    owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
+    return (
+        f"at t = {times[worst]:.6g} s loops that {owners} close pass a singular posture (ratio {ratios[worst]:.1e}), in"
+        " which branches of their motion meet: links that bend may go on along another one"
+    )
 
 
 def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
@@ -213,10 +250,17 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
     path that jumps before `end` (s).
     """
     path, found = model.scene.path, mobility(model, q)
+    bent, locked = paths_by_bending(model, q)
     for each in model.scene.trajectory if end > 0 else ():
         check_smooth(path, ((f'trajectory "{each.name}": {name}', target) for name, target in each.targets), end)
     rows = int(np.count_nonzero(~model.loop_rows))
     names = quoted(trajectory.name for trajectory in model.scene.trajectory)
+    if rows > found.freedom and bent:
+        yield (
+            f"loops lock joints {quoted(locked)} with rigid links: the mechanism follows trajectory {names} only as its"
+            " links bend"
+        )
+        found = replace(found, freedom=found.freedom + bent, followed=found.followed + bent)
     if rows > found.freedom:
         raise InputError(
             f"{path}: trajectory: expected at most {found.freedom} components, as many as the mechanism has degrees of"

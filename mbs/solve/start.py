@@ -12,7 +12,17 @@ from ...common.errors import InputError, quoted
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model, row_values, turned_over
 from ..scene.bodies import ROUNDING, tensor
-from .posture import MET, MOST_ITERATIONS, joint_scales, mobility, row_sizes, solve_posture, solve_postures, with_rates
+from .posture import (
+    MET,
+    MOST_ITERATIONS,
+    joint_scales,
+    mobility,
+    paths_by_bending,
+    row_sizes,
+    solve_posture,
+    solve_postures,
+    with_rates,
+)
 from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
 
 LEAST = 1e-13  # of inertia, relative
@@ -101,11 +111,14 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
 def rank_of_redundant_loops(model: Model, rows: Indices) -> int | None:
     """Of the constraints of loops among `rows`, where straight links make some of them redundant; else None.
 
-    Bent links raise it: joints seem to be locked that the links let move.
+    Bent links raise it: joints seem to be locked that the links let move. So does a path by which links bend.
     """
     count = int(np.count_nonzero(model.loop_rows[rows]))
-    rank = mobility(model, undeformed_posture(model).q).loop_rank if count else 0
-    return rank if rank < count else None
+    if not count:
+        return None
+    q = undeformed_posture(model).q
+    rank = mobility(model, q).loop_rank
+    return rank - paths_by_bending(model, q)[0] if rank < count else None
 
 
 def shape_in_redundant_loops(model: Model, rows: Indices) -> str:

@@ -254,7 +254,7 @@ def _scales(K: Array, size: float) -> Array:
 
 def _step(at: Balance, K: Array, free: Indices) -> Array:
     """Newton's step along v[`free`], the least where nothing resists."""
-    K, J = K[np.ix_(free, free)], at.gradient[np.ix_(at.independent, free)]
+    K, J = K[np.ix_(free, free)], at.gradient[at.independent][:, free]
     scale = _scales(K, at.size)
     J = J * scale
     of_rows = np.linalg.norm(J, axis=1)
