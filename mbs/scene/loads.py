@@ -22,7 +22,7 @@ class Load(Referring):
     point: PointReference | None = None
     """Loaded point, "BODY.POINT"."""
     joint: str | None = None
-    """Joint that it acts on, along its coordinate."""
+    """Joint that it acts on, along its coordinate; behind a compliant gear on its motor, as that itself does."""
     pzt: str | None = None
     """Name of the layout with the driven patches (default: the name of the body)."""
     x: Expression | None = None
@@ -38,8 +38,9 @@ class Load(Referring):
     mz: Annotated[Expression | None, IN_SPACE] = None
     """Moment about the ground's z axis on the section, N·m; expression in t."""
     moment: Annotated[Expressions | None, Spelled(Expression, as_written)] = None
-    """Torque on the second side of the joint along its coordinate, N·m (N along sliding coordinates); expression in t,
-    or a list of them for several coordinates. In planar scenes also the counter-clockwise moment on a point."""
+    """Torque on the second side of the joint (of a compliant gear: on its output, before the spring) along its
+    coordinate, N·m (N along sliding coordinates); expression in t, or a list of them for several coordinates. In planar
+    scenes also the counter-clockwise moment on a point."""
     force: StateForce | None = None
     """Function of t, position and velocity that returns force (N) and moment (N·m); in scenes made in Python only."""
     voltage: tuple[Expression, ...] | None = None

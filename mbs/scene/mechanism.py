@@ -29,6 +29,8 @@ class Initial(Referring):
     """State at t = 0; values of bodies and joints are guesses that the constraints correct.
 
     Where kinematic loops alone constrain, joints with values keep them if the other joints can close the loops.
+    A joint with values behind a compliant gear keeps them, too, where its motor follows a trajectory: the gear starts
+    twisted. Without values, or with state = "static", it starts as the gear lets it.
     In planar scenes with `joints` or `joint_rates`, a frame without an own angle or rate follows the coordinate of its
     inboard joint (default 0); without them, its angle and rate are 0.
     """

@@ -61,7 +61,18 @@ def undeformed_posture(model: Model) -> State:
     if named.any():
         kept = with_rates(model, q, with_rates(model, q, v, held=named).v)
         start = kept if np.allclose(kept.v[named], v[named]) else start
-    return relaxed_gears(model, start)
+    return _twisted_gears(model, start, relaxed_gears(model, start))
+
+
+def _twisted_gears(model: Model, given: State, relaxed: State) -> State:
+    """The relaxed state, with joints behind motors on a path where [initial] has them: their gears are twisted."""
+    initial = model.scene.initial
+    for gear in model.tree.gears:
+        if gear.joint.joint.name in initial.named("joints"):
+            relaxed.q[gear.joint.q] = given.q[gear.joint.q]
+        if gear.joint.joint.name in initial.named("joint_rates"):
+            relaxed.v[gear.joint.v] = given.v[gear.joint.v]
+    return relaxed
 
 
 def check_turning(model: Model) -> None:
