@@ -103,11 +103,11 @@ def _load_inertias(motion: RobotMotion) -> dict[str, tuple[float, ...]]:
     rows = np.unique(np.linspace(0, len(motion.time) - 1, ROWS).astype(int))
     inertia = mass_matrices(model, motion.q[rows])
     most = inertia.diagonal(axis1=1, axis2=2).max(axis=0)
-    found = {}
+    found, behind = {}, {gear.joint.joint.name: gear.joint.v for gear in model.tree.gears}
     for joint, columns in model.motors.items():
         node = model.tree.nodes[model.tree.carried[joint]]
-        J, N = rotor(node)
-        found[joint] = tuple(float(most[int(k)]) - J * N**2 for k in columns)
+        J, N = rotor(node)  # 0 of a compliant gear, whose rotor has a coordinate of its own
+        found[joint] = tuple(float(one) - J * N**2 for one in most[behind.get(joint, columns)])
     return found
 
 

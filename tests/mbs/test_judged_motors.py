@@ -32,17 +32,21 @@ def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
     assert peaks[2] == pytest.approx(largest[2], rel=0.02)
 
 
-def test_inertia_that_a_motor_turns_with_the_other_joints_locked():
-    """Steiner: the shoulder turns both links and the hand, the farthest when they are stretched most."""
-    keys = {"gear_ratio": 50.0, "rotor_inertia": 2e-5}
+@pytest.mark.parametrize(("gear", "subject"), [({}, "joint"), ({"stiffness": 1e5, "damping": 50.0}, "motor")])
+def test_inertia_that_a_motor_turns_with_the_other_joints_locked(gear, subject):
+    """Steiner: the shoulder turns both links and the hand, the farthest when they are stretched most.
+
+    To 0.1 % behind compliant gears, in front of which motors follow the path.
+    """
+    keys, accuracy = {"gear_ratio": 50.0, "rotor_inertia": 2e-5, **gear}, 1e-3 if gear else 1e-9
     scene = arm_of_rods(
         {"upper": (2.0, 0.5), "lower": (1.0, 0.4)}, "se", keys,
-        trajectory=[{"name": "s", "joint": "s", "value": "sin(t)"}, {"name": "e", "joint": "e", "value": "1 - t"}],
+        trajectory=[{"name": "s", subject: "s", "value": "sin(t)"}, {"name": "e", subject: "e", "value": "1 - t"}],
         analysis=[{"name": "follow", "kind": "pcid", "end": 0.5, "output_step": 0.01}],
     )  # fmt: skip
     results = program.solve(scene)
     motors = results.verdict["follow"].motors
     lower = 1.0 * 0.4**2 / 3
     shoulder = 2.0 * 0.5**2 / 3 + lower + 1.0 * (0.5**2 + 2 * 0.5 * 0.2 * np.cos(0.5)) + 2e-5  # and the other rotor
-    assert motors["e"].load_inertia == pytest.approx(lower, rel=1e-9)
-    assert motors["s"].load_inertia == pytest.approx(shoulder, rel=1e-9)
+    assert motors["e"].load_inertia == pytest.approx(lower, rel=accuracy)
+    assert motors["s"].load_inertia == pytest.approx(shoulder, rel=accuracy)
