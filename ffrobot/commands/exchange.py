@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -142,14 +143,27 @@ ELSEWHERE = {
     metavar="NAME",
     help="Analysis; default: the first with moving joints, for fmu the first linear or forward one.",
 )
+@click.option(
+    "--side",
+    type=click.Choice(["motor", "joint"]),
+    help="Side of compliant gears whose positions a JointTrajectory has [motor].",
+)
 @click.option("-o", "--output", metavar="FILE", type=FILE, help="Output file [next to the input, by analysis].")
 @click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
-def export(file: Path, file_format: str, analysis: str | None, output: Path | None, *, force: bool) -> None:
+def export(
+    file: Path,
+    file_format: str,
+    analysis: str | None,
+    side: Literal["motor", "joint"] | None,
+    output: Path | None,
+    *,
+    force: bool,
+) -> None:
     """Export results, a modal body or a scene in a format of other programs.
 
     \b
-    csv               time, and position, velocity and torque of every joint, with all digits
+    csv               time, and position, velocity and torque of every joint, and of motors before compliant gears
     joint-trajectory  JSON in the layout of ROS 2's trajectory_msgs/JointTrajectory, with effort
     rosbag2           a folder, the bag of ROS 2 with that message; needs rosbags (extra "ros")
     fmu               FMI 2.0, model exchange and co-simulation, of a linear model; with C sources, compiled where
@@ -166,4 +180,4 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     from ..present.console import summary_console
 
     with reading(file):
-        print_export(export_file(file, file_format, analysis, output, force=force), summary_console())
+        print_export(export_file(file, file_format, analysis, output, force=force, side=side), summary_console())

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from rich.console import Console
 
-from ..common.errors import InputError, quoted
+from ..common.errors import InputError, either, quoted
 from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.tables import shown
@@ -25,6 +25,7 @@ from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
 from .motion.read_motion import (
     RobotMotion,
+    Side,
     csv_text,
     joint_trajectory_bag,
     joint_trajectory_text,
@@ -57,8 +58,8 @@ class Made(NamedTuple):
     analysis: str = ""
 
 
-Make = Callable[[Path, str | None], Made]
-"""Of a file, and of an analysis of it where one is named."""
+Make = Callable[[Path, str | None, Side], Made]
+"""Of a file, of an analysis of it where one is named, and of a side of compliant gears."""
 Converted = tuple[Content, tuple[str, ...]]
 """A content, and remarks on what it does not carry."""
 
@@ -66,8 +67,8 @@ Converted = tuple[Content, tuple[str, ...]]
 def _of_motion(convert: Callable[[RobotMotion], Converted], what: str) -> Make:
     """From the motion in a results file; `what` tells how much it is."""
 
-    def make(path: Path, analysis: str | None) -> Made:
-        motion = robot_motion(path, analysis)
+    def make(path: Path, analysis: str | None, side: Side) -> Made:
+        motion = robot_motion(path, analysis, side)
         content, remarks = convert(motion)
         counted = what.format(joints=len(motion.joints), points=len(motion.time))
         return Made(content, f"{counted} of {motion.analysis}", remarks, motion.analysis)
@@ -78,7 +79,7 @@ def _of_motion(convert: Callable[[RobotMotion], Converted], what: str) -> Make:
 def _of_body(convert: Callable[[ModalBody], Converted]) -> Make:
     """From a modal body file."""
 
-    def make(path: Path, analysis: str | None) -> Made:
+    def make(path: Path, analysis: str | None, side: Side) -> Made:
         body = read_modal_body(path)
         content, remarks = convert(body)
         return Made(content, f"{body.name}, {body.modes_in_words}", remarks)
@@ -91,11 +92,11 @@ FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
         "csv": (".csv", _of_motion(lambda motion: (csv_text(motion), motion.remarks), "{joints} joints")),
         "joint-trajectory": (".joint-trajectory.json", _of_motion(joint_trajectory_text, "{points} points")),
         "rosbag2": (".rosbag2", _of_motion(joint_trajectory_bag, "a JointTrajectory with {points} points")),
-        "fmu": (".fmu", lambda path, analysis: Made(*linear_fmu(path, analysis))),
+        "fmu": (".fmu", lambda path, analysis, _: Made(*linear_fmu(path, analysis))),
     },
     "a scene": {
-        "urdf": (".urdf", lambda path, _: Made(*scene_as_urdf(path))),
-        "fmu": (".fmu", lambda path, analysis: Made(*forward_fmu(path, analysis))),
+        "urdf": (".urdf", lambda path, *_: Made(*scene_as_urdf(path))),
+        "fmu": (".fmu", lambda path, analysis, _: Made(*forward_fmu(path, analysis))),
     },
     "a modal body": {
         "sid": (".SID_FEM", _of_body(sid_text)),
@@ -107,8 +108,18 @@ FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
 """Formats of each kind of file: end of the new file's name, and what makes its content."""
 
 
+SIDED = ("joint-trajectory", "rosbag2")
+"""Formats with positions of one side of compliant gears."""
+
+
 def export_file(
-    path: Path, file_format: str, analysis: str | None, output: Path | None, *, force: bool = False
+    path: Path,
+    file_format: str,
+    analysis: str | None,
+    output: Path | None,
+    *,
+    force: bool = False,
+    side: Side | None = None,
 ) -> Exported:
     """Write a scene, a modal body or a results file in another format; by default beside it, with the analysis' name.
 
@@ -125,10 +136,12 @@ def export_file(
         raise InputError(f'{path}: --format: expected one of {quoted(known)} of {kind}, found "{file_format}"')
     if analysis is not None and (kind == "a modal body" or file_format == "urdf"):
         raise InputError(f"{path}: --analysis: expected it with results and FMUs only, found {kind} as {file_format}")
+    if side is not None and file_format not in SIDED:
+        raise InputError(f"{path}: --side: expected it with {either(SIDED)} only, found {file_format}")
     suffix, make = known[file_format]
     if output is not None:
         _check(output, force=force)
-    made = make(path, analysis)
+    made = make(path, analysis, side or "motor")
     target = output or path.with_suffix(f".{made.analysis}{suffix}" if made.analysis else suffix)
     _check(target, force=force)
     _write(target, made.content)

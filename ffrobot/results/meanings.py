@@ -56,7 +56,8 @@ joints/*/coordinate | rad, m | of the second body on the first | coordinate of {
 joints/*/rate | rad/s, m/s | of the coordinate | coordinate of {}
 joints/*/moment | N m, N | of the motor, at the joint | coordinate of {}
 joints/*/motor_moment | N m, N | of the motor, before its gear | coordinate of {}
-joints/*/motor_angle | rad | of the motor, behind its compliant gear | coordinate of {}
+joints/*/motor_coordinate | rad | of the motor, behind its compliant gear | coordinate of {}
+joints/*/motor_angle | rad | the same | coordinate of {}
 joints/*/motor_rate | rad/s | likewise | coordinate of {}
 joints/*/gear_moment | N m | that the gear transmits | coordinate of {}
 joints/*/reaction | N | on the second body | axis

@@ -116,7 +116,8 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
             entry["error"] = errors[trajectory.name]
         entry.attrs["components"] = list(trajectory.force_components)
         if functions := list(trajectory.components.values()):
-            entry["target"] = np.stack([function.sample(inside)[0] for function in functions], axis=1)
+            target = [function.sample(inside)[0] for function in functions]
+            entry["target"] = target[0] if trajectory.coordinate_of else np.stack(target, axis=1)
         _write_path(entry, trajectory)
 
 
@@ -173,6 +174,7 @@ def write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) 
         if (found := motion.joint(joint.name)) is not None:
             entry["coordinate"] = np.squeeze(found[0], 1) if len(joint.units) == 1 else found[0]
         if (motor := motion.motor_motion(joint.name)) is not None:
-            entry["motor_angle"] = motor[0]
+            entry["motor_coordinate"] = motor[0]
+            entry["motor_angle"] = entry["motor_coordinate"]  # the same dataset under its former name
         if (gear := motion.gears.get(joint.name)) is not None:
             entry.attrs["unresolved"] = gear.unresolved

@@ -54,13 +54,13 @@ def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator
         yield "reaction_moment", motion.space.about(acting.moment)
     if (found := motion.joint(joint.name)) is not None:
         yield "rate", np.squeeze(found[1], 1) if is_single else found[1]
-    moment = motion.motor_moments.get(joint.name)
+    moment, motor = motion.motor_moments.get(joint.name), motion.motor_motion(joint.name)
     if moment is not None and joint in solution.scene.motor_joints:
         moment = np.squeeze(moment, 1) if is_single else moment
         yield "moment", moment
-        if joint.given_gear_ratio is not None:
-            yield "motor_moment", moment / joint.given_gear_ratio
-    if (motor := motion.motor_motion(joint.name)) is not None:
+        if joint.given_gear_ratio is not None or motor is not None:
+            yield "motor_moment", moment / (joint.given_gear_ratio or 1.0)
+    if motor is not None:
         yield "motor_rate", motor[1]
     if (moment := motion.gear_moment(joint.name)) is not None:
         yield "gear_moment", moment

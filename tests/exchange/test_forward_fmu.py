@@ -234,7 +234,8 @@ def expected(results, variable):
         strain = results.modal_body(body).stress[point].strain[("xx", "yy", "zz", "yz", "xz", "xy").index(last[0])]
         return modal(results, body) @ strain
     joint, _, number = name.partition(" ")
-    found = results[f"swing/joints/{joint}/{'rate' if last else 'coordinate'}"]
+    side = "motor_" if kind == "motor" else ""
+    found = results[f"swing/joints/{joint}/{side}{'rate' if last else 'coordinate'}"]
     return found[:, int(number) - 1] if number else found
 
 

@@ -85,6 +85,54 @@ def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
     assert ("no joint has a motor: effort is left empty" in done.stdout) == (not driven)
 
 
+@pytest.fixture(scope="module")
+def geared(tmp_path_factory, ffrobot):
+    """Results of an arm that sags behind a compliant gear, whose motor follows a path."""
+    scene = tmp_path_factory.mktemp("geared") / "scene.toml"
+    scene.write_text(
+        """name = "geared"
+gravity = [0.0, -9.81]
+body = [{ name = "a", rigid = { mass = 2.0, inertia = 0.1, center = [0.4, 0.0], points = { root = [0.0, 0.0] } } }]
+trajectory = [{ name = "t", motor = "hub", via = [0.0, 0.5], duration = 0.4 }]
+initial = { state = "static" }
+analysis = [{ name = "run", kind = "pcid", end = 0.5, output_step = 0.05 }]
+[[joint]]
+name = "hub"
+type = "revolute"
+between = ["ground", "a.root"]
+gear_ratio = 50.0
+rotor_inertia = 1e-5
+stiffness = 2e3
+damping = 2.0
+"""
+    )
+    ffrobot.ok("solve", scene)
+    return scene.with_suffix(".results.h5")
+
+
+def test_the_side_of_a_compliant_gear_is_chosen(geared, ffrobot, tmp_path):
+    """The path itself on the side of the motor, unless the other one is asked for; a table has both."""
+    with h5py.File(geared) as file:
+        target, joint = file["run/trajectories/t/target"][()], {k: v[()] for k, v in file["run/joints/hub"].items()}
+    assert target.shape == joint["coordinate"].shape
+    np.testing.assert_allclose(joint["motor_coordinate"], target, atol=1e-9)
+    assert np.abs(joint["coordinate"] - target).min() > 1e-3
+    for options, prefix in (((), "motor_"), (("--side", "motor"), "motor_"), (("--side", "joint"), "")):
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.json"
+        done = ffrobot.ok("export", geared, "--format", "joint-trajectory", *options, "-o", path)
+        points = json.loads(path.read_text())["points"]
+        for key, of in (("positions", f"{prefix}coordinate"), ("velocities", f"{prefix}rate"), ("effort", "moment")):
+            np.testing.assert_array_equal([point[key][0] for point in points], joint[of])
+        assert f"--side {'joint' if prefix else 'motor'} takes the other side" in " ".join(done.stdout.split())
+    ffrobot.ok("export", geared, "--format", "csv", "-o", tmp_path / "out.csv")
+    found = table(tmp_path / "out.csv")
+    for key in ("motor_coordinate", "motor_rate", "motor_moment"):
+        np.testing.assert_array_equal(found[f"hub.{key}"], joint[key])
+    done = ffrobot("export", geared, "--format", "csv", "--side", "motor", "-o", tmp_path / "2.csv")
+    assert done.returncode == 2
+    assert '--side: expected it with "joint-trajectory" or "rosbag2" only, found csv' in done.stderr
+
+
 def test_what_motors_do_before_the_path_comes_first(ur5):
     """The message begins at 0, where motions before the path are at t < 0."""
     motion = robot_motion(ur5, None)

@@ -193,7 +193,7 @@ def voltages_of_patches(model: Model, patches: Mapping[str, LinkPatches]) -> Ite
 
 
 def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
-    """Coordinates and rates of joints whose coordinates are those of the state."""
+    """Coordinates and rates of joints that the state has as they are, and of motors before compliant gears."""
     tree = model.tree
     for joint in model.scene.joint:
         node = tree.nodes[tree.carried[joint.name]] if joint.name in tree.carried else None
@@ -205,6 +205,10 @@ def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
             yield Variable(f"joint/{name}", unit, f"coordinate of joint {name}"), _core.LinearOutput([entry], [sign])
             rate = Variable(f"joint/{name}/rate", f"{unit}/s", f"rate of joint {name}")
             yield rate, _core.LinearOutput([tree.n_q + int(column)], [sign])
+    for gear in tree.gears:
+        name, q, v = gear.joint.joint.name, gear.motor.q.start, tree.n_q + gear.motor.v.start
+        yield Variable(f"motor/{name}", "rad", f"coordinate of the motor of {name}"), _core.LinearOutput([q], [1.0])
+        yield Variable(f"motor/{name}/rate", "rad/s", f"rate of the motor of {name}"), _core.LinearOutput([v], [1.0])
 
 
 def has_own_coordinates(node: Node) -> bool:

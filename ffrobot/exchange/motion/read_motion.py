@@ -7,9 +7,9 @@ import math
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,6 +24,10 @@ from ...results.file import Results
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 STATES = "sensor_msgs/msg/JointState"
 MOVING = 0.01  # of the largest rate: less is rest
+OF_MOTOR = ("motor_coordinate", "motor_rate", "motor_moment")
+"""Datasets of a joint whose gear is compliant."""
+Side = Literal["motor", "joint"]
+"""Of a compliant gear."""
 NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 """Keys under which messages of planners have a JointTrajectory."""
 
@@ -277,26 +281,40 @@ class JointMotion:
         coordinate: (T,) rad, or m along a way.
         rate: (T,) rad/s or m/s.
         moment: (T,) N·m or N, at the joint, behind a gear; None of a joint without motor.
+        motor: of a compliant gear, `motor_coordinate`, `motor_rate` and `motor_moment` (T,) as in results; else none.
     """
 
     name: str
     coordinate: Array
     rate: Array
     moment: Array | None
+    motor: Mapping[str, Array] = field(default_factory=dict)
+
+    def on(self, side: Side) -> tuple[Array, Array]:
+        """Coordinate and rate behind a compliant gear, or of its motor, which are those of the joint without one."""
+        if side == "motor" and self.motor:
+            return self.motor["motor_coordinate"], self.motor["motor_rate"]
+        return self.coordinate, self.rate
 
 
 @dataclass(frozen=True, eq=False)
 class RobotMotion:
-    """The joints of an analysis with their coordinates, at `time` (T,) s; `remarks` say what to know of it."""
+    """The joints of an analysis with their coordinates, at `time` (T,) s; `remarks` say what to know of it.
+
+    `side`: of compliant gears, whose positions a JointTrajectory has.
+    """
 
     analysis: str
     time: Array
     joints: tuple[JointMotion, ...]
     remarks: tuple[str, ...]
+    side: Side = "motor"
 
 
-def robot_motion(path: Path, analysis: str | None) -> RobotMotion:
+def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> RobotMotion:
     """From the results file at `path`: of `analysis`, else of the first that has joints which move.
+
+    `side` of compliant gears: which positions a JointTrajectory has.
 
     Raises:
         InputError: there is no such analysis, or none of its joints moves.
@@ -315,8 +333,8 @@ def robot_motion(path: Path, analysis: str | None) -> RobotMotion:
         time = results.time(name)
         status = results.attributes(name)["status"]
     if status != "completed":
-        return RobotMotion(name, time, joints, (f"{name} ended at t = {time[-1]:g} s: {status}",))
-    return RobotMotion(name, time, joints, ())
+        return RobotMotion(name, time, joints, (f"{name} ended at t = {time[-1]:g} s: {status}",), side)
+    return RobotMotion(name, time, joints, (), side)
 
 
 def _moving(results: Results, analysis: str) -> Iterator[str]:
@@ -331,17 +349,25 @@ def _parts(results: Results, analysis: str, joint: str) -> Iterator[JointMotion]
     coordinate, rate = (results[f"{group}/{key}"].reshape(outputs, -1).T for key in ("coordinate", "rate"))
     has_motor = results.has(f"{group}/moment")
     moment = results[f"{group}/moment"].reshape(outputs, -1).T if has_motor else [None] * len(coordinate)
+    motor = {}
+    if results.has(f"{group}/motor_coordinate"):
+        keys = (key for key in OF_MOTOR if results.has(f"{group}/{key}"))
+        motor = {key: results[f"{group}/{key}"] for key in keys}
     for k, values in enumerate(zip(coordinate, rate, moment, strict=True)):
-        yield JointMotion(joint if len(coordinate) == 1 else f"{joint}[{k}]", *values)
+        yield JointMotion(joint if len(coordinate) == 1 else f"{joint}[{k}]", *values, motor)
 
 
 def csv_text(motion: RobotMotion) -> str:
-    """A table: `time`, then NAME.coordinate, NAME.rate and, with a motor, NAME.moment of every joint; SI units."""
+    """A table: `time`, then NAME.coordinate, NAME.rate and, with a motor, NAME.moment of every joint; SI units.
+
+    Of joints with compliant gears also NAME.motor_coordinate, NAME.motor_rate, NAME.motor_moment.
+    """
     columns = {"time": motion.time}
     for joint in motion.joints:
         columns |= {f"{joint.name}.coordinate": joint.coordinate, f"{joint.name}.rate": joint.rate}
         if joint.moment is not None:
             columns[f"{joint.name}.moment"] = joint.moment
+        columns |= {f"{joint.name}.{key}": values for key, values in joint.motor.items()}
     return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))])
 
 
@@ -349,7 +375,7 @@ NANO = 1_000_000_000
 
 
 def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The message, of joints with a motor; and remarks on what it leaves out.
+    """The message, of joints with a motor on the motion's side of compliant gears; and remarks on what it leaves out.
 
     Accelerations stay empty, as the message allows: results have none of joints. Where no joint has a motor, all are
     taken, without effort.
@@ -365,8 +391,12 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
     begin = min(float(motion.time[0]), 0.0)
     if begin < 0.0:
         remarks.append(f"time_from_start 0 is t = {begin:g} s, when motors begin: the path does {-begin:g} s later")
+    if geared := [joint.name for joint in joints if joint.motor]:
+        of = {"motor": "of motors, before compliant gears", "joint": "behind compliant gears, of joints"}[motion.side]
+        other = {"motor": "joint", "joint": "motor"}[motion.side]
+        remarks.append(f"positions of {quoted(geared)} are {of}: --side {other} takes the other side")
     positions, velocities = (
-        np.stack([getattr(joint, key) for joint in joints], axis=1) for key in ("coordinate", "rate")
+        np.stack(columns, axis=1) for columns in zip(*(joint.on(motion.side) for joint in joints), strict=True)
     )
     efforts = np.stack(moments, axis=1) if moments else np.zeros((len(motion.time), 0))
     points = [
