@@ -23,6 +23,7 @@ from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model, without_paths
+from ...mbs.quantities.settling import commanded_rest
 from ...mbs.solve.linearisation import LinearEquations
 from ...mbs.solve.statics import initial_state
 from ..context import ActuatedContext
@@ -290,19 +291,21 @@ def _followed(
     model = run.model
     columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
     rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
-    error = _position(run, tip) - place_at(run.time)
+    error = _position(model, run.q, tip) - place_at(run.time)
     completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
     return Followed(run.time, error, place_at, rates, held(run.time), completed, is_disturbed, quiet)
 
 
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str) -> Callable[[Array], Array]:
     paths, run = [path.components for path in model.scene.trajectory if path.point == tip], source.closer
-    return partial(place_of_tip, end=analysis.last_time, known=(run.time, _position(run, tip)), paths=paths)
+    known, rest = (run.time, _position(run.model, run.q, tip)), commanded_rest(source)
+    last = None if rest is None else (rest.since, _position(rest.model, rest.q[None], tip)[0])
+    return partial(place_of_tip, end=analysis.last_time, known=known, paths=paths, last=last)
 
 
-def _position(run: Outcome, point: str) -> Array:
-    tree = run.model.tree
-    return tree.pose(tree.section(point), run.q, tree.poses(run.q)).r
+def _position(model: Model, q: Array, point: str) -> Array:
+    tree = model.tree
+    return tree.pose(tree.section(point), q, tree.poses(q)).r
 
 
 def _default_tip(model: Model) -> str:

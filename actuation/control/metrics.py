@@ -189,10 +189,17 @@ def overshoot(time: Array, place: Array, error: Array) -> float:
     return largest(time, beyond)[0] / length if length > 0.0 else 0.0
 
 
-def place_of_tip(time: Array, end: float, known: tuple[Array, Array], paths: Sequence[Mapping[str, Any]]) -> Array:
+def place_of_tip(
+    time: Array,
+    end: float,
+    known: tuple[Array, Array],
+    paths: Sequence[Mapping[str, Any]],
+    last: tuple[float, Array] | None = None,
+) -> Array:
     """(T, d) m: where its `paths`, functions of time by component, say, which are held before 0 and after `end` (s).
 
-    Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d).
+    Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d). That may ring: from when
+    all paths are over, s, its place is the `last` one (d,), the final position.
     """
     from scipy.interpolate import CubicSpline
 
@@ -201,6 +208,8 @@ def place_of_tip(time: Array, end: float, known: tuple[Array, Array], paths: Seq
     for components in paths:
         for component, target in components.items():
             place[:, "xyz".index(component)] = target.sample(on_path)[0]
+    if last is not None:
+        place[time >= last[0]] = last[1]
     return place
 
 

@@ -21,7 +21,10 @@ MOST = 100_000  # runs
 )
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Seed of the sample.")
 @click.option(
-    "--collect", metavar="DATASET[:max|rms|first|last|lowest]", multiple=True, help="Further columns; repeatable."
+    "--collect",
+    metavar="DATASET[:max|rms|first|last|lowest]",
+    multiple=True,
+    help='Further columns, also "residual POINT" and "settling POINT"; repeatable.',
 )
 @click.option("--keep/--no-keep", default=True, show_default=True, help="Retention of the results files of the runs.")
 @runs_options("SCENE.sweep", "Folder of the sweep")

@@ -83,7 +83,9 @@ def repeated_steps(results: Results) -> dict[Key, Any] | None:
 def _needed(scene: Scene, goals: Sequence[Goal]) -> set[str]:
     """Names of the analyses that goals name, by default the first, and of those that they rest on."""
     names = [one.name for one in scene.analysis]
-    found = {goal.analysis if goal.analysis in names else names[0] for goal in goals} or {names[0]}
+    moving = next((one.name for one in scene.analysis if isinstance(one, TimedAnalysis)), names[0])
+    default = {False: names[0], True: moving}
+    found = {goal.analysis if goal.analysis in names else default[goal.is_of_rest] for goal in goals} or {names[0]}
     for one in reversed(scene.analysis):  # each rests on earlier ones only
         if one.name in found and one.source is not None:
             found.add(one.source)

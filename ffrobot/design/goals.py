@@ -62,7 +62,7 @@ def _of_scene(results: Results, variable: Variable) -> tuple[CatalogMotor, float
 
 FORMS = (
     "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
-    "frequency NUMBER BODY", "mass", "mass BODY", "motors mass", "motors cost",
+    "residual POINT", "settling POINT", "frequency NUMBER BODY", "mass", "mass BODY", "motors mass", "motors cost",
     "motors share", "value KEY",
 )  # fmt: skip
 
@@ -100,6 +100,31 @@ class OfHistory(Goal):
                 f'"{self.text}": expected one column, such as "{self.name}[0]", found {history.values.shape[1]}'
             )
         return history
+
+
+@dataclass(frozen=True)
+class OfSettling(Goal):
+    """Residual vibration of a point, m, or the time in which it settles, s; see `mbs.quantities.settling`."""
+
+    text: str
+    what: str
+    point: str
+    is_of_rest = True
+
+    @property
+    def analysis(self) -> str:
+        """In front of the point."""
+        return self.point.rpartition("/")[0]
+
+    def read(self, results: Results) -> Reading:
+        """The number; of a point that does not settle the time that the run leaves it."""
+        analysis, about = results.settling(self.point, f'"{self.text}"')
+        if self.what == "residual":
+            return Reading(float(about["residual"]), "m")
+        if np.isfinite(value := float(about["time_to"])):
+            return Reading(value, "s")
+        rest = float(results.time(analysis)[-1] - about["path_end"])
+        return Reading(rest, "s", doubt="not settled at the end of the run: at least that, take a later end")
 
 
 @dataclass(frozen=True)
@@ -187,6 +212,8 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
             return OfHistory(text, _integral, f"{joint}.{POWER}", "s")
         case (("rms" | "mean" | "integral"), [name]):
             return OfHistory(text, REDUCTIONS[word], name, "s" if word == "integral" else "")
+        case (("residual" | "settling"), [point]):
+            return OfSettling(text, word, point)
         case "frequency", [number, body] if number.isdecimal():
             return Frequency(text, int(number), body)
         case "mass", []:

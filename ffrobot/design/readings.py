@@ -90,6 +90,8 @@ class Goal:
     """Of its history, if it has one."""
     needs_motion = True
     """Whether an analysis has to be run for it."""
+    is_of_rest = False
+    """Whether that is by default the first which follows paths, rather than the first of all."""
 
     @property
     def analysis(self) -> str:

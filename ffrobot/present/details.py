@@ -15,7 +15,7 @@ from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
 from ..mbs.solve.zero_dynamics import is_unstable
 from ..results.file import Results
-from ..results.tables import Cells, analysis_cells, voltage_cells
+from ..results.tables import Cells, analysis_cells, settling_cells, voltage_cells
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
 from .control import control_lines, control_tables
@@ -62,6 +62,8 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
     """What was found of each kind, where there is any."""
     rows = ((name, cells) for name in results.analyses for cells in voltage_cells(results, name))
     yield from named_tables("voltages of", rows)
+    rows = ((name, cells) for name in results.analyses for cells in settling_cells(results, name))
+    yield from named_tables("residual vibration", rows)
     analyses = solution.analyses.items()
     yield from named_tables("stress in", (row for name, result in analyses for row in _stresses(name, result)))
     yield from control_tables(_details(solution))

@@ -121,6 +121,8 @@ def _texts(verdict: Verdict, remarks: Sequence[str]) -> Iterator[str]:
     advice = ((one.name, text) for one in verdict.analyses for text in one.advice)
     yield from _labelled("warning", alike(warnings))
     yield from _labelled("to try", alike(advice))
+    settled = ((one.name, one.settled.in_words) for one in verdict.analyses if one.settled is not None)
+    yield from _labelled("vibration", alike(settled))
     yield from remarks
     yield from _labelled("at rest", alike((one.name, one.held) for one in verdict.analyses if one.held))
     yield from _labelled("note", alike((one.name, text) for one in verdict.analyses for text in one.notes))

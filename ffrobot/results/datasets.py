@@ -115,6 +115,23 @@ class Datasets:
             raise InputError(f'{self.path}: expected the group "{group}", found none{self._near(group)}')
         return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
 
+    def settling(self, point: str, option: str = "settling") -> tuple[str, Mapping[str, Any]]:
+        """The first analysis with residual vibration of "BODY.POINT", and the numbers; "ANALYSIS/BODY.POINT" names it.
+
+        Raises `InputError`, with the `option` that names the point, where there is none.
+        """
+        analysis, slash, name = point.rpartition("/")
+        groups = [analysis] if slash else list(self._file)
+        known = [f"{of}/{one}" for of in self._file for one in self.names(f"{of}/settling")]
+        for of in groups:
+            if f"{of}/{name}" in known:
+                return of, self.attributes(f"{of}/settling/{name}")
+        found = quoted(known) if known else "none: paths move to the end of their analyses"
+        raise InputError(
+            f'{option}: expected "BODY.POINT" or "ANALYSIS/BODY.POINT" with residual vibration, {found}, found'
+            f' "{point}"{did_you_mean(point, known)}'
+        )
+
     def names(self, group: str) -> list[str]:
         """Names inside a group such as `inverse/points`, 2 before 10; none when the file does not have it."""
         return sorted(self._file.get(group, ()), key=_natural)

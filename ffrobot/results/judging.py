@@ -14,7 +14,7 @@ from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
 from .peaks import POWER, peak_of
-from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict, millimeters, off_path, tool_error
+from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, Verdict, millimeters, off_path, tool_error, vibrates
 
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
@@ -54,6 +54,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         deflection=None if _ended_early(group) else _deflection(group),
         stress=None if _ended_early(group) else _stress(group),
         margins=_margins(group),
+        settled=_settled(group),
         held=held_in_words(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
         notes=tuple(map(str, about.get("notes", ()))),
@@ -159,6 +160,14 @@ def _deflection(group: h5py.Group) -> Place | None:
     found = [_peak(point["deflection"], name, time) for name, point in group.get("points", {}).items()
              if "deflection" in point]  # fmt: skip
     return max((place for place in found if place[0] > 0.0), default=None)
+
+
+def _settled(group: h5py.Group) -> Settled | None:
+    """Of the point that vibrates most; None where that is next to nothing."""
+    keys = ("residual", "frequency", "time_to", "tolerance")
+    moving = {name: at.attrs for name, at in group.get("settling", {}).items() if vibrates(at.attrs)}
+    found = (Settled(name, *(float(about[key]) for key in keys)) for name, about in moving.items())
+    return max(found, key=lambda one: one.residual, default=None)
 
 
 def _stress(group: h5py.Group) -> Place | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .file import Results, status_in_words
-from .verdict import AnalysisVerdict
+from .verdict import AnalysisVerdict, vibrates
 
 if TYPE_CHECKING:
     from ..actuation.control.metrics import Metrics
@@ -52,6 +52,24 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
             "limit (V)": span if is_limited else "none",
             "required /\nlimit": f"{np.max(required / limits):.3g}" if is_limited else "",
             "condition\nnumber": f"{about['condition_number']:.3g}",
+        }
+
+
+def settling_cells(results: Results, analysis: str) -> Iterator[Cells]:
+    """How far points are from their final position once all paths are over."""
+    for point in results.names(f"{analysis}/settling"):
+        about = results.attributes(f"{analysis}/settling/{point}")
+        if not vibrates(about):
+            continue
+        settled = about["time_to"]
+        yield {
+            "point": point,
+            "path over\n(s)": f"{about['path_end']:.4g}",
+            "off then\n(mm)": f"{1e3 * about['at_path_end']:.3g}",
+            "at the end\n(mm)": f"{1e3 * about['at_end']:.3g}",
+            "peak to peak\n(mm)": f"{1e3 * about['residual']:.3g}",
+            "lowest\n(Hz)": "" if np.isnan(about["frequency"]) else f"{about['frequency']:.4g}",
+            f"within {1e3 * about['tolerance']:g} mm\nafter (s)": "no" if np.isnan(settled) else f"{settled:.3g}",
         }
 
 

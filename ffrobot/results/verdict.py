@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -98,6 +98,33 @@ Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
 
 
+STILL = 0.01  # of the tolerance within which a point has settled: a smaller residual vibration is none
+
+
+def vibrates(about: Mapping[str, Any]) -> bool:
+    """Whether a point with these attributes of `settling/POINT` has any residual vibration to speak of."""
+    return bool(about["residual"] > STILL * about["tolerance"] or about["time_to"] != 0.0)
+
+
+@struct
+class Settled:
+    """Of the point that vibrates most once all paths are over: see `mbs.quantities.settling.Settling`."""
+
+    point: str
+    residual: float  # m, peak to peak
+    frequency: float  # Hz, NaN where nothing vibrates
+    time_to: float  # s, NaN where it does not settle within `tolerance`, m
+    tolerance: float
+
+    @property
+    def in_words(self) -> str:
+        """Peak to peak, and when it has settled."""
+        at = "" if np.isnan(self.frequency) else f" (lowest frequency {self.frequency:.3g} Hz)"
+        when = "at no time of the run" if np.isnan(self.time_to) else f"{self.time_to:.3g} s after the path"
+        within = f"within {millimeters(self.tolerance)} of its final position {when}"
+        return f"{self.point} {millimeters(self.residual, 3)} peak to peak{at}, {within}"
+
+
 @struct
 class PatchNeed:
     """What patches of a body need, times their limit (0 without), since when (s), and a limit (V) that would do."""
@@ -124,6 +151,7 @@ class AnalysisVerdict:
         deflection: largest of a point, m, which, and when.
         stress: largest von Mises, Pa, the body, and when; None if not requested.
         margins: gain and delay margins of closed-loop runs by their linear model, in words; empty where not known.
+        settled: of the point that vibrates most after the paths; None where these move to the end.
         held: natural frequencies and least stiffness with motors at rest, in words; empty if not requested.
         warnings: why results may be wrong, or not mean what they seem to.
         notes: what is worth knowing of results that are right.
@@ -144,6 +172,7 @@ class AnalysisVerdict:
     deflection: Place | None
     stress: Place | None
     margins: str
+    settled: Settled | None
     held: str
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
@@ -161,6 +190,8 @@ class AnalysisVerdict:
             yield f"  largest deflection {_place(millimeters(self.deflection[0]), *self.deflection[1:])}"
         if self.stress is not None:
             yield f"  largest stress {_place(f'{self.stress[0] / 1e6:.4g} MPa', *self.stress[1:])} (von Mises)"
+        if self.settled is not None:
+            yield f"  residual vibration: {self.settled.in_words}"
         for text in filter(None, (self.margins, self.held)):
             yield f"  {text}"
         yield from (f"  to try: {text}" for text in self.advice)

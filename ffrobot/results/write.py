@@ -90,6 +90,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
             group[f"patch_structure/{name}/{key}"] = pair
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
+    for point, found in result.settling.items():
+        group.create_group(f"settling/{point}").attrs.update(vars(found))
     for key, values in vars(result.energies).items():
         group[f"energy/{key}"] = values
     group["momentum/linear"] = motion.space.along(result.momentum.linear)

@@ -104,6 +104,11 @@ class MotionOfLinks(RobotMotion):
         in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), found.position - frame.position)
         return replace(found, deflection=in_frame - position)
 
+    def place_and_rate(self, point: str) -> tuple[Array, Array]:
+        """Of the section "BODY.POINT", where the piece has it."""
+        name, _, label = point.partition(".")
+        return super().place_and_rate(self.divided[name].body.point(label) if name in self.divided else point)
+
     def deflection(self, point: str) -> Array:
         """Of the section "BODY.POINT", in the axes of its body or link."""
         is_divided = point.partition(".")[0] in self.divided

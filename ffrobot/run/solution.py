@@ -32,6 +32,7 @@ from ..mbs.quantities.attachment_error import (
 from ..mbs.quantities.motion import Energies, Momentum, RobotMotion
 from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing
+from ..mbs.quantities.settling import Settling
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
@@ -112,6 +113,7 @@ class AnalysisResult:
         bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
         sharing: reactions that redundant constraints leave open; None where there are none.
         predicted_shift: by point, (T, 3) m: what voltages within their limits leave undone.
+        settling: by point, of runs whose paths end before them.
     """
 
     run: Outcome
@@ -124,6 +126,7 @@ class AnalysisResult:
     bending: Mapping[str, Bending] = field(default_factory=dict)
     sharing: Sharing | None = None
     predicted_shift: Mapping[str, Array] = field(default_factory=dict)
+    settling: Mapping[str, Settling] = field(default_factory=dict)
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:

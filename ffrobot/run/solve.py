@@ -19,8 +19,9 @@ from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.motion import RobotMotion, totals
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
+from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
-from ..mbs.scene.analysis import Analysis
+from ..mbs.scene.analysis import Analysis, TimedAnalysis
 from ..mbs.solve.reach import turned_guesses
 from ..mbs.solve.start import check_turning
 from ..scene.load import load_scene
@@ -166,7 +167,7 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
             return replace(solution, analyses=results, seconds=seconds, failure=error)
         try:
             with of_file(solution.scene.path):
-                result = _result(solution, run)
+                result = _result(solution, run, results)
         except Exception as error:  # raised once the integration is kept
             return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
@@ -217,7 +218,7 @@ def _context(
     )
 
 
-def _result(solution: Solution, run: Outcome) -> AnalysisResult:
+def _result(solution: Solution, run: Outcome, earlier: Mapping[str, AnalysisResult]) -> AnalysisResult:
     """What is read off a run; what has peaks at its outputs and between, as far as that is known."""
     motion, sharing = _moving(solution, run)
     twists = {joint: gear.curve for joint, gear in motion.gears.items()}  # splines through outputs
@@ -229,8 +230,23 @@ def _result(solution: Solution, run: Outcome) -> AnalysisResult:
     found = AnalysisResult(
         run, motion, *totals(motion), histories, sharing=sharing, bending=bending_of_links(solution, among),
         point_forces=histories.point_forces if closest is run else _point_forces(solution, run),
+        settling=_settling(solution, run, earlier),
     )  # fmt: skip
     return replace(found, predicted_shift=_predicted_shift(solution, found))
+
+
+def _settling(solution: Solution, run: Outcome, earlier: Mapping[str, AnalysisResult]) -> dict[str, Settling]:
+    """By point, of a run that goes on after the paths that it, or the analysis that it replays, follows."""
+    analysis = run.analysis
+    commanding = earlier[analysis.source].run if analysis.takes_actuation and analysis.source in earlier else run
+    if not isinstance(analysis, TimedAnalysis) or run.status != "completed":
+        return {}
+    rest, closer = commanded_rest(commanding), run.closer
+    if rest is None or not rest.since < run.time[-1]:
+        return {}
+    metrics, motion = getattr(run.details, "metrics", None), _moving(solution, closer)[0]
+    lowest = rest.frequency if metrics is None else metrics.lowest_frequency
+    return settling(motion, rest, list(end_points(solution.scene, motion.points)), analysis.settled, lowest)
 
 
 def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Array]:

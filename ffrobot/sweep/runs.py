@@ -41,6 +41,9 @@ REDUCTIONS: Mapping[str, Callable[[Array, Array], Any]] = {
 STANDARD = ("joints/{}/moment", "pzt/{}/required_voltage", "pzt/{}/voltage", "points/{}/deflection")
 """Histories of which the largest value is in every table."""
 
+SETTLING = {"residual": "residual", "settling": "time_to"}
+"""Attributes of `settling/POINT` by the word before the point in `--collect`."""
+
 PER_MODE = ("frequency", "damping_ratio")
 OF_MODES = {"linear", "joints_locked", "joints_compliant"}
 """Groups with datasets `PER_MODE` whose columns are the robot's vibrations, the lowest first, no vector."""
@@ -139,7 +142,11 @@ def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:
                 found[f"{name} max"] = _reduce(results, name, "max")
         for request in collect:
             name, reduction = collected(request)
-            found[f"{name} {reduction}"] = _reduce(results, _meant(results, name), reduction)
+            if name in SETTLING:
+                with suppress(InputError):
+                    found[f"{name} {reduction}"] = float(results.settling(reduction)[1][SETTLING[name]])
+            else:
+                found[f"{name} {reduction}"] = _reduce(results, _meant(results, name), reduction)
     return found
 
 
@@ -162,7 +169,10 @@ def missing_columns(rows: Sequence[Row], requests: Sequence[str], folder: Path) 
     completed = [row for row in rows if row.status == "completed"]
     for request in requests:
         name, reduction = collected(request)
-        if completed and all(np.isnan(row.quantities.get(f"{name} {reduction}", np.nan)) for row in completed):
+        values = [row.quantities.get(f"{name} {reduction}") for row in completed]
+        if name in SETTLING and completed and all(value is None for value in values):
+            yield f'--collect: expected a point with residual vibration, found no "{reduction}" in any run'
+        elif name not in SETTLING and completed and all(value is None or np.isnan(value) for value in values):
             known: list[str] = []
             for path in (folder / "runs").glob(f"*/{RESULTS}"):
                 with suppress(InputError), Results(path) as results:
@@ -218,8 +228,14 @@ def is_vector(results: Results, name: str, values: Array) -> bool:
 
 
 def collected(request: str) -> tuple[str, str]:
-    """Dataset and reduction of a `--collect`. Raises `InputError` where the word behind the colon is unknown."""
+    """Dataset and reduction of a `--collect`, or the word of `SETTLING` and the point.
+
+    Raises `InputError` where the word behind the colon is unknown.
+    """
+    if len(words := request.split()) == 2 and words[0] in SETTLING:
+        return words[0], words[1]
     name, _, reduction = request.partition(":")
     if not name or reduction not in ("", *REDUCTIONS):
-        raise InputError(f'--collect: expected DATASET or DATASET:{"|".join(REDUCTIONS)}, found "{request}"')
+        reductions, of_point = "|".join(REDUCTIONS), " or ".join(f"{word} POINT" for word in SETTLING)
+        raise InputError(f'--collect: expected DATASET, DATASET:{reductions}, {of_point}, found "{request}"')
     return name, reduction or "max"

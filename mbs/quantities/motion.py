@@ -234,6 +234,11 @@ class RobotMotion:
         turned = None if self.space.is_plane else continuous(quaternions(found.F))
         return PointMotion(found.r, self.deflection(point), turned)
 
+    def place_and_rate(self, point: str) -> tuple[Array, Array]:
+        """R (T, 3), m, of the section "BODY.POINT", and its velocity (T, 3), m/s."""
+        section = self.section(point)
+        return section.r, np.einsum("tij,tj->ti", section.L[:, :3], self.v)
+
     def deflection(self, point: str) -> Array:
         """Φ p (T, 3), m, of the section "BODY.POINT" in the axes of its body."""
         body, _, label = point.partition(".")

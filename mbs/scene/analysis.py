@@ -138,6 +138,8 @@ class TimedAnalysis(Analysis):
     """End time, s; the run begins at 0."""
     output_step: Positive
     """Time between outputs, s; `end` is a whole number of them."""
+    settled: Positive = 1e-4
+    """Distance from the final position, m, within which a point has settled after the paths end."""
 
     @model_validator(mode="after")
     def _divides(self) -> Self:

@@ -392,7 +392,7 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
     if begin < 0.0:
         remarks.append(f"time_from_start 0 is t = {begin:g} s, when motors begin: the path does {-begin:g} s later")
     if geared := [joint.name for joint in joints if joint.motor]:
-        of = {"motor": "of motors, before compliant gears", "joint": "behind compliant gears, of joints"}[motion.side]
+        of = {"motor": "those of motors, before compliant gears", "joint": "behind compliant gears"}[motion.side]
         other = {"motor": "joint", "joint": "motor"}[motion.side]
         remarks.append(f"positions of {quoted(geared)} are {of}: --side {other} takes the other side")
     positions, velocities = (

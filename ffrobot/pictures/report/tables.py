@@ -11,7 +11,7 @@ from ...mbs.solve.zero_dynamics import is_unstable
 from ...results.file import Results
 from ...results.joints import joint_coordinates
 from ...results.linear import read_metrics
-from ...results.tables import Cells, analysis_cells, loop_cells, voltage_cells, volts
+from ...results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
 from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
@@ -96,6 +96,12 @@ def voltages_table(runs: Sequence[Run]) -> Table:
     """What the patches of every link should give, and what they can."""
     cells = ((run.label, of) for run in runs for of in voltage_cells(run.results, run.analysis))
     return _named("voltages of", cells)
+
+
+def settling_table(runs: Sequence[Run]) -> Table:
+    """How far points are from their final position once all paths are over."""
+    cells = ((run.label, of) for run in runs for of in settling_cells(run.results, run.analysis))
+    return _named("residual vibration", cells)
 
 
 def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Table:
@@ -196,5 +202,6 @@ TABLES: Mapping[str, Callable[[Sequence[Run]], Table]] = {
     "bending": bending_table,
     "peaks": peaks_table,
     "voltages": voltages_table,
+    "settling": settling_table,
 }
 """What the page calls them."""

@@ -1,0 +1,214 @@
+"""Residual vibration and settling: how far points are from their final position once the commanded motion is over.
+
+The final position is that of the commanded robot at rest: paths at their ends hold, and links, compliant gears and
+joints that nothing else holds are in static equilibrium under gravity, payloads and loads. Where the shape of links is
+prescribed, too, it is that of the end. It is never read off a motion that may ring.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats, null_space
+from ...common.errors import InputError, SolveError
+from ...common.structs import struct
+from .._core import TimeFunction
+from ..analysis.outcome import Outcome
+from ..model.known_motion import KnownStates, State, required_forces
+from ..model.model import Model, row_values
+from ..scene.analysis import TimedAnalysis
+from ..scene.mechanism import MechanismScene
+from ..scene.trajectories import Trajectory
+from ..solve.statics import natural_sizes, static_equilibrium
+from ..solve.vibration import without_rows
+from .motion import RobotMotion
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
+
+MOVED = 1e-6  # of the range of a target: by more it is not yet at its end
+GRID, ROUNDS = 2001, 3  # times at which a target is compared with its end, and how often between two of them
+NEXT = 0.02  # of the run: an instant at which a target changes, this soon after it, ends it exactly
+PERIOD = 800  # times of the last period
+DEPENDENT = 1e-9  # of the largest singular value of rows: below it they depend on others
+STEP = 6e-6  # of natural sizes: central differences of first derivatives
+FLOOR, FREE = 1e-7, 1e-3  # of the largest stiffness, and of stiffnesses above that: less is none
+PARTS = 4  # of an interval between samples
+
+
+@struct
+class Settling:
+    """Of a point, by its distance from the final position; see the module."""
+
+    residual: float  # m, peak to peak: the largest distance of two places in the last period of `frequency`
+    at_path_end: float  # m
+    at_end: float  # m, at the end of the run
+    frequency: float  # Hz, the lowest of the commanded robot at rest, or of the loop; NaN where nothing vibrates
+    # s, after the path's end, until the distance stays below `tolerance`, for a period at least; NaN where it does not
+    time_to: float
+    tolerance: float  # m
+    path_end: float  # s, when all paths are over
+
+
+class Rest(NamedTuple):
+    """Where commands end."""
+
+    model: Model  # the robot that they hold
+    q: Array  # (n_q,)
+    since: float  # s, when the last of them is over
+    frequency: float  # Hz, the lowest of that robot there; NaN where nothing vibrates
+
+
+def commanded_rest(commanding: Outcome) -> Rest | None:
+    """Of a run that follows paths; None where these move to its end, or leave the robot free to move.
+
+    And where the run did not complete, or no equilibrium is near its last posture.
+    """
+    analysis, model = commanding.analysis, commanding.details.held or commanding.model
+    if not isinstance(analysis, TimedAnalysis) or commanding.status != "completed":
+        return None
+    since, end = end_of_paths(model.scene.trajectory, analysis), analysis.last_time
+    if not since < commanding.time[-1] or not any(row.is_trajectory for row in model.rows):
+        return None
+    q, still = commanding.q[-1].copy(), np.zeros(model.tree.n_v)
+    if analysis.is_algebraic:
+        return Rest(model, q, since, _lowest_frequency(model, q, end))
+    for node in model.tree.nodes:  # straight links, as at the start: those of the run may ring
+        q[node.p_q] = 0.0
+    try:
+        q = static_equilibrium(model, State(q, still), end).q
+    except (SolveError, InputError):
+        return None
+    frequency = _lowest_frequency(model, q, end)
+    return None if frequency == 0.0 else Rest(model, q, since, frequency)
+
+
+def _lowest_frequency(model: Model, q: Array, t: float) -> float:
+    """Of small vibrations about rest at q (n_q,), Hz, gravity and loads included; NaN where rows hold all.
+
+    0 where rows leave the robot free to move, or the equilibrium is unstable.
+    """
+    from scipy.linalg import eigh
+
+    tree, sizes = model.tree, natural_sizes(model)
+    still, C_v = np.zeros(tree.n_v), row_values(model, q[None], np.array([t]))[1][0] * sizes
+    free = null_space(C_v, DEPENDENT) if len(C_v) else np.eye(tree.n_v)
+    if not free.shape[1]:
+        return float("nan")
+    ways = sizes[:, None] * free
+
+    def forces(q: Array) -> Array:
+        rest = np.zeros((len(q), tree.n_v))
+        return -required_forces(model, KnownStates(q, rest, rest), np.full(len(q), t))
+
+    multipliers = np.linalg.lstsq(C_v.T, forces(q[None])[0] * sizes, rcond=None)[0]
+
+    def left(q: Array) -> Array:
+        held = np.einsum("tij,i->tj", row_values(model, q, np.full(len(q), t))[1], multipliers)
+        return as_floats((forces(q) - held) @ ways)
+
+    K = (left(tree.integrate(q, -STEP * ways.T)) - left(tree.integrate(q, STEP * ways.T))) / (2 * STEP)
+    M = ways.T @ np.linalg.inv(without_rows(model).derivatives(t, q, still, still).a_f) @ ways
+    K, M, own = (K + K.T) / 2, (M + M.T) / 2, np.abs(K.diagonal())
+    scale = 1.0 / np.sqrt(np.maximum(own, FLOOR * max(own.max(), np.finfo(float).tiny)))
+    if np.linalg.eigvalsh(scale[:, None] * K * scale)[0] < FREE:
+        return 0.0
+    return float(np.sqrt(eigh(K, M, eigvals_only=True)[0]) / (2 * np.pi))
+
+
+def end_of_paths(paths: Sequence[Trajectory], analysis: TimedAnalysis) -> float:
+    """When (s) the last target stays where it is for good."""
+    shapes = (function for _, function, _ in analysis.prescribed())
+    ends = [_end(target, analysis.last_time, _breaks(path)) for path in paths for _, target in path.targets]
+    return max([*ends, *(_end(function, analysis.last_time, function.switches()) for function in shapes)], default=0.0)
+
+
+def _breaks(path: Trajectory) -> Sequence[float]:
+    """Instants (s) at which its law changes."""
+    if path.path is not None:
+        return [float(t) for t in path.path.breaks]
+    return [t for _, target in path.targets for t in target.switches()]
+
+
+def _end(target: TimeFunction, end: float, breaks: Sequence[float]) -> float:
+    """When the target is at its value at `end` for good: at the next of the `breaks`, where one is near."""
+
+    def off(times: Array) -> Array:
+        return np.abs(target.sample(times)[0] - last)
+
+    first, then = 0.0, end
+    last = float(target.sample(np.array([end]))[0][0])
+    level = MOVED * float(off(np.linspace(first, then, GRID)).max())
+    if not level > 0.0:
+        return 0.0
+    for _ in range(ROUNDS):
+        times = np.linspace(first, then, GRID)
+        k = int(np.flatnonzero(off(times) > level)[-1])
+        first, then = float(times[k]), float(times[k + 1])
+    return next((t for t in sorted(breaks) if first <= t <= first + NEXT * end), then)
+
+
+def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Tools, points on paths, tips that carry no joint, and payloads' points, each once; else the last point.
+
+    `points`: labels by body.
+    """
+    joined = {side for joint in scene.joint for side in joint.between}
+    tips = (f"{body}.tip" for body, labels in points.items() if "tip" in labels)
+    named = [tool.reference for tool in scene.tool]
+    named += [path.point for path in scene.trajectory if path.point is not None]
+    named += [*(tip for tip in tips if tip not in joined), *(str(load.point) for load in scene.payload)]
+    known = {f"{body}.{label}" for body, labels in points.items() for label in labels}
+    found = [point for point in dict.fromkeys(named) if point in known]
+    yield from found or [f"{body}.{labels[-1]}" for body, labels in list(points.items())[-1:] if labels]
+
+
+def settling(
+    motion: RobotMotion, rest: Rest, points: Sequence[str], tolerance: float, lowest: float
+) -> dict[str, Settling]:
+    """Of each of the points of a `motion` that ends at rest; `lowest`: frequency (Hz) of the run, NaN for none."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    first = max(int(np.searchsorted(motion.time, rest.since, side="right")) - 1, 0)
+    after = _part(motion, motion.model, *(values[first:] for values in (motion.time, motion.q, motion.v)))
+    at_rest = _part(motion, rest.model, np.zeros(1), rest.q[None], np.zeros((1, rest.model.tree.n_v)))
+    found = {}
+    for point in points:
+        r, r_dot = after.place_and_rate(point)
+        path, place = CubicHermiteSpline(after.time, r, r_dot), at_rest.point(point).position[0]
+        found[point] = _settling(path, place, rest.since, tolerance, lowest)
+    return found
+
+
+def _part(motion: RobotMotion, model: Model, time: Array, q: Array, v: Array) -> RobotMotion:
+    """States of the same robot, alone."""
+    return replace(
+        motion, model=model, time=time, q=q, v=v, a=0.0 * v, multipliers=np.zeros((len(time), len(model.rows))),
+        required=None, applied=(), commanded={}, twists={},
+    )  # fmt: skip
+
+
+def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: float, lowest: float) -> Settling:
+    """Of a point on its `path` (m, by s), by the distance from its final `place` (d,)."""
+    from scipy.optimize import brentq
+
+    def off(t: Array | float) -> Array:
+        return np.asarray(np.linalg.norm(path(t) - place, axis=-1))
+
+    end = float(path.x[-1])
+    window = min(1.0 / lowest, end - since) if lowest > 0.0 else end - since
+    last = path(np.linspace(end - window, end, PERIOD))
+    residual = max(float(np.linalg.norm(last - one, axis=1).max()) for one in last)
+    knots = np.append(since, path.x[path.x > since])
+    times = np.interp(np.arange(PARTS * (len(knots) - 1) + 1) / PARTS, np.arange(len(knots)), knots)
+    beyond, time_to = np.flatnonzero(off(times) > tolerance), 0.0
+    if beyond.size and times[beyond[-1]] + window > end:
+        time_to = float("nan")
+    elif beyond.size:
+        near = times[beyond[-1] : beyond[-1] + 2]
+        time_to = float(brentq(lambda t: float(off(t)) - tolerance, *near)) - since
+    return Settling(residual, float(off(since)), float(off(end)), lowest, time_to, tolerance, since)

@@ -1,0 +1,125 @@
+"""Residual vibration and settling: closed forms of one axis with a compliant gear, final positions of all kinds."""
+
+import numpy as np
+import pytest
+from beam_links import beam_link, rectangle
+from tables_3d import ORIGIN, revolute, rigid, scene
+
+import ffrobot
+
+INERTIA, K, LENGTH, WAY = 0.3, 500.0, 0.5, 0.7
+OMEGA = np.sqrt(K / INERTIA)
+AVERAGED = {"trapezoid": np.array([2, 1]) / 3, "s-curve": np.array([4, 2, 1]) / 7}
+
+
+def axis(duration, *, damping=0.0, step=0.01, settled=1e-4, **path):
+    """A body behind a compliant gear whose motor turns by `WAY` rad in `duration` s."""
+    joint = revolute(
+        "hub", "ground", "b.root", [0.0, 0.0, 1.0], stiffness=K, damping=damping, gear_ratio=9.0, rotor_inertia=1e-4
+    )
+    return scene(
+        [rigid("b", 1.0, [INERTIA] * 3, ORIGIN, tip=[LENGTH, 0.0, 0.0])],
+        [joint],
+        {"name": "run", "kind": "pcid", "end": 1.5, "settled": settled, "output_step": step, "tolerance": 1e-9},
+        gravity=ORIGIN,
+        trajectory=[{"name": "turn", "motor": "hub", "via": [0.0, WAY], "duration": duration} | path],
+    )
+
+
+def settled(tables, point="run/settling/b.tip"):
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        return dict(results.attributes(point))
+
+
+def amplitude(profile, duration, omega=OMEGA):
+    """Of the body: |∫ θ̇ e^{−iωt} dt| of a step averaged over times T_i, a product of sin(ωT/2)/(ωT/2)."""
+    return WAY * np.prod(np.abs(np.sinc(omega * duration * AVERAGED[profile] / (2 * np.pi))))
+
+
+def swing(angle):
+    """Peak to peak (m) of the tip of a body that swings by ± `angle`."""
+    return 2 * LENGTH * np.sin(angle)
+
+
+@pytest.mark.parametrize("profile", AVERAGED)
+@pytest.mark.parametrize("duration", [0.4, 0.53])
+def test_residual_of_a_trapezoid_and_of_an_s_curve(profile, duration):
+    about = settled(axis(duration, profile=profile, settled=1e-9))
+    assert about["residual"] == pytest.approx(swing(amplitude(profile, duration)), rel=1e-4)
+    assert about["frequency"] == pytest.approx(OMEGA / (2 * np.pi), rel=1e-6)
+    assert about["path_end"] == pytest.approx(duration, rel=1e-12)
+    assert np.isnan(about["time_to"])
+
+
+@pytest.mark.parametrize("off", [1.0, 0.9, 1.2])
+def test_a_zv_shaper_leaves_the_cosine_of_its_delay(off):
+    """Two halves of the motion, half a period 1/(2 f) apart: |cos(ω/(4 f))|; nothing where f is right."""
+    shaper = {"kind": "zv", "frequency": off * OMEGA / (2 * np.pi)}
+    about, bare = settled(axis(0.4, profile="s-curve", shaper=shaper)), amplitude("s-curve", 0.4)
+    expected = swing(bare * abs(np.cos(np.pi / (2 * off))))
+    assert about["residual"] == pytest.approx(expected, rel=1e-4, abs=1e-8)
+    assert about["path_end"] == pytest.approx(0.4 + np.pi / OMEGA / off, rel=1e-9)
+
+
+def test_a_damped_axis_settles_at_the_time_of_the_closed_form_whatever_the_outputs():
+    """ë + 2ζω ė + ω² e = −θ̈, constant by pieces: e is the imaginary part of a sum of exponentials of one pole."""
+    duration, damping, tolerance = 0.4, 1.0, 2e-3
+    decay = damping / (2 * INERTIA)
+    pole = complex(-decay, np.sqrt(OMEGA**2 - decay**2))
+    first, second = duration * AVERAGED["trapezoid"]
+    pieces = [(0.0, second, 1.0), (first, first + second, -1.0)]
+
+    def twist(t):
+        parts = (sign * (np.exp(pole * (t - a)) - np.exp(pole * (t - b))) / pole for a, b, sign in pieces)
+        return -WAY / (first * second) * (sum(parts) / pole.imag).imag
+
+    def off(t):
+        return 2 * LENGTH * np.abs(np.sin(twist(t) / 2))
+
+    times = np.linspace(duration, 1.5, 2_000_001)
+    last = times >= 1.5 - 2 * np.pi / OMEGA
+    expected = {
+        "at_path_end": off(duration), "at_end": off(1.5),
+        "residual": 2 * LENGTH * np.sin(np.ptp(twist(times[last])) / 2),
+        "time_to": times[off(times) > tolerance][-1] - duration,
+    }  # fmt: skip
+    for step in (0.001, 0.25):
+        about = settled(axis(duration, damping=damping, step=step, settled=tolerance, profile="trapezoid"))
+        for key, value in expected.items():
+            assert about[key] == pytest.approx(value, rel=1e-4), (step, key)
+
+
+def soft_arm(*kinds):
+    """An arm that hangs on a motor and bends under gravity by 20 mm; strongly damped, it is at rest at the end."""
+    link = beam_link(
+        0.6, rectangle(0.004, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"}, damping={"ratio": 0.3}
+    )  # fmt: skip
+    inverse = {"kind": "pcid", "end": 3.0, "output_step": 0.01}
+    of_kind = {
+        "pcid": inverse,
+        "fcid": inverse | {"kind": "fcid", "shape": "static"},
+        "motors-only": inverse | {"kind": "motors-only"},
+        "closed-loop": {"kind": "closed-loop", "actuation": "pcid", "sample_time": 0.001, "controller": [
+            {"kind": "joint-pid", "proportional": {"hub": 400.0}, "derivative": {"hub": 40.0}}]},
+    }  # fmt: skip
+    joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "gear_ratio": 100.0}
+    return {
+        "name": "arm", "gravity": [0.0, -9.81], "body": [{"name": "arm", "link": link}],
+        "joint": [joint | {"rotor_inertia": 1e-3}], "payload": [{"point": "arm.tip", "mass": 0.1}],
+        "initial": {"state": "static"},
+        "trajectory": [{"name": "swing", "joint": "hub", "via": ["0*deg", "20*deg"], "duration": 0.4}],
+        "analysis": [{"name": kind, **of_kind[kind]} for kind in kinds],
+    }  # fmt: skip
+
+
+def test_robots_of_all_kinds_come_to_rest_at_their_final_position():
+    """The last output of a damped run is the equilibrium, which no kind reads off it; the path's end is not."""
+    with ffrobot.solve(ffrobot.make_scene(**soft_arm("pcid", "fcid", "motors-only", "closed-loop"))) as results:
+        for kind in results.analyses:
+            about = results.attributes(f"{kind}/settling/arm.tip")
+            assert about["at_end"] < 5e-6, kind
+            assert about["residual"] < 5e-6, kind
+            assert kind == "fcid" or about["at_path_end"] > 1e-3, kind
+        sag = results["pcid/points/arm.tip/deflection"][-1, 1]
+        assert sag < -5e-3
+        assert results.attributes("closed-loop/control")["residual"] < 5e-6
