@@ -67,26 +67,35 @@ class KrylovSchur:
     def lowest(self, count: int) -> Array:
         """X (m, count), XᵀMX = I to rounding, ω² ascending.
 
+        Raises `SolveError` as `candidates` does.
+        """
+        X = self.candidates(count)
+        while not self.complete(count):
+            X = self.candidates(count)
+        return X
+
+    def candidates(self, count: int) -> Array:
+        """The same, but of several alike one may be missing: `complete` finds out.
+
         Raises `SolveError` where there are not as many but for round-off, or too few converge.
         """
-        missing = count - self._theta.size
-        while missing > 0:
-            self._add(missing, self._tolerance)
-            last = self._theta[min(count, self._theta.size) - 1]
-            if self._theta.size < min(count, self._rank):
-                missing = count - self._theta.size
-            elif self._theta.size < self._rank:
-                missing = int(np.sum(self._search(1, LOOSE)[1] > (1 + ALIKE) * last))
-            else:
-                missing = 0
+        if self._theta.size < min(count, self._rank):
+            self._add(count - self._theta.size)
         found = int(np.sum(self._theta > ROUNDING * self._theta.max(initial=0.0)))
         if found < count:
             raise SolveError(f"eigenproblem: {found} of {count} modes are above round-off; request fewer modes")
         return self._X[:, :count]
 
-    def _add(self, count: int, tolerance: float) -> None:
+    def complete(self, count: int) -> bool:
+        """Whether the lowest `count` are all there; if not, one more of them is now."""
+        if self._theta.size >= self._rank or self._search(1, LOOSE)[1][0] <= (1 + ALIKE) * self._theta[count - 1]:
+            return True
+        self._add(1)
+        return False
+
+    def _add(self, count: int) -> None:
         """The lowest `count` modes beside those known."""
-        found, theta = self._search(min(count, self._rank - self._theta.size), tolerance)
+        found, theta = self._search(min(count, self._rank - self._theta.size), self._tolerance)
         order = np.argsort(np.append(-self._theta, -theta), kind="stable")
         self._theta = np.append(self._theta, theta)[order]
         self._X = self._orthonormal(np.hstack([self._X, found]))[:, order]

@@ -53,7 +53,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
                 f" all families, found {needed}"
             )
         found = min(found + batch, most)
-        X = search.lowest(found)
+        X = search.candidates(found)
         omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
         X = X @ Q
         motion = read(X)
@@ -64,6 +64,9 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
         if not numbers.size:
             hits = _lowest_of_each(hits, kinds)
         if len(hits) >= needed:
+            if not search.complete(found):
+                batch = 0
+                continue
             chosen = np.array(hits)[numbers] if numbers.size else np.array(hits)
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
         if found == most < available:
