@@ -224,8 +224,8 @@ def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., M
     except ImportError as error:
         gone = f"{error.name} is not installed" if isinstance(error, ModuleNotFoundError) else str(error)
         raise SolveError(
-            f"{source_path}: computing this link needs the finite element libraries, and {gone}: install dolfinx"
-            " (Debian: python3-dolfinx), or use a modal body file made elsewhere"
+            f"{source_path}: computing this link needs the finite element libraries, and {gone}: install the extra fem"
+            " (docs/install.md), or use a modal body file made elsewhere"
         ) from None
 
 

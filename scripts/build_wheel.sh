@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds a wheel of stage 2 into dist/, for any processor of this kind: on x86-64 it holds two variants of the core.
-# Needs a C++20 compiler and Eigen 3.4; pip fetches the rest.
+# Builds a wheel into dist/, for any processor of this kind: on x86-64 it holds two variants of the core. With Python
+# 3.12 or later it serves all later ones, too. Needs a C++20 compiler; pip fetches the rest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
