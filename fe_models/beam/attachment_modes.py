@@ -13,8 +13,9 @@ from ...common.arrays import Array
 from ..link_records.families import Family
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
 from ..modal_body.craig_bampton import in_order
-from .beam import R_X, FamilyModel
+from .beam import FamilyModel
 from .eigen import Flexibility
+from .line import R_X
 
 
 def attachment_modes(

@@ -18,11 +18,8 @@ from ...common.structs import struct
 from ..link_records.families import Family
 from ..link_records.link import BeamLink
 from .dolfinx_forms import BeamForms
-from .line import hermite, lagrange
+from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, hermite, lagrange
 from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
-
-# Rows of a station: displacement and rotation of the cross section about x, y, z.
-U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
 
 
 @struct

@@ -26,9 +26,8 @@ from ..link_records.link import BeamLink
 from ..modal_body.lumped_masses import of_turning
 from ..modal_body.parts import LEVI_CIVITA
 from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names
-from .beam import R_X
 from .invariants import weighted
-from .line import Functions
+from .line import R_X, Functions
 from .sections import Property
 
 ROTARY: Sequence[tuple[Property, Sequence[float]]] = (

@@ -12,8 +12,7 @@ import scipy.sparse as sp
 from ...common.arrays import Array
 from ..link_records.link import BeamLink
 from ..modal_body.parts import Invariants
-from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z
-from .line import Functions, gram
+from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, gram
 from .sections import Property, cellwise
 
 

@@ -11,6 +11,9 @@ from scipy.special import roots_legendre
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
 
+# Rows of a station: displacement and rotation of the cross section about x, y, z.
+U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
+
 # Points of an element: exact for products of two cubics.
 GAUSS = 4
 

@@ -21,12 +21,12 @@ from ..modal_body.attachment_modes import ascending
 from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
 from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
-from .beam import R_X, FamilyModel, family_model
+from .beam import FamilyModel, family_model
 from .dolfinx_forms import BeamForms
 from .eigen import lowest_modes
 from .geometric_stiffness import geometric_stiffness
 from .invariants import shape_integrals
-from .line import Functions, lagrange, on_axis
+from .line import R_X, Functions, lagrange, on_axis
 from .sections import section_outlines, shear_modulus
 from .stress import beam_stresses, segments, stress_loads
 
