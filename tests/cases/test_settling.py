@@ -1,11 +1,15 @@
 """Residual vibration and settling: closed forms of one axis with a compliant gear, final positions of all kinds."""
 
+import csv
+
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from tables_3d import ORIGIN, revolute, rigid, scene
 
-import ffrobot
+import ffrobot as program
+from ffrobot import InputError, Results
+from ffrobot.design.goals import parse_goal
 
 INERTIA, K, LENGTH, WAY = 0.3, 500.0, 0.5, 0.7
 OMEGA = np.sqrt(K / INERTIA)
@@ -27,7 +31,7 @@ def axis(duration, *, damping=0.0, step=0.01, settled=1e-4, **path):
 
 
 def settled(tables, point="run/settling/b.tip"):
-    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+    with program.solve(program.make_scene(**tables)) as results:
         return dict(results.attributes(point))
 
 
@@ -89,6 +93,42 @@ def test_a_damped_axis_settles_at_the_time_of_the_closed_form_whatever_the_outpu
             assert about[key] == pytest.approx(value, rel=1e-4), (step, key)
 
 
+def test_residual_and_settling_are_responses(tmp_path, ffrobot):
+    """Columns of a sweep by the closed form; a point that does not settle takes as long as the run leaves it."""
+    body = f"mass = 1.0, inertia = {INERTIA}, center = [0.0, 0.0]"
+    points = f"{{ root = [0.0, 0.0], tip = [{LENGTH}, 0.0] }}"
+    (tmp_path / "scene.toml").write_text(
+        f"""name = "axis"
+gravity = [0.0, 0.0]
+body = [{{ name = "b", rigid = {{ {body}, points = {points} }} }}]
+trajectory = [{{ name = "turn", motor = "hub", via = [0.0, {WAY}], duration = 0.4, profile = "trapezoid" }}]
+analysis = [{{ name = "run", kind = "pcid", end = 1.5, output_step = 0.01 }}]
+[[joint]]
+name = "hub"
+type = "revolute"
+between = ["ground", "b.root"]
+gear_ratio = 9.0
+rotor_inertia = 1e-4
+stiffness = 500.0
+"""
+    )
+    stiffnesses, responses = (500.0, 700.0), ("--collect", "residual b.tip", "--collect", "settling run/b.tip")
+    ffrobot.ok(
+        "sweep", tmp_path / "scene.toml", "--vary", "joint.hub.stiffness=500,700", *responses, "-o", tmp_path / "out"
+    )
+    rows = list(csv.DictReader((tmp_path / "out/table.csv").read_text().splitlines()))
+    for row, stiffness in zip(rows, stiffnesses, strict=True):
+        expected = swing(amplitude("trapezoid", 0.4, np.sqrt(stiffness / INERTIA)))
+        assert float(row["residual b.tip"]) == pytest.approx(expected, rel=1e-4)
+        assert row["settling run/b.tip"].lower() in ("", "nan")
+    with Results(next((tmp_path / "out").rglob("*.h5"))) as results:
+        found = parse_goal("settling b.tip").read(results)
+        assert found.value == pytest.approx(1.1, rel=1e-12)
+        assert "not settled" in found.doubt
+        with pytest.raises(InputError, match='expected "BODY.POINT" .* "run/b.tip", found "b.top"'):
+            parse_goal("residual b.top").read(results)
+
+
 def soft_arm(*kinds):
     """An arm that hangs on a motor and bends under gravity by 20 mm; strongly damped, it is at rest at the end."""
     link = beam_link(
@@ -114,7 +154,7 @@ def soft_arm(*kinds):
 
 def test_robots_of_all_kinds_come_to_rest_at_their_final_position():
     """The last output of a damped run is the equilibrium, which no kind reads off it; the path's end is not."""
-    with ffrobot.solve(ffrobot.make_scene(**soft_arm("pcid", "fcid", "motors-only", "closed-loop"))) as results:
+    with program.solve(program.make_scene(**soft_arm("pcid", "fcid", "motors-only", "closed-loop"))) as results:
         for kind in results.analyses:
             about = results.attributes(f"{kind}/settling/arm.tip")
             assert about["at_end"] < 5e-6, kind
