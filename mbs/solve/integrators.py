@@ -173,7 +173,12 @@ def beyond_rounding(tolerance: float, rounding: float) -> str:
 
 def unmet(choice: Choice, run: _core.TreeRun) -> str:
     """What the integrator saw where steps have become too short and no cause is found in loads or positions."""
-    if run.last_error < 1.0:
+    if run.last_step == 0:
+        return (
+            "the first step would be too short to change the time: accelerations or frequencies are that large;"
+            " check units"
+        )
+    if run.last_error <= 1:
         saw = f"steps fell to {run.last_step:.2g} s, where round-off sets the error"
     elif np.isfinite(run.last_error):
         saw = f"a step of {run.last_step:.2g} s still errs by {run.last_error:.2g} times what it may"

@@ -10,6 +10,8 @@ from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
+from ffrobot.mbs.fields.functions import user_function
+from ffrobot.mbs.solve.diagnosis import load_jump
 
 ELBOW = (-0.2, 1.4)
 
@@ -54,6 +56,23 @@ def test_load_that_ends(moment, says):
     assert says in outcome.statistics.cause
     assert outcome.statistics.time_reached <= 0.5
     assert 10 < len(outcome.q) == len(outcome.time) <= 51
+
+
+@pytest.mark.parametrize(
+    ("moment", "says"),
+    [
+        (lambda t: 80 * np.exp(-(((t - 0.50037) / 2e-3) ** 2)), ""),
+        (lambda t: 3.0, ""),
+        (lambda t: 1e4 * np.sin(20 * t), ""),
+        (lambda t: 2.0 + (t > 0.5), "jumps from 2 to 3 there"),
+        (lambda t: np.nan if t > 0.5 else 1.0, "has no finite value"),
+    ],
+)
+def test_loads_from_python_are_blamed_for_their_values_alone(moment, says):
+    """They need no slopes."""
+    found = load_jump([('load on "O", moment,', user_function(moment))], 0.5)
+    assert says in found
+    assert bool(says) == bool(found)
 
 
 @pytest.mark.parametrize("tiny", [5e-324, 1e-310, 1e-160])
