@@ -154,8 +154,8 @@ def marker(position=(0.0, 0.0), translation=(), rotation=()):
     return made
 
 
-def chain(links):
-    """Hinged links, as the core has them in the plane; rows are x and y of the last tip."""
+def chain(links, coordinates=(None, None)):
+    """Hinged links, as the core has them in the plane; rows are x and y of the last tip, or two coordinates in v."""
     bodies, tip = [], r.MarkerAt(len(links) - 1, 2)
     for k, link in enumerate(links):
         body, data = r.PlanarBody(), r.PlanarData()
@@ -168,8 +168,10 @@ def chain(links):
         body.inboard_marker, body.parent_marker = 1, 2 if k else 0
         bodies.append(body)
     rows = [r.ConstraintModel() for _ in range(2)]
-    for row, f in zip(rows, np.eye(3), strict=False):
+    for row, f, coordinate in zip(rows, np.eye(3)[:2], coordinates, strict=True):
         row.name, row.kind, row.f, row.a, row.b = "tip", r.ConstraintKind.point, f, r.MarkerAt(-1, 0), tip
+        if coordinate is not None:
+            row.kind, row.a, row.b, row.coordinate = r.ConstraintKind.coordinate, *[r.MarkerAt(0, 0)] * 2, coordinate
     return r.PlanarModel(bodies, [marker()], rows, [], np.array(GRAVITY))
 
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <complex>
 
 namespace ffrobot {
@@ -30,6 +31,12 @@ public:
 
   // Where a step from t on that could be of length h had best end: what acts may cost less at times that it knows.
   virtual double end_of_step(double t, double h) { return t + h; }
+
+  // What rounding of every part by `relative` leaves in the last slope(), near z, where parts of it cancel, as loads
+  // and what carries them: z_dot (2 n_v). Another slope() has to follow before error_size() or accepted().
+  virtual void round_off([[maybe_unused]] const double *z, [[maybe_unused]] double relative, double *z_dot) {
+    std::fill_n(z_dot, size(), 0.0);
+  }
 
   // Moves z back onto the system's invariants after a step; false where that fails (the step is then rejected).
   virtual bool correct(double t, double *z) = 0;

@@ -24,7 +24,8 @@ FFROBOT_INLINE void superposed(const Workspace<Space, T> &w, int slot, const Pac
 }
 
 // Acceleration A of the section (in: as if the joint were stiff) and a of the joint; the force on the ground of a body
-// that is alone
+// that is alone. Coordinates that constraint equations prescribe do exactly what these say: sums of what multipliers
+// and loads do to them are rounding, which sections with next to no inertia, as those of cantilever modes, amplify.
 template <class Space, class T, int W>
 inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T> &hinge, const Workspace<Space, T> &w,
                              const Pack<T, W> &y, T *A, T *a) {
@@ -39,6 +40,11 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
   for (int k = 0; k < node.shape.freedoms.count; ++k) {
     const int f = node.shape.freedoms.component[k];
     const T before = A[f];
+    if (const int row = W > 1 && w.target && !node.shape.in_inner_axes ? hinge.row[k] : -1; row >= 0) {
+      x[k] = w.target[row];
+      A[f] = before + x[k];
+      continue;
+    }
     if (node.rotor_inertia == 0)
       A[f] = T(0.);
     T sum = hinge.U[k][0] * A[0];
@@ -59,7 +65,7 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
       x[k] = turned[k];
   }
   for (int k = 0; k < node.shape.freedoms.count; ++k)
-    a[k] = x[k];
+    a[k] = W > 1 && w.target && hinge.row[k] >= 0 ? w.target[hinge.row[k]] : x[k];
 }
 
 // Accelerations of ports, and forces f on those that modes move or that carry a joint, whose forces steps are judged

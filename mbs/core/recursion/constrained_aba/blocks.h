@@ -56,7 +56,7 @@ template <class Space, class T> void add_up(Workspace<Space, T> &w, const T &uni
 
 template <bool by_multipliers, class Space, class T>
 void accelerate_in_blocks(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w, T *a) {
-  add_up(w, T(by_multipliers ? 0. : 1.));
+  add_up(w, by_multipliers ? w.y[0] : T(1.));
   auto y = Pack<T, most_columns>::zero();
   y.set(0, T(1.));
   acceleration_pass_of_block<by_multipliers>(m, q, y, w, a);
@@ -96,8 +96,8 @@ void evaluate_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const
   factorise(S_all, n), solve_factorised(S_all, n, lambda);
   for (int r = 0; r < n; ++r)
     w.lambda[w.active[r]] = lambda[r];
+  w.target = target;
   accelerate_in_blocks<false>(m, q, w, a);
-  prescribe(m, target, w, a);
   ++w.evaluations;
 }
 

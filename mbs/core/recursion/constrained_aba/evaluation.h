@@ -45,13 +45,11 @@ FFROBOT_NOINLINE void evaluate(const Mechanism<Space> &m, const T *q, const T *v
     for (int r = 0; r < rows; ++r)
       w.lambda[w.active[r]] = lambda[r];
   }
+  w.target = target;
   if constexpr (W == most_columns)
     acceleration_pass_of_block<false>(m, q, y, w, a);
   else
     acceleration_pass<false, Space, T, W>(m, q, y, w, a);
-  if constexpr (W > 1)
-    if (m.has_prescribed)
-      prescribe(m, target, w, a);
   ++w.evaluations;
 }
 
@@ -115,6 +113,22 @@ template <class Space, class T> void respond(const Mechanism<Space> &m, const T 
 template <class Space, class T>
 void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<Space, T> &w, T *dq) {
   put_active(lambda, w);
+  w.target = nullptr;
+  respond(m, q, w, dq);
+}
+
+// Parts of a sum that cancel are rounded by other shares each.
+template <class Space, class T>
+void round_off(const Mechanism<Space> &m, const T *q, const std::type_identity_t<T> &relative, Workspace<Space, T> &w,
+               T *dq) {
+  constexpr double golden = 0.6180339887498949; // its multiples are spread over [0, 1)
+  put_active(w.lambda.data(), w);
+  w.y[0] = relative;
+  for (std::size_t r = 1; r < w.y.size(); ++r) {
+    const double x = golden * static_cast<double>(r);
+    w.y[r] *= -(0.5 + x - std::floor(x)) * relative;
+  }
+  w.target = w.nothing.data();
   respond(m, q, w, dq);
 }
 
@@ -122,6 +136,7 @@ template <class Space, class T>
 void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
   put_active(residual, w);
   solve_factorised(w.factor.data(), w.factored(), w.y.data() + 1);
+  w.target = nullptr;
   respond(m, q, w, dq);
 }
 
@@ -184,9 +199,11 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   z.assign(widest, T(0.));
   const std::size_t rows = m.constraints.size(), factored = std::max(rows, static_cast<std::size_t>(columns - 1));
   delassus.assign(rows * rows, T(0.)), factor.assign(factored * factored, T(0.));
-  lambda.assign(rows + 1, T(0.)), y.assign(std::max(stride, rows + 1), T(0.));
-  for (const Constraint &constraint : m.constraints)
-    lifts.push_back(constraint.moves || constraint.follows ? 0 : constraint.lift);
+  lambda.assign(rows + 1, T(0.)), nothing = lambda, y.assign(std::max(stride, rows + 1), T(0.));
+  for (const Constraint &of : m.constraints) {
+    lifts.push_back(of.moves || of.follows ? 0 : of.lift);
+    coordinates.emplace_back(of.model.kind == ConstraintKind::coordinate ? of.node : -1, of.freedom);
+  }
   for (const auto &actions : m.actions) {
     for (const Action &action : actions.list)
       if (action.is_point) {
@@ -226,8 +243,14 @@ template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> 
   active = std::move(equations);
   column.assign(lambda.size(), 0);
   std::fill(lambda.begin(), lambda.end(), T(0.));
-  for (std::size_t k = 0; k < active.size(); ++k)
-    column[static_cast<std::size_t>(active[k])] = static_cast<int>(k) + 1;
+  for (auto &hinge : hinges)
+    std::fill(std::begin(hinge.row), std::end(hinge.row), -1);
+  for (std::size_t k = 0; k < active.size(); ++k) {
+    const auto r = static_cast<std::size_t>(active[k]);
+    column[r] = static_cast<int>(k) + 1;
+    if (const auto [node, freedom] = coordinates[r]; node >= 0)
+      hinges[static_cast<std::size_t>(node)].row[freedom] = active[k];
+  }
   put_in_columns();
   blocks.clear();
   if (active.size() <= block_constraints)
@@ -255,6 +278,8 @@ template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> 
 #define FFROBOT_RESPONSES(Space)                                                                                       \
   template void respond(const Mechanism<Space> &, const double *, const double *, Workspace<Space, double> &,          \
                         double *);                                                                                     \
+  template void round_off(const Mechanism<Space> &, const double *, const double &, Workspace<Space, double> &,        \
+                          double *);                                                                                   \
   template void response(const Mechanism<Space> &, const double *, const double *, Workspace<Space, double> &, double *)
 
 } // namespace ffrobot::recursion

@@ -59,13 +59,4 @@ FFROBOT_NOINLINE void acceleration_pass_of_block(const Mechanism<Space> &m, cons
   acceleration_pass<by_multipliers, Space, T, most_columns>(m, q, y, w, a);
 }
 
-// Of coordinates that constraint equations prescribe: exactly what these say. Where a light link carries a heavy one,
-// multipliers leave them more rounding than the tolerance of a step at rest has room for.
-template <class Space, class T>
-void prescribe(const Mechanism<Space> &m, const T *target, const Workspace<Space, T> &w, T *a) {
-  for (const int r : w.active)
-    if (const Constraint &of = m.constraints[static_cast<std::size_t>(r)]; of.model.kind == ConstraintKind::coordinate)
-      a[m.nodes[static_cast<std::size_t>(of.node)].v + of.freedom] = target[r];
-}
-
 } // namespace ffrobot::recursion

@@ -50,6 +50,7 @@ template <class Space, class T> struct Hinge {
   T pin[2];               // U/D of a pin, in place of all that
   T f[packed<T, d>] = {}; // on the ground, in axes of the section, of a body that is alone
   T spin;                 // rad/s of its rotor about z
+  int row[d];             // of each freedom: the active constraint equation that is its coordinate; -1: none
   T gyro[2]; // moment on the inner section about x, y by which the rotor resists turning with it, opposite sign
 };
 
@@ -95,6 +96,8 @@ template <class Space, class T> struct Workspace {
   Aligned<T> lift;              // (columns) what active ones of that kind measure of gravity, from 0 on
   std::vector<Block<T>> blocks; // of active ones where they are more than columns; else none
   Aligned<T> lambda;            // (constraints)
+  const T *target = nullptr;    // (constraints) that prescribed coordinates follow in the acceleration pass; null: none
+  Aligned<T> nothing;           // (constraints) zeros
   Aligned<T> y;                 // (columns, or 1 + constraints): 1, multipliers of active ones
   std::vector<Pose<T>> frames;  // of nodes
   std::vector<Turning> turning; // of ground markers, in space: those that turn are to be kept up to date
@@ -107,7 +110,8 @@ template <class Space, class T> struct Workspace {
     double force[Space::linear];
   };
   std::vector<PointForce> point_forces;
-  std::vector<double> lifts; // (constraints)
+  std::vector<double> lifts;                    // (constraints)
+  std::vector<std::pair<int, int>> coordinates; // (constraints) node and freedom of those that are a coordinate, or -1
 
   void keep(std::vector<int> equations); // these alone
   void put_in_columns();                 // point_force and lift, after a change of `column`
@@ -152,6 +156,12 @@ void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<S
 // The same with the multipliers that answer a residual: dq = -M^-1 C^T (C M^-1 C^T)^-1 residual (constraints).
 template <class Space, class T>
 void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq);
+
+// What rounding of every part by `relative` leaves in the sums that the last accelerations() were: of what acts and of
+// what each multiplier does, which may cancel. To its state q is near; `w` afterwards as after respond().
+template <class Space, class T>
+void round_off(const Mechanism<Space> &m, const T *q, const std::type_identity_t<T> &relative, Workspace<Space, T> &w,
+               T *dq);
 
 // Values and rates of all constraint equations (m, rad; m/s, rad/s), at a state without generalized forces.
 template <class Space, class T>

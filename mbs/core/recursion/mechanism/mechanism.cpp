@@ -343,10 +343,8 @@ template <class Space> void Mechanism<Space>::connect_ports() {
 // What an evaluation has to know of its direction
 template <class Space> void Mechanism<Space>::classify(Constraint &of) {
   const ConstraintKind kind = of.model.kind;
-  if (kind == ConstraintKind::coordinate) {
-    has_prescribed = true;
+  if (kind == ConstraintKind::coordinate)
     return;
-  }
   of.moves = kind != ConstraintKind::point && kind != ConstraintKind::rotation;
   if (kind == ConstraintKind::point)
     of.lift = gravity.dot(of.model.f.head(Space::linear)) * ((of.a.node < 0) - (of.b.node < 0));

@@ -119,7 +119,6 @@ template <class Space> struct Mechanism {
   std::vector<Actions> actions;
   bool needs_positions = false;        // constraint equations have directions that move
   bool has_moving_constraints = false; // or follow markers of the ground that turn
-  bool has_prescribed = false;         // constraint equations that are joint coordinates
   std::vector<Eigen::Index> rotations; // index in v of the first of three components of each quaternion's rate
 
 private:

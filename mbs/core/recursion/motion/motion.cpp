@@ -38,6 +38,7 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   else if (!mechanism.constraints.empty())
     evaluate(t, q, v, correction_.data()); // projections need its factors
   newton_.keep(workspace_.active);
+  bear_loads();
   if (scene.has_loops && !workspace_.active.empty()) {
     evaluate(t, q, v, correction_.data()); // with the factors of the equations that are kept
     loops_.emplace(mechanism, workspace_);
@@ -50,6 +51,14 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
+}
+
+template <class Space> void RecursiveMotion<Space>::bear_loads() {
+  if (forces_.acts())
+    for (const int r : workspace_.active)
+      if (const Constraint &of = mechanism_.constraints[static_cast<std::size_t>(r)];
+          of.model.kind == ConstraintKind::coordinate)
+        borne_.push_back({mechanism_.nodes[static_cast<std::size_t>(of.node)].v + of.freedom, r, 0});
 }
 
 template <class Space> void RecursiveMotion<Space>::plan(double duration) {
@@ -80,11 +89,15 @@ template <class Space>
     forces = acting.forces;
     if (acting.placed)
       placed.emplace(*acting.placed);
+    for (Borne &of : borne_)
+      of.force = forces_.take(of.v);
   }
   if (placed)
     accelerations(*placed, forces.wrench, laws_.accelerations(), a);
   else
     accelerations(mechanism_, q, v, forces, laws_.accelerations(), workspace_, a);
+  for (const Borne &of : borne_)
+    workspace_.lambda[of.row] += of.force;
 }
 
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
@@ -97,6 +110,13 @@ template <class Space> void RecursiveMotion<Space>::slope(double t, const double
   evaluate_here(t, q, v, z_dot + n_v());
   if (loops_ && !loops_->has_begun())
     loops_->begin_at(q, workspace_, newton_.workspace());
+}
+
+template <class Space> void RecursiveMotion<Space>::round_off(const double *z, double relative, double *z_dot) {
+  std::fill_n(z_dot, n_v(), 0.0);
+  for (const Borne &of : borne_)
+    workspace_.lambda[of.row] -= of.force;
+  recursion::round_off(mechanism_, local().state(z), relative, workspace_, z_dot + n_v());
 }
 
 template <class Space>

@@ -35,6 +35,7 @@ public:
 
   void slope(double t, const double *z, double *z_dot) override;
   void set_stage_times(const double *times, int count) override;
+  void round_off(const double *z, double relative, double *z_dot) override;
   double end_of_step(double t, double h) override { return forces_.end_of_step(t, h); }
   bool correct(double t, double *z) override;
   bool finish(double t, double *z, double *z_dot) override;
@@ -85,6 +86,7 @@ private:
       turn_markers(t);
   }
   void turn_markers(double t);
+  void bear_loads();                                                         // finds borne_
   void evaluate_here(double t, const double *q, const double *v, double *a); // evaluate(), inline
   Placed<Space, double> residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
@@ -96,6 +98,13 @@ private:
   // Where workspace_ has the kinematics of the state that will be evaluated next
   std::optional<Placed<Space, double>> placed_;
   SceneForces<Space> forces_;
+  // What acts along a coordinate that a constraint equation prescribes moves nothing: its multiplier bears that, and
+  // what is left of both in sums would be rounding.
+  struct Borne {
+    int v, row;
+    double force; // of the last evaluation, N m or N
+  };
+  std::vector<Borne> borne_;
   ConstraintLaws laws_;
   MotionNorm<Space> norm_;
   NewtonSystem<Space> newton_;

@@ -11,13 +11,16 @@ using Eigen::VectorXd;
 namespace {
 
 double farthest(const planar::Body &b) {
-  double r = 0;
+  double r = b.mass > 0 ? std::sqrt(b.J / b.mass) : 0;
   for (const planar::Port &port : b.ports)
     r = std::max(r, std::hypot(port.x, port.y));
   return r;
 }
 double farthest(const spatial::Body &b) {
-  double r = 0;
+  double polar = 0;
+  for (int i = 0; i < 3; ++i)
+    polar += 0.5 * b.J0[symmetric_index(i, i)];
+  double r = b.mass > 0 ? std::sqrt(polar / b.mass) : 0;
   for (const spatial::Port &port : b.ports)
     r = std::max(r, std::hypot(port.r[0], port.r[1], port.r[2]));
   return r;

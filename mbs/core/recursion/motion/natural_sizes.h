@@ -15,8 +15,9 @@ public:
   // The run will last `duration` s: no pace is slower than once in it. Before, gravity alone makes one.
   void plan(double duration);
 
-  double length() const { return length_; }                       // m, of the longest body
-  const std::vector<double> &reach() const { return reach_; }     // m, of each body from its frame
+  double length() const { return length_; } // m, of the longest body
+  // m, of each body from its frame: to what it carries, or its radius of gyration where that is farther
+  const std::vector<double> &reach() const { return reach_; }
   double pace() const { return pace_; }                           // 1/s, of a motion without vibrations
   double acceleration() const { return length_ * pace_ * pace_; } // m/s^2
 

@@ -33,6 +33,9 @@ public:
   };
   Acting at(double t, const double *q, const double *v, Workspace<Space, double> &w);
 
+  // Takes what acts along an entry of v out of the generalized forces of the last at().
+  double take(int v) { return has_generalized_ ? std::exchange(generalized_[v], 0.0) : 0; }
+
   const double *generalized() const { return has_generalized_ ? generalized_.data() : nullptr; } // of the last at()
 
   void set_stage_times(const double *times, int count) {
