@@ -200,10 +200,13 @@ def _between(
         held = zero_order_hold(system.model, control.commands)
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
-    some = some_of(times, ends)
+    # what rings between samples of a controller has peaks and means of its own there
+    joints = system.model.tree.joint_columns
+    rates = states[:, -len(joints) :][:, joints]
+    some = some_of(times, rates, ends, LOOKED_AT if control is None else len(times))
     run = at(some)
     motion, replayed = _motion(system, run, times[some]), run.replayed
-    if (more := about_highest(some, motion.multipliers)).size:
+    if (more := np.setdiff1d(about_highest(some, np.hstack([motion.multipliers, motion.a[:, joints]])), some)).size:
         others, order = at(more), np.argsort(np.concatenate([some, more]))
         motion = motion.with_rows_of(_motion(system, others, times[more]), order)
         replayed = np.concatenate([replayed, others.replayed])[order]

@@ -52,18 +52,25 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
     return (times[:reached], samples.states.reshape(len(times), -1)[:reached]) if reached else None
 
 
-def some_of(times: Array, ends: Array) -> Indices:
-    """Numbers of some of the samples at `times` (k,), s: the first, the last, and those at which steps have to end."""
+def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
+    """Numbers of some of the samples at `times` (k,), s, at `most` and about the highest of `rates` (k, n_v).
+
+    The first, the last, and those at which steps have to end are among them.
+    """
     count = len(times)
     at_ends = np.flatnonzero(np.isin(times, ends))
-    return np.unique(np.concatenate([np.arange(0, count, -(-count // LOOKED_AT)), at_ends, [count - 1]]))
+    some = np.unique(np.concatenate([np.arange(0, count, -(-count // most)), at_ends, [count - 1]]))
+    return some if len(some) == count else np.union1d(some, about_highest(np.arange(count), rates, 2))
 
 
-def about_highest(some: Indices, quantities: Array) -> Indices:
-    """All other samples about the highest of `quantities` (T, columns), which were found at `some` (T,)."""
+def about_highest(some: Indices, quantities: Array, beside: int = 1) -> Indices:
+    """All samples about the highest of `quantities` (T, columns), which were found at `some` (T,).
+
+    From `beside` of these before each to as many behind.
+    """
     tops = sorted({k for column in np.abs(quantities).T for k in _highest(column)})
-    about = [np.arange(some[max(k - 1, 0)], some[min(k + 1, len(some) - 1)] + 1) for k in tops]
-    return np.setdiff1d(np.concatenate([some[:0], *about]), some)
+    about = [np.arange(some[max(k - beside, 0)], some[min(k + beside, len(some) - 1)] + 1) for k in tops]
+    return np.unique(np.concatenate([some[:0], *about]))
 
 
 def _highest(values: Array) -> list[int]:

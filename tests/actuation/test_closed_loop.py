@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from beam_links import paper_link
+from beam_links import beam_link, paper_link, tube
 from scipy.linalg import expm, solve_discrete_are
 
 import ffrobot
@@ -193,6 +193,30 @@ def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     found = solution.analyses["inverse"].motion.motor_moments
     tau = np.column_stack([found[joint] for joint in "OA"])
     np.testing.assert_allclose(moments, tau, atol=1e-8 * np.abs(tau).max())
+
+
+def test_peaks_of_what_rings_do_not_depend_on_outputs():
+    """A tube that is hit rings at 100 Hz and more between samples: outputs far apart, and closer than its periods."""
+
+    def found(step):
+        joint = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"], "rotor_inertia": 0.05}
+        link = beam_link(0.5, tube(0.03, 0.026), 10, nu=None, modes={"count": 5, "family": "in-plane-bending"})
+        inverse = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": step}
+        hit = [{"point": "arm.tip", "y": "where(t < 0.0007, 200, 0)"}]
+        control = loop(sample_time=1e-3, controller=[PID], disturbance=hit)
+        scene = make_scene(
+            name="rings", gravity=[0.0, 0.0], body=[{"name": "arm", "link": link}], joint=[joint],
+            trajectory=[{"name": "stand", "joint": "O", "value": "0"}], analysis=[inverse, control],
+        )  # fmt: skip
+        results = ffrobot.solve(scene)
+        seen = {of: results.attributes(f"loop/joints/O/{of}") for of in ("rate", "reaction", "moment")}
+        rates = results["loop/joints/O/rate"]
+        return [about[key] for about in seen.values() for key in ("peak", "rms")], np.abs(rates).max()
+
+    (far, _), (near, highest) = found(0.5), found(1e-4)
+    # the force has eight steps in a period of the fastest mode, between which its peak is that of a polynomial
+    assert np.all(np.abs(np.array(far) / near - 1) < [1e-3, 1e-3, 6e-3, 1e-3, 1e-3, 1e-3])
+    assert far[0] == pytest.approx(highest, rel=3e-3)  # a tenth of a period of the fastest mode between outputs
 
 
 def test_the_rigid_arm_says_where_its_links_do_not_reach():
