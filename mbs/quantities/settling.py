@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats, null_space
+from ...common.arrays import Array, null_space
 from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..analysis.outcome import Outcome
-from ..model.known_motion import KnownStates, State, required_forces
-from ..model.model import Model, row_values
+from ..model.model import Model
 from ..scene.analysis import TimedAnalysis
 from ..scene.mechanism import MechanismScene
 from ..scene.trajectories import Trajectory
-from ..solve.statics import natural_sizes, static_equilibrium
+from ..solve.statics import Statics
 from ..solve.vibration import without_rows
 from .motion import RobotMotion
 
@@ -35,7 +34,6 @@ GRID, ROUNDS = 2001, 3  # times at which a target is compared with its end, and 
 NEXT = 0.02  # of the run: an instant at which a target changes, this soon after it, ends it exactly
 PERIOD = 800  # times of the last period
 DEPENDENT = 1e-9  # of the largest singular value of rows: below it they depend on others
-STEP = 6e-6  # of natural sizes: central differences of first derivatives
 FLOOR, FREE = 1e-7, 1e-3  # of the largest stiffness, and of stiffnesses above that: less is none
 PARTS = 4  # of an interval between samples
 
@@ -74,13 +72,11 @@ def commanded_rest(commanding: Outcome) -> Rest | None:
     since, end = end_of_paths(model.scene.trajectory, analysis), analysis.last_time
     if not since < commanding.time[-1] or not any(row.is_trajectory for row in model.rows):
         return None
-    q, still = commanding.q[-1].copy(), np.zeros(model.tree.n_v)
+    q = commanding.q[-1]
     if analysis.is_algebraic:
         return Rest(model, q, since, _lowest_frequency(model, q, end))
-    for node in model.tree.nodes:  # straight links, as at the start: those of the run may ring
-        q[node.p_q] = 0.0
     try:
-        q = static_equilibrium(model, State(q, still), end).q
+        q = Statics(model, end).equilibrium(q)
     except (SolveError, InputError):
         return None
     frequency = _lowest_frequency(model, q, end)
@@ -94,25 +90,14 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     """
     from scipy.linalg import eigh
 
-    tree, sizes = model.tree, natural_sizes(model)
-    still, C_v = np.zeros(tree.n_v), row_values(model, q[None], np.array([t]))[1][0] * sizes
-    free = null_space(C_v, DEPENDENT) if len(C_v) else np.eye(tree.n_v)
+    statics, tree = Statics(model, t), model.tree
+    at, still = statics.balance(q, np.arange(tree.n_v)), np.zeros(tree.n_v)
+    free = null_space(at.gradient, DEPENDENT) if len(at.gradient) else np.eye(tree.n_v)
     if not free.shape[1]:
         return float("nan")
-    ways = sizes[:, None] * free
-
-    def forces(q: Array) -> Array:
-        rest = np.zeros((len(q), tree.n_v))
-        return -required_forces(model, KnownStates(q, rest, rest), np.full(len(q), t))
-
-    multipliers = np.linalg.lstsq(C_v.T, forces(q[None])[0] * sizes, rcond=None)[0]
-
-    def left(q: Array) -> Array:
-        held = np.einsum("tij,i->tj", row_values(model, q, np.full(len(q), t))[1], multipliers)
-        return as_floats((forces(q) - held) @ ways)
-
-    K = (left(tree.integrate(q, -STEP * ways.T)) - left(tree.integrate(q, STEP * ways.T))) / (2 * STEP)
-    M = ways.T @ np.linalg.inv(without_rows(model).derivatives(t, q, still, still).a_f) @ ways
+    mobility = without_rows(model).derivatives(t, q, still, still).a_f
+    ways = statics.sizes[:, None] * free
+    K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ np.linalg.inv(mobility) @ ways
     K, M, own = (K + K.T) / 2, (M + M.T) / 2, np.abs(K.diagonal())
     scale = 1.0 / np.sqrt(np.maximum(own, FLOOR * max(own.max(), np.finfo(float).tiny)))
     if np.linalg.eigvalsh(scale[:, None] * K * scale)[0] < FREE:
