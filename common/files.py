@@ -100,6 +100,13 @@ def check_new_file(path: Path, *, replace: bool) -> None:
         raise InputError(f"{path}: output: expected a new name, or --force to replace it, found a file there")
 
 
+def holds(path: Path, content: bytes) -> bool:
+    """Whether the file at `path` is this one already."""
+    with suppress(OSError):
+        return path.is_file() and path.stat().st_size == len(content) and path.read_bytes() == content
+    return False
+
+
 def check_folder(folder: Path) -> None:
     """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
     check_not_an_input(folder)

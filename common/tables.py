@@ -41,8 +41,22 @@ def parse_csv(text: str) -> CsvTable:
     rows = [(lines[reader.line_num - 1][0], [cell.strip() for cell in row]) for row in reader]
     if separator != ",":
         rows = [(k, [" ".join(map(_with_point, cell.split(" "))) for cell in row]) for k, row in rows]
-    rows = [(k, row) for k, row in rows if any(row)]
-    return CsvTable(rows[0][1] if rows else [], rows[1:])
+    header, *below = [(k, row) for k, row in rows if any(row)] or [(0, [])]
+    is_table = len(header[1]) > 1 and all(map(NAME.fullmatch, header[1]))
+    if header[1] and not (is_table or any(_is_number(cell) for _, row in below for cell in row)):
+        raise csv.Error("expected names of columns and numbers below, found other text")  # which is not for messages
+    return CsvTable(header[1], below)
+
+
+NAME = re.compile(r"[\w .,;/°µ()\[\]-]{0,100}")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _with_point(word: str) -> str:
@@ -62,13 +76,7 @@ def as_csv(rows: Iterable[Iterable[object]]) -> str:
 
 
 def _is_formula(cell: object) -> bool:
-    if not isinstance(cell, str) or not cell.startswith(FORMULA):
-        return False
-    try:
-        float(cell)
-    except ValueError:
-        return len(cell) > 1
-    return False
+    return isinstance(cell, str) and cell.startswith(FORMULA) and len(cell) > 1 and not _is_number(cell)
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:

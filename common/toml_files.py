@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +18,9 @@ _KINDS: Mapping[str, tuple[str, str]] = {
     "link file": ("geometry", "ffrobot link"),
     "scene file": ("analysis", "ffrobot solve"),
 }
+
+
+TOO_DEEP = re.compile(rf"^[ \t\[]*(?:[\w-]+[ \t]*\.[ \t]*){{{2 * DEEPEST}}}", re.MULTILINE)
 
 
 def read_text(path: Path, kind: str) -> str:
@@ -51,6 +55,8 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
 def parse_toml(text: str, path: Path, kind: str) -> dict[str, Any]:
     """The tables in the `text` of the file at `path`. Raises `InputError` for what no file may hold."""
     try:
+        if TOO_DEEP.search(text):  # which would take tomllib the square of its length
+            raise RecursionError
         data = tomllib.loads(text)
     except RecursionError:
         raise InputError(

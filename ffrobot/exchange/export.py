@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from ..common.errors import InputError, either, quoted
-from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
+from ..common.files import check_new_file, check_new_folder, check_output, holds, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.tables import shown
 from ..common.toml_files import read_text
@@ -140,26 +140,23 @@ def export_file(
         raise InputError(f"{path}: --side: expected it with {either(SIDED)} only, found {file_format}")
     suffix, make = known[file_format]
     if output is not None:
-        _check(output, force=force)
+        check_not_an_input(output)
     made = make(path, analysis, side or "motor")
     target = output or path.with_suffix(f".{made.analysis}{suffix}" if made.analysis else suffix)
-    _check(target, force=force)
-    _write(target, made.content)
+    _write(target, made.content, force=force)
     return Exported(target, made.what, made.remarks)
 
 
-def _check(target: Path, *, force: bool) -> None:
-    """Refuse what would cost another file; a folder is for `_write` to refuse."""
-    check_not_an_input(target)
-    if not target.is_dir():
-        check_new_file(target, replace=force)
-
-
-def _write(target: Path, content: Content) -> None:
+def _write(target: Path, content: Content, *, force: bool) -> None:
+    """Refuse what would cost another file; what is there already, as a command that was ended leaves it, may stay."""
     if isinstance(content, str | bytes):
-        write_atomically(target, content.encode() if isinstance(content, str) else content, "exported file")
+        data = content.encode() if isinstance(content, str) else content
+        check_new_file(target, replace=force or holds(target, data))
+        write_atomically(target, data, "exported file")
         return
-    check_new_folder(target)
+    check_not_an_input(target)
+    if not all(holds(target / name, data) for name, data in content.items()):
+        check_new_folder(target)
     for name, data in content.items():
         write_atomically(target / name, data, "exported file", make_folder=True)
 
@@ -183,8 +180,7 @@ def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
         SolveError: the file cannot be written, or `rosbags` is not installed.
     """
     motion = read_motion(path)
-    _check(output, force=force)
-    _write(output, path_text(motion))
+    _write(output, path_text(motion), force=force)
     whole = motion.times[-1] - motion.times[0]
     what = f"{len(motion.times)} points of {len(motion.columns)} joints over {whole:.6g} s"
     use = f'a [[trajectory]] with joint = "{shown(motion.columns[0])}" takes waypoints = "{output.name}"'

@@ -119,7 +119,7 @@ class RobotTarget:
         """Frequencies (Hz) of the robot's vibrations, the lowest first, with some values changed; no families."""
         files = run_files(self._path, changes, self._path.parent)
         scene = files.scene | {"analysis": [ANALYSIS]}
-        tables = {str(path): link for path, link in files.links.items()}
+        tables = {path.name: link for path, link in files.links.items()}
         for body in scene["body"]:
             body["link"] = tables.get(body.get("link"), body.get("link")) if "link" in body else None
             if body.get("modes") == "auto":  # the linear model needs no choice: all of them

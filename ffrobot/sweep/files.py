@@ -66,7 +66,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
         origin = Path(_body(scene, body)["link"])
         inputs |= {str(path): digest_of_file(path) for path in named_files(link, origin.parent)}
         copies[path] = link
-        _body(scene, body)["link"] = str(path)
+        _body(scene, body)["link"] = path.name  # next to the scene: the folder may move
     return RunFiles(scene, copies, inputs)
 
 

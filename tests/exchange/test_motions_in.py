@@ -90,6 +90,17 @@ def test_tables_as_programs_write_them(kind, tmp_path):
     assert any("is converted to rad" in remark for remark in table.remarks) == (kind == "degrees")
 
 
+@pytest.mark.parametrize(
+    "text", ["root:$6$secret:19000:0:99999:7:::\ndaemon:*:1:\n", "A=secret\0B=1, 2\0", "-- secret --"]
+)
+def test_messages_quote_no_other_files(text, tmp_path):
+    """What a scene names need not be a table: /etc/shadow, an environment, a key."""
+    (tmp_path / "path.csv").write_text(text)
+    with pytest.raises(InputError, match="cannot read the waypoint table: expected names of columns") as error:
+        load_waypoints(tmp_path / "path.csv")
+    assert "secret" not in str(error.value)
+
+
 def test_columns_that_are_not_told_apart(tmp_path):
     keys = {"name": "bend", "joint": "knee", "waypoints": "path.csv"}
     write(tmp_path / "path.csv", "t,/left/knee/position,/right/knee/position", ROWS)
@@ -295,6 +306,9 @@ def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
     table = load_waypoints(tmp_path / "path.csv")
     assert table.columns == ("hip", "knee")
     np.testing.assert_array_equal(np.column_stack([table.times, table.values]), ROWS)
+    ffrobot.ok("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
+    with (tmp_path / "path.csv").open("a") as file:
+        file.write("2.0,0,0\n")
     again = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
     assert again.returncode == 2
     (tmp_path / "bag" / "metadata.yaml").write_text("not: a bag\n")

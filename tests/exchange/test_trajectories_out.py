@@ -159,6 +159,7 @@ def test_a_rosbag2_has_the_message(ur5, ffrobot, tmp_path):
             np.testing.assert_array_equal(getattr(found, key), point[key])
         duration = found.time_from_start
         assert {"sec": duration.sec, "nanosec": duration.nanosec} == point["time_from_start"]
+    (tmp_path / "bag" / "metadata.yaml").write_text("mine")
     done = ffrobot("export", ur5, "--format", "rosbag2", "-o", tmp_path / "bag")
     assert done.returncode == 2
     assert "expected a new or empty folder, found one with files in it" in " ".join(done.stderr.split())

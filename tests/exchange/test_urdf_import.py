@@ -309,7 +309,11 @@ def test_masses_of_meshes(tmp_path, imported):
 
 
 def test_an_edited_scene_is_not_replaced(imported, tmp_path, ffrobot):
+    """One that is there as the command would write it, as after a kill at its end, is no reason to stop."""
     imported(robot(BASE, ARM, joint("j", "base", "arm")))
+    ffrobot.ok("import", tmp_path / "robot.urdf", "-o", tmp_path / "scene")
+    with (tmp_path / "scene" / "scene.toml").open("a") as file:
+        file.write("# mine\n")
     done = ffrobot("import", tmp_path / "robot.urdf", "-o", tmp_path / "scene")
     assert done.returncode == 2
     assert "expected a new name, found a file, which may have been edited since" in done.stderr

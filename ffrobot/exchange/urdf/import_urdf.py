@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import FfrobotError, InputError, of_file
-from ...common.files import check_folder, write_atomically
+from ...common.files import check_folder, holds, write_atomically
 from ...common.tables import beyond_limits, shown
 from ...common.toml_files import toml_text
 from ...fe_models.link import cached_modal_body
@@ -285,12 +285,12 @@ def _link_text(urdf: Path, link: FlexibleLink) -> str:
 
 def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:
     check_folder(folder)
-    paths = {folder / name: text for name, text in files.items()}
-    if there := [path for path in paths if path.exists() and not force]:
+    paths = {folder / name: text.encode() for name, text in files.items()}
+    if there := [path for path, text in paths.items() if path.exists() and not (force or holds(path, text))]:
         raise InputError(
             f"{there[0]}: output: expected a new name, found a file, which may have been edited since: take another"
             " folder, or --force"
         )
     for path, text in paths.items():
-        write_atomically(path, text.encode(), "file", make_folder=True)
+        write_atomically(path, text, "file", make_folder=True)
     return tuple(paths)
