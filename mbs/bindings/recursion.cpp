@@ -218,7 +218,6 @@ void bind_recursion(nb::module_ &m) {
       .def_ro("Q", &ForcesAtRest::Q, "(n_v) of gravity, elasticity and the scene.")
       .def_ro("value", &ForcesAtRest::value, "(rows) less their targets.")
       .def_ro("C_q", &ForcesAtRest::C_q, "(rows, n_v)")
-      .def_ro("independent", &ForcesAtRest::independent, "Rows that do not depend on others.")
       .def_ro("force", &ForcesAtRest::force, "N, the largest that a joint transmits, or a load.")
       .def_ro("moment", &ForcesAtRest::moment, "N m, the same.");
   bind_body<Planar>(m, "PlanarBody"), bind_body<Spatial>(m, "SpatialBody");

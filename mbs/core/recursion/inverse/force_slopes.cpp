@@ -2,7 +2,6 @@
 
 #include "core/linear/products.h"
 #include "core/recursion/constrained_aba/gradients.h"
-#include "core/recursion/constrained_aba/independent_constraints.h"
 #include "core/recursion/motion/natural_sizes.h"
 #include "core/recursion/motion/scene_forces.h"
 
@@ -98,9 +97,8 @@ ForcesAtRest forces_at_rest(const Mechanism<Space> &m, const Scene &scene, doubl
                             Workspace<Space, double> &w) {
   const auto rows = static_cast<Index>(m.constraints.size());
   AtRest<Space> at(m, scene, t, q, w);
-  ForcesAtRest found{{}, VectorXd(rows), MatrixXd(rows, m.n_v), {}, 0, 0};
+  ForcesAtRest found{{}, VectorXd(rows), MatrixXd(rows, m.n_v), 0, 0};
   if (rows) {
-    found.independent = keep_independent_constraints(m, q.data(), at.still.data(), w);
     std::vector<int> all(static_cast<std::size_t>(m.n_v));
     std::iota(all.begin(), all.end(), 0);
     found.C_q = gradients(m, q.data(), all, w);

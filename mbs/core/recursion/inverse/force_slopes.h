@@ -25,10 +25,9 @@ void add_slopes(const Scene &scene, const double *q, const double *v, Eigen::Mat
 // At rest at q and time t, where what follows a path stands still; Q (n_v) are generalized forces of gravity,
 // elasticity and the scene.
 struct ForcesAtRest {
-  Eigen::VectorXd Q, value;     // value: of constraint equations less their targets
-  Eigen::MatrixXd C_q;          // (constraints, n_v)
-  std::vector<int> independent; // equations that do not depend on others there
-  double force, moment;         // N, N m: the largest that a joint transmits, or a load
+  Eigen::VectorXd Q, value; // value: of constraint equations less their targets
+  Eigen::MatrixXd C_q;      // (constraints, n_v)
+  double force, moment;     // N, N m: the largest that a joint transmits, or a load
 };
 template <class Space>
 ForcesAtRest forces_at_rest(const Mechanism<Space> &m, const Scene &scene, double t, const Eigen::VectorXd &q,
