@@ -70,12 +70,12 @@ class Piecewise:
         return [function.held(self.begin, self.end) for function in made]
 
 
-def shifted(coefficients: Array, s: float) -> Array:
-    """The same polynomials, (order, n) with the highest power first, in powers of x − s (Horner's scheme)."""
-    moved = coefficients.copy()
-    for last in range(len(moved), 1, -1):
+def shifted(coefficients: Array, s: Array | float) -> Array:
+    """The same polynomials, (…, order, n) with the highest power first, in powers of x − s, s (…) (Horner's scheme)."""
+    moved, s = coefficients.copy(), np.asarray(s)[..., None]
+    for last in range(moved.shape[-2], 1, -1):
         for k in range(1, last):
-            moved[k] += s * moved[k - 1]
+            moved[..., k, :] += s * moved[..., k - 1, :]
     return moved
 
 
@@ -89,9 +89,9 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
         total[middles < motion.begin, -1] += weight * motion.first
         total[middles > motion.end, -1] += weight * motion.last
         own = order - motion.coefficients.shape[1]
-        for k in np.flatnonzero((middles > motion.begin) & (middles < motion.end)):
-            piece = int(np.searchsorted(motion.breaks, middles[k])) - 1
-            total[k, own:] += weight * shifted(motion.coefficients[piece], breaks[k] - motion.breaks[piece])
+        k = np.flatnonzero((middles > motion.begin) & (middles < motion.end))
+        piece = np.searchsorted(motion.breaks, middles[k]) - 1
+        total[k, own:] += weight * shifted(motion.coefficients[piece], breaks[k] - motion.breaks[piece])
     return Piecewise(breaks, total)
 
 
