@@ -1,11 +1,15 @@
 # shellcheck shell=bash
 # Sourced by demo.sh and test.sh: installs whatever is missing and leaves the environment in .venv/ at the repo root.
 #
+# Where there are apt and root (or sudo, or nothing is missing) dolfinx, gmsh and Eigen are Debian's packages, elsewhere
+# PyPI's. FFROBOT_SETUP=debian or pip decides otherwise.
+#
 # Each step runs only when what it depends on has changed since it last succeeded; its key is then written to
 # .venv/*.stamp. When nothing has changed no step runs, and neither apt nor pip is called.
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+source scripts/pythons.sh
 
 # What a user's shell may carry that does not belong in here: other Pythons, other install targets, threads in BLAS
 # that slow these small systems down.
@@ -83,40 +87,60 @@ install_packages() {
   "${apt[@]}" update && "${apt[@]}" install -y --no-install-recommends "$@"
 }
 
+# way: debian or pip.
+way() {
+  if [[ ${FFROBOT_SETUP:-} ]]; then
+    printf '%s' "$FFROBOT_SETUP"
+  elif type -P dpkg-query apt-get >/dev/null && { [[ -z $(missing_packages) ]] || ((EUID == 0)) || sudo -v; } 2>/dev/null; then
+    printf debian
+  else
+    printf pip
+  fi
+}
+
+# python_of WAY: the Python that the environment is made of.
+python_of() {
+  if [[ $1 == debian ]]; then
+    printf '%s' "$DEBIAN_PYTHON"
+  else
+    newer_python || die "there is neither apt with root or sudo, nor a Python from 3.12 on with its headers; as root:
+  apt-get install --no-install-recommends ${DEBIAN_PACKAGES[*]}"
+  fi
+}
+
 debian_step() {
-  type -P dpkg-query apt-get >/dev/null ||
-    die "this is no Debian system; ffrobot's FE stage uses Debian's packages (12 or later): ${DEBIAN_PACKAGES[*]}"
   local missing
   mapfile -t missing < <(missing_packages)
   ((${#missing[@]})) || return 0
-  if ((EUID != 0)); then
-    command -v sudo >/dev/null || die "these Debian packages are missing, and there is neither root nor sudo:
-  apt-get install --no-install-recommends ${missing[*]}"
-    sudo -v || die "sudo refused; as root: apt-get install --no-install-recommends ${missing[*]}"
-  fi
   step "installing ${#missing[@]} Debian packages" install_packages "${missing[@]}"
   mapfile -t missing < <(missing_packages)
   ((${#missing[@]} == 0)) || die "apt-get left these packages uninstalled: ${missing[*]}"
 }
 
 make_venv() {
-  "$DEBIAN_PYTHON" -I -m venv --system-site-packages .venv && .venv/bin/python -m pip --version
+  local options=()
+  [[ $WAY == pip ]] || options=(--system-site-packages)
+  "$PYTHON" -I -m venv "${options[@]}" .venv && .venv/bin/python -m pip --version
 }
 
-# What pyproject.toml asks for, with figures and reports, but numpy, scipy and h5py: those have to be Debian's, which
-# dolfinx and its HDF5 go with. pip is told of them as constraints only, since it does not recognise Debian's h5py.
+# What pyproject.toml asks for, with figures and reports. With Debian's dolfinx numpy, scipy and h5py have to be Debian's,
+# too, which go with its HDF5. pip is told of them as constraints only, since it does not recognise Debian's h5py.
 install_dependencies() {
-  .venv/bin/python -I - <<'PYTHON' || return
+  .venv/bin/python -I - "$WAY" <<'PYTHON' || return
 import re
+import sys
 import tomllib
 from importlib.metadata import distributions
 from pathlib import Path
 
-from_debian = {"numpy", "scipy", "h5py"}
+is_debian = sys.argv[1] == "debian"
+from_debian = {"numpy", "scipy", "h5py"} if is_debian else set()
 project = tomllib.loads(Path("pyproject.toml").read_text())
 extras = project["project"]["optional-dependencies"]
 wanted = project["build-system"]["requires"] + project["project"]["dependencies"] + extras["plot"] + extras["report"]
-wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in from_debian]
+wanted += [] if is_debian else [*extras["fem"], "cmake>=3.20", "ninja"]
+left_out = from_debian | {"cmeel-eigen"} if is_debian else set()
+wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in left_out]
 Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
 Path(".venv/test_requirements.txt").write_text("\n".join(extras["docs"] + extras["test"] + extras["view"]) + "\n")
 
@@ -135,21 +159,27 @@ install_test_packages() {
 
 # Python files are seen as they are edited; C++ sources and new files are taken in here.
 build_package() {
-  .venv/bin/python -m pip install --no-deps --no-build-isolation -e .
+  local site
+  site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+  PATH="$PWD/.venv/bin:$PATH" CMAKE_PREFIX_PATH=$site .venv/bin/python -m pip install --no-deps --no-build-isolation -e .
 }
+
+# Forms that links need, so that none of them waits for a compiler.
+compile_forms() { .venv/bin/python -m ffrobot.fe_models.forms; }
 
 # The environment as a user of .venv/bin/ffrobot will find it.
 check_environment() {
-  env -u PYTHONNOUSERSITE .venv/bin/python - <<'PYTHON'
+  env -u PYTHONNOUSERSITE .venv/bin/python - "$WAY" <<'PYTHON'
 import sys
 from importlib.util import find_spec
 
-for name in ("numpy", "scipy", "h5py"):
+for name in ("numpy", "scipy", "h5py") if sys.argv[1] == "debian" else ():
     origin = find_spec(name).origin
     if not origin.startswith("/usr/lib/python3/dist-packages/"):
         sys.exit(f"{origin} hides Debian's {name}, which dolfinx goes with: uninstall it")
 
-import dolfinx, gmsh, h5py, meshio, numpy, scipy
+import gmsh, h5py, meshio, numpy, scipy
+import ffrobot.mesh.compat
 from petsc4py import PETSc
 
 if numpy.issubdtype(PETSc.ScalarType, numpy.complexfloating):
@@ -162,22 +192,32 @@ PYTHON
 # What the compiled core and the installed file list depend on.
 build_key() {
   {
-    printf '%s\n' "${CXX:-}" "${CXXFLAGS:-}" "$FFROBOT_NATIVE"
+    printf '%s\n' "${CXX:-}" "${CXXFLAGS:-}" "$FFROBOT_NATIVE" "$WAY"
     find ffrobot common mesh fe_models mbs actuation -name '*.py' -o -name '*.pyi' | LC_ALL=C sort
     find mbs CMakeLists.txt pyproject.toml '(' -name '*.h' -o -name '*.cpp' -o -name 'CMakeLists.txt' \
       -o -name pyproject.toml ')' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum
   } | digest
 }
 
+# What defines the forms.
+forms_key() { cat fe_models/forms.py fe_models/beam/dolfinx_forms.py fe_models/solid/{elasticity,functionals}.py | digest; }
+
 setup() {
   exec 9<.
   flock 9 # one set-up at a time in this folder
-  debian_step
+  WAY=$(way)
+  PYTHON=$(python_of "$WAY")
+  if [[ $WAY == debian ]]; then
+    debian_step
+  fi
 
   local venv_key dependencies_key
-  venv_key="$PWD $(readlink -f "$DEBIAN_PYTHON") $(digest <scripts/setup.sh)"
+  venv_key="$PWD $(readlink -f "$PYTHON") $(digest <scripts/setup.sh)"
   if [[ ! -f .venv/venv.stamp || $(<.venv/venv.stamp) != "$venv_key" ]] || ! .venv/bin/python -c '' 2>/dev/null; then
     rm -rf .venv
+  fi
+  if [[ ! -f .venv/venv.stamp ]]; then
+    printf 'set-up: finite elements from %s\n' "$([[ $WAY == debian ]] && printf "Debian's packages" || printf 'PyPI, %s' "$("$PYTHON" -V)")"
   fi
   once venv "$venv_key" "making the virtual environment .venv" make_venv
 
@@ -186,6 +226,7 @@ setup() {
   [[ -z ${WITH_TEST_PACKAGES:-} ]] || once tests "$dependencies_key" "installing what the tests need" install_test_packages
   once build "$(build_key) $dependencies_key" "building ffrobot" build_package
   once check "$(<.venv/build.stamp)" "checking the environment" check_environment
+  once forms "$dependencies_key $(forms_key)" "compiling finite element forms" compile_forms
   exec 9<&-
 }
 
