@@ -23,6 +23,13 @@ FFROBOT_INLINE void superposed(const Workspace<Space, T> &w, int slot, const Pac
   sums(products, to);
 }
 
+// What an active constraint equation prescribes of a freedom of the node's joint; null: none does
+template <class Space, class T>
+FFROBOT_INLINE const T *prescribed(const Node<Space> &node, const Hinge<Space, T> &hinge, const Workspace<Space, T> &w,
+                                   int freedom) {
+  return node.has_constraints && w.target && hinge.row[freedom] >= 0 ? w.target + hinge.row[freedom] : nullptr;
+}
+
 // Acceleration A of the section (in: as if the joint were stiff) and a of the joint; the force on the ground of a body
 // that is alone. Coordinates that constraint equations prescribe do exactly what these say: sums of what multipliers
 // and loads do to them are rounding, which sections with next to no inertia, as those of cantilever modes, amplify.
@@ -40,8 +47,8 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
   for (int k = 0; k < node.shape.freedoms.count; ++k) {
     const int f = node.shape.freedoms.component[k];
     const T before = A[f];
-    if (const int row = W > 1 && w.target && !node.shape.in_inner_axes ? hinge.row[k] : -1; row >= 0) {
-      x[k] = w.target[row];
+    if (const T *target = W > 1 ? prescribed(node, hinge, w, k) : nullptr; target && !node.shape.in_inner_axes) {
+      x[k] = *target;
       A[f] = before + x[k];
       continue;
     }
@@ -65,7 +72,10 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
       x[k] = turned[k];
   }
   for (int k = 0; k < node.shape.freedoms.count; ++k)
-    a[k] = W > 1 && w.target && hinge.row[k] >= 0 ? w.target[hinge.row[k]] : x[k];
+    if (const T *target = W > 1 ? prescribed(node, hinge, w, k) : nullptr)
+      a[k] = *target;
+    else
+      a[k] = x[k];
 }
 
 // Accelerations of ports, and forces f on those that modes move or that carry a joint, whose forces steps are judged

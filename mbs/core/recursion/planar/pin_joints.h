@@ -287,20 +287,20 @@ FFROBOT_INLINE void accelerate_pin(const Mechanism<Planar> &m, std::size_t i_nod
     hinge.f[0] = -(superposed<Planar, T, W>(w, node.ground_slot(), y) + xx * Ax + xy * Ay);
     hinge.f[1] = -(superposed<Planar, T, W>(w, node.ground_slot() + 1, y) + xy * Ax + yy * Ay);
   }
-  constexpr int tilt = planar::Body::TILT;
-  const int row = W > 1 && w.target ? hinge.row[0] : -1;
-  const T Aa = row >= 0 && !body.is_tilted
-                   ? T(P_rotation + w.target[row])
-                   : -(superposed<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
-  a[node.v] = row >= 0 ? w.target[row] : T(Aa - P_rotation);
+  T Aa = -(superposed<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
+  const T *target = W > 1 ? prescribed(node, hinge, w, 0) : nullptr;
+  if (target && !body.is_tilted)
+    Aa = P_rotation + *target;
+  a[node.v] = Aa - P_rotation;
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
+  constexpr int tilt = planar::Body::TILT;
   const bool constraints_on_modes = W > 1 && body.is_tilted && node.has_constraints;
   const T on_modes = constraints_on_modes ? multiplier_force<T, W>(m, node, 0, w, y) : T(0.); // by multipliers
   const T on_port = by_multipliers ? T(0.) : s.on_port;
   T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), on_port, by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard)
     accelerate_port_of_pin<by_multipliers, T, W>(node, Ax, Ay, Aa, on_modes, on_port, constraints_on_modes, w, y, z);
-  if (body.is_tilted && row < 0) {
+  if (body.is_tilted) {
     a[node.v] += s.gram_of_block(tilt, 3) * z[3] + s.gram_of_block(tilt, 4) * z[4] - s.gram_of_block(tilt, 0) * Ax -
                  s.gram_of_block(tilt, 1) * Ay - s.gram_of_block(tilt, 2) * Aa;
     if (constraints_on_modes)
@@ -310,6 +310,8 @@ FFROBOT_INLINE void accelerate_pin(const Mechanism<Planar> &m, std::size_t i_nod
     if (body.has_more)
       a[node.v] -= s.WH[tilt] * Aa;
   }
+  if (target)
+    a[node.v] = *target;
   if (body.n)
     modes_of_pin<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
 }
