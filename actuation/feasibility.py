@@ -74,7 +74,8 @@ def quasi_static_shift(motion: RobotMotion, modal: Mapping[str, Array], points: 
     twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
     """
     shift = _held(motion, modal).shift
-    return {point: np.einsum("tkn,tn->tk", motion.section(point).L[:, :3], shift) for point in points}
+    places = motion.model.tree.places(motion.q, shift)
+    return {point: places.at(motion.model.tree.section(point)).velocity for point in points}
 
 
 def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
@@ -86,7 +87,8 @@ def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, row
     shift, R = _held(motion, modal, rows)
     MR = mass_matrices(motion.model, motion.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])
-    return np.einsum("tik,tk->ti", motion.section(point).L[rows, :3], shift - (R @ gamma)[:, :, 0])
+    tree, freed = motion.model.tree, shift - (R @ gamma)[:, :, 0]
+    return tree.places(motion.q[rows], freed).at(tree.section(point)).velocity
 
 
 def seen_at_points(

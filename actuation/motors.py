@@ -11,8 +11,8 @@ from ..common.peaks import largest, root_mean_square, shares
 from ..common.structs import struct
 from ..mbs._core import TimeFunction
 from ..mbs.joints.joint import MotorLimits
-from ..mbs.model.gears import rotor
 from ..mbs.model.known_motion import mass_matrices
+from ..mbs.model.nodes import rotor
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
 

@@ -236,7 +236,7 @@ def solve_points(chosen: PointSet, run: Outcome) -> PointForces:
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[:, :1], axis=1).min())
     condition = float((sizes[:, 0] / sizes[:, -1]).max())
     if (space := SPACES[run.model.scene.space]).is_plane:
-        F = run.model.tree.poses(run.q)[run.model.tree.index[chosen.body]].F
+        F = run.model.tree.places(run.q).frame(run.model.tree.index[chosen.body]).F
         on_frame = np.einsum("tij,tj->ti", F, unmet[:, :3]), unmet[:, 3:6]
         unmet = np.column_stack([space.along(on_frame[0]), space.about(on_frame[1]), unmet[:, 6:]])
     return PointForces(force, unmet, residual, rank, condition)
@@ -256,9 +256,9 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Outcome) -> dict[str, 
                 f'{run.model.scene.path}: analysis "{run.analysis.name}": expected [[actuation_points]] on every body'
                 f' that trajectories drive or that has a prescribed shape, found none on "{body}"'
             )
-    poses = tree.poses(run.q)
+    places = tree.places(run.q)
     for body, points in chosen.items():
-        F = poses[tree.index[body]].F
+        F = places.frame(tree.index[body]).F
         force = solve_points(points, run).force
         for k, name in enumerate(points.names):
             found[f"{body}.{name}"] = force[:, k : k + 1] * (F @ points.direction[:, k])

@@ -97,10 +97,10 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from ffrobot.common.rotations import exponential, of_quaternion, quaternions
+from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.field_types import Vector2, Vector3
 from ffrobot.mbs.fields.spelling import Spelled, place
-from ffrobot.mbs.joints.joint import Along, LoopEquation, Place
+from ffrobot.mbs.joints.joint import Along, LoopEquation
 from ffrobot.mbs.joints.moving_joint import AxialJoint
 
 
@@ -117,13 +117,6 @@ class SlotJoint(AxialJoint):
     loop_equations = (LoopEquation("slide", 0), LoopEquation("slide", 1))
     along = (Along("slide", 2),)
     locates: ClassVar[bool] = False  # it leaves a place open: loops are cut here
-
-    def place(self, q):
-        return Place(q[..., :1] * np.eye(3)[2], of_quaternion(q[..., 1:]))
-
-    def motion(self, q):
-        turning = np.concatenate([np.zeros((*q.shape[:-1], 3, 3)), of_quaternion(q[..., 1:])], axis=-2)
-        return np.concatenate([np.broadcast_to(np.eye(6)[:, 2:3], (*q.shape[:-1], 6, 1)), turning], axis=-1)
 
     def state(self, coordinates):
         return np.concatenate([coordinates, quaternions(exponential(np.zeros(3)))])

@@ -304,8 +304,7 @@ def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str)
 
 
 def _position(model: Model, q: Array, point: str) -> Array:
-    tree = model.tree
-    return tree.pose(tree.section(point), q, tree.poses(q)).r
+    return model.tree.places(q).at(model.tree.section(point)).r
 
 
 def _default_tip(model: Model) -> str:

@@ -17,23 +17,23 @@ from ...mbs.analysis.gears import with_motor_coordinates
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
-from ...mbs.model.model import Model, build_model, row_values
+from ...mbs.model.model import Model, build_model, constraint_values
+from ...mbs.model.parts import ZERO
 from ...mbs.model.rows import rows_of_joint
-from ...mbs.model.system import ZERO, MultibodySystem
+from ...mbs.model.system import MultibodySystem
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
+from ...mbs.solve.posture import MET, posture_search
 from ...mbs.solve.start import undeformed_posture
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
 from .signals import check_joint, volts_on_file
 
-TOLERANCE, MOST_ITERATIONS = 1e-10, 20
-
 
 def rigid_freedom(model: Model) -> int:
     """How many independent joint coordinates the mechanism with rigid links has where it starts."""
     joints, q = model.tree.joint_columns, undeformed_posture(model).q
-    C_v = row_values(model, q[None], np.zeros(1))[1][0][model.loop_rows][:, joints]
+    C_v = constraint_values(model, q[None], np.zeros(1))[1][0][model.loop_rows][:, joints]
     return int(np.count_nonzero(joints)) - int(np.linalg.matrix_rank(C_v) if C_v.size else 0)
 
 
@@ -62,7 +62,7 @@ class RigidArm:
         ]
         self._model = replace(free, rows=(*free.rows, *motors))
         self._motors = np.arange(len(free.rows), len(free.rows) + len(motors))
-        self._turns = [k for k, row in enumerate(self._model.rows) if row.kind == "turn"]  # values within ±π
+        self._search = posture_search(self._model)
         self._system = MultibodySystem(self._model)
         self._q: Array = np.zeros(free.tree.n_q)
         for own, node in zip(free.tree.nodes, model.tree.nodes, strict=True):
@@ -70,28 +70,24 @@ class RigidArm:
 
     def angles(self) -> Array:
         """(motors,) where it stands."""
-        return row_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
+        return constraint_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
-        """Coordinates q (n_q,) and C_v at motor angles gamma, by Newton from the last place.
+        """Coordinates q (n_q,) and C_v at motor angles gamma, from the last place.
 
         Raises `SolveError` where the links do not reach these angles.
         """
-        q = self._q
-        for _ in range(MOST_ITERATIONS):
-            values, gradients = row_values(self._model, q[None], np.zeros(1))
-            C, C_v = values[0], gradients[0]
-            C[self._motors] -= gamma
-            C[self._turns] -= 2 * np.pi * np.round(C[self._turns] / (2 * np.pi))
-            if np.abs(C).max() < TOLERANCE:
-                self._q = q
-                return q, C_v
-            q = self._model.tree.integrate(q, -np.linalg.pinv(C_v) @ C)
-        raise SolveError(
-            f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have, found"
-            f" {np.round(gamma, 6)}, {np.abs(C).max():.2g} (rad, m) from such after {MOST_ITERATIONS} steps: smaller"
-            " steps of the path, or a loop that stays nearer to it"
-        )
+        beside, now = np.zeros((1, len(self._model.rows))), np.zeros(1)
+        beside[0, self._motors] = gamma
+        q, left = self._model.constraints.postures(self._q[None], now, self._search, beside)
+        if not left[0] <= MET:
+            raise SolveError(
+                f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have, found"
+                f" {np.round(gamma, 6)}, {left[0]:.2g} (rad, sizes of the robot) from such: smaller steps of the path,"
+                " or a loop that stays nearer to it"
+            )
+        self._q = q[0]
+        return self._q, constraint_values(self._model, q, now)[1][0]
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
         """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""

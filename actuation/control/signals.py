@@ -14,8 +14,9 @@ from ...mbs.analysis.context import WholeLinks, place_of
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.known_motion import KnownStates, motion_forces
 from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.nodes import Section
 from ...mbs.model.system import MultibodySystem
-from ...mbs.model.tree import KinematicTree, Section
+from ...mbs.model.tree import KinematicTree
 from ...mbs.scene.space import SPACES
 from ...mbs.solve.linearisation import labelled
 from ..patches.link_patches import LinkPatches
@@ -74,13 +75,13 @@ class Sensing:
         found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
         if not self._points:
             return found
-        frames, forces = self._tree.frames(q), None
+        places, forces = self._tree.places(q, v), None
         if self._system is not None:
             none = np.zeros((len(q), len(self._system.model.rows)))
             forces = motion_forces(self._system, KnownStates(q, v, a), np.zeros(len(q)), none)
         for point, section, columns in self._points:
-            at = self._tree.motion(section, q, frames)
-            orders = [at.r, np.einsum("tij,tj->ti", at.L[:, :3], v)]
+            at = places.at(section)
+            orders = [at.r, at.velocity]
             if forces is not None:
                 orders.append(forces.of_point(point).a)
             for k, order, axis in columns:

@@ -67,10 +67,10 @@ def _in(value: float, unit: str) -> str:
 
 def _points(model: Model, q: Array) -> Iterator[tuple[str, str, str]]:
     """Points of paths, and tools with their orientation, in the plane by yaw alone."""
-    tree, frames, space = model.tree, model.tree.frames(q[None]), SPACES[model.scene.space]
+    tree, places, space = model.tree, model.tree.places(q[None]), SPACES[model.scene.space]
     tools = [tool.reference for tool in model.scene.tool]
     for point in dict.fromkeys([*(path.point for path in model.scene.trajectory if path.point is not None), *tools]):
-        pose = tree.pose(tree.section(point), q[None], frames)
+        pose = places.at(tree.section(point))
         angles = rpy_of(pose.F[0])[2:] if space.is_plane else rpy_of(pose.F[0])
         turned = ", ".join(_in(angle, "rad") for angle in angles) if point in tools else ""
         yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in space.along(pose.r[0])), turned

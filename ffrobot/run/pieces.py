@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ..fe_models.link_records.families import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import BodyPoint
 from ..mbs.model.divided_link import spread_of
+from ..mbs.model.kinematics import Motion
 from ..mbs.model.motors import MotorForces
 from ..mbs.quantities.attachment_error import PieceInMotion, missed_by_pieces
 from ..mbs.quantities.motion import BodyMotion, PointMotion, RobotMotion, continuous
@@ -48,16 +50,6 @@ class Divided:
     pieces: tuple[ModalBody, ...]
     to_own: Array
     points: Mapping[str, BodyPoint]
-
-
-@struct
-class SectionMotion:
-    """A section over time: place r (T, 3), axes A (T, 3, 3), their velocity (T, 3) and angular velocity (T, 3)."""
-
-    r: Array
-    A: Array
-    r_dot: Array
-    omega: Array
 
 
 @struct
@@ -210,57 +202,55 @@ def _shortening(solution: Solution, name: str) -> float:
 def _motion_of_link(motion: RobotMotion, link: Divided) -> BodyMotion:
     """Of the frame of the one link, and of the modes of its file."""
     x = link.modal.stations.position[:, 0]
-    sections = [_section(motion, link, at) for at in x]
+    sections = _sections(motion, link, x)
     root, tip = sections[int(np.argmin(x))], sections[int(np.argmax(x))]
     holds_root = link.modal.reference_condition in HOLDING_ROOT
-    A, omega = (root.A, root.omega) if holds_root else _along_chord(root, tip)
+    A, omega = (root.F, root.omega) if holds_root else _along_chord(root, tip)
     u, u_dot = (np.zeros((len(x), 4, len(root.r))) for _ in range(2))
     for k, at in enumerate(sections):
-        arm, rate = at.r - root.r, at.r_dot - root.r_dot
-        phi = logarithm(np.swapaxes(A, -1, -2) @ at.A)
+        arm, rate = at.r - root.r, at.velocity - root.velocity
+        phi = logarithm(np.swapaxes(A, -1, -2) @ at.F)
         spin = _seen_from(A, at.omega - omega)
         u[k, :3] = (_seen_from(A, arm) - x[k] * X).T
         u_dot[k, :3] = _seen_from(A, rate - np.cross(omega, arm)).T
         u[k, 3] = link.modal.length * phi[:, 0]
         u_dot[k, 3] = link.modal.length * np.linalg.solve(left_jacobian(phi), spin[:, :, None])[:, 0, 0]
     p, p_dot = (_nearest_shape(link.modal, each) for each in (u, u_dot))
-    return BodyMotion(root.r, continuous(quaternions(A)), root.r_dot, omega, p, p_dot)
+    return BodyMotion(root.r, continuous(quaternions(A)), root.velocity, omega, p, p_dot)
 
 
-def _section(motion: RobotMotion, link: Divided, x: float) -> SectionMotion:
-    """Of the section at x (m from the root of the link); to second order in p at the ends of pieces, where K is."""
-    starts, names = link.body.cut.starts, link.body.names
-    k = int(np.clip(np.searchsorted(starts, x, side="right") - 1, 0, len(names) - 1))
-    at = link.pieces[k].interpolate(min(x - starts[k], link.pieces[k].length))
-    for end, interface in link.pieces[k].interfaces.items():
-        if abs(interface.position[0] - at.position[0]) < AT_END * link.modal.length:
-            found = motion.section(f"{names[k]}.{end}")
-            rates = np.einsum("tij,tj->ti", found.L, motion.v)
-            return SectionMotion(found.r, found.F, rates[:, :3], rates[:, 3:])
-    node, frame = motion.node(names[k]), motion.frames[motion.model.tree.index[names[k]]]
-    Phi, Phi_r = at.translation @ node.body.modal_transform, at.rotation @ node.body.modal_transform
-    p, p_dot = motion.q[:, node.p_q], motion.v[:, node.p_v]
-    velocity = np.einsum("tij,tj->ti", frame.L, motion.v)
-    arm, phi = np.einsum("tij,tj->ti", frame.F, at.position + p @ Phi.T), p @ Phi_r.T
-    turning = np.einsum("tij,tj->ti", left_jacobian(phi), p_dot @ Phi_r.T)
-    r_dot = velocity[:, :3] + np.cross(velocity[:, 3:], arm) + np.einsum("tij,tj->ti", frame.F, p_dot @ Phi.T)
-    omega = velocity[:, 3:] + np.einsum("tij,tj->ti", frame.F, turning)
-    return SectionMotion(frame.r + arm, frame.F @ exponential(phi), r_dot, omega)
+def _sections(motion: RobotMotion, link: Divided, stations: Array) -> list[Motion]:
+    """Of the sections at `stations` (m from the root); to second order at the ends of pieces, where K is."""
+    starts, names, tree = link.body.cut.starts, link.body.names, motion.model.tree
+    bodies, found = {node.body.name: node.body for node in tree.nodes}, list[str]()
+    for x in stations.tolist():
+        k = int(np.clip(np.searchsorted(starts, x, side="right") - 1, 0, len(names) - 1))
+        at, body = link.pieces[k].interpolate(min(x - starts[k], link.pieces[k].length)), bodies[names[k]]
+        ends = link.pieces[k].interfaces.items()
+        near = (end for end, of in ends if abs(of.position[0] - at.position[0]) < AT_END * link.modal.length)
+        point, T = next(near, f"station {x}"), body.modal_transform
+        if point not in body.points:
+            place = BodyPoint(at.position, at.translation @ T, at.rotation @ T)
+            bodies[names[k]] = replace(body, points=MappingProxyType({**body.points, point: place}))
+        found.append(f"{names[k]}.{point}")
+    moving = tree.with_bodies(tuple(bodies.values()))
+    places = moving.places(motion.q, motion.v)
+    return [places.at(moving.section(point)) for point in found]
 
 
-def _along_chord(root: SectionMotion, tip: SectionMotion) -> tuple[Array, Array]:
+def _along_chord(root: Motion, tip: Motion) -> tuple[Array, Array]:
     """Axes (T, 3, 3) with x along the chord, in which the section at the root is not twisted, and their spin (T, 3).
 
     With the section at exp(φ~) from these axes, φ₁ = 0 at all times: with the spin c × ċ + α c, α follows from φ̇₁ = 0.
     """
-    d, d_dot = tip.r - root.r, tip.r_dot - root.r_dot
+    d, d_dot = tip.r - root.r, tip.velocity - root.velocity
     size = np.linalg.norm(d, axis=1)[:, None]
     c = d / size
     c_dot = (d_dot - c * np.sum(c * d_dot, axis=1)[:, None]) / size
-    across = np.cross(root.A[:, :, 0], c)
-    sine, cosine = np.linalg.norm(across, axis=1), np.sum(root.A[:, :, 0] * c, axis=1)
+    across = np.cross(root.F[:, :, 0], c)
+    sine, cosine = np.linalg.norm(across, axis=1), np.sum(root.F[:, :, 0] * c, axis=1)
     turn = across * np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
-    A = as_floats(exponential(turn) @ root.A)
+    A = as_floats(exponential(turn) @ root.F)
     J = left_jacobian(-_seen_from(A, turn))
     swing = np.cross(c, c_dot)
     left, of_x = (np.linalg.solve(J, b[:, :, None])[:, 0, 0] for b in (_seen_from(A, root.omega - swing), 0 * c + X))

@@ -13,7 +13,7 @@ from ..mbs.analysis.context import WholeLinks
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.divided_link import DividedLink, PieceOfLink, divided_link_of
 from ..mbs.model.model import Model
-from ..mbs.model.tree import Node
+from ..mbs.model.nodes import Node
 from ..scene.pieces import places_on_pieces
 from .pieces import MotionOfLinks, divided_links
 from .solution import Solution

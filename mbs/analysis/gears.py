@@ -19,11 +19,11 @@ from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ..joints.twist_spring import TwistSpring
 from ..model.frame_motors import turning_motors
-from ..model.gears import compliance, elastic_joints, rotor, with_compliance
+from ..model.gears import compliance, elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.model import Model
 from ..model.motors import MotorForces, motor_forces
-from ..model.tree import Node
+from ..model.nodes import Node, rotor
 from .outcome import GearMotion, Outcome
 from .replay import supplied_in
 

@@ -15,7 +15,7 @@ from ...common.arrays import Array
 from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
-from ..model.model import Model, row_values
+from ..model.model import Model, constraint_values
 from ..model.motors import (
     MotorForces,
     driven_mechanism,
@@ -167,7 +167,7 @@ def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:
     model, times, q = source.model, run.time[now], run.q[now]
     if not len(times):
         return
-    share = np.abs(row_values(model, q, times)[0]) / row_sizes(model)
+    share = np.abs(constraint_values(model, q, times)[0]) / row_sizes(model)
     for path in dict.fromkeys(row.owner for row in model.rows if row.is_trajectory):
         off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
         if off.max() > OFF_PATH:

@@ -5,6 +5,7 @@
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -92,6 +93,18 @@ double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const 
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / repetitions;
 }
 
+template <class Space> void check_states(const Model<Space> &model, const RowMajor &q, const RowMajor &v) {
+  check_size("states", v.rows(), q.rows());
+  check_size("q", q.cols(), model.mechanism.n_q), check_size("v", v.cols(), model.mechanism.n_v);
+}
+
+template <class Space>
+void check_postures(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                    const RowMajor &q) {
+  check_scene(model, scene);
+  check_size("times", static_cast<Index>(times.size()), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
+}
+
 template <class Space> void bind_body(nb::module_ &m, const char *name) {
   using Body = BodyModel<typename Space::Data>;
   nb::class_<Body>(m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/mechanism/model.h.")
@@ -173,6 +186,65 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
             return frame_motions(model.mechanism, q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Motion of all frames, accelerations those of the last evaluation.")
+      .def(
+          "motions",
+          [](Model<Space> &model, const RowMajor &q, const RowMajor &v) {
+            check_states(model, q, v);
+            return motions_of_states(model.mechanism, q, v, model.w);
+          },
+          "q"_a, "v"_a,
+          "(T, 18 (bodies + wrenches)) of states q (T, n_q), v (T, n_v): position (m), axes (3, 3) row by row, "
+          "velocity "
+          "and\nangular velocity of frames, which may sit at joints, and of sections on which wrenches may act.")
+      .def(
+          "moved",
+          [](const Model<Space> &model, RowMajor q, const RowMajor &step) {
+            check_states(model, q, step);
+            const ConfigurationSpace space(model.mechanism.n_v, model.mechanism.rotations);
+            for (Index i = 0; i < q.rows(); ++i)
+              space.integrate(q.row(i).data(), 1, step.row(i).data(), q.row(i).data());
+            return q;
+          },
+          "q"_a, "step"_a, "q (T, n_q) moved by steps along v (T, n_v), orientations along rotation vectors.")
+      .def(
+          "constraints",
+          [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q) {
+            check_postures(model, scene, times, q);
+            return Postures<Space>(model.mechanism, scene, model.w).constraints(times, q);
+          },
+          "scene"_a, "times"_a, "q"_a,
+          "Values of rows less targets (T, rows), less full turns, and C_v (T, rows n_v) at times (T) and q (T, n_q).")
+      .def(
+          "constraint_rates",
+          [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
+             const RowMajor &v) {
+            check_postures(model, scene, times, q), check_states(model, q, v);
+            return Postures<Space>(model.mechanism, scene, model.w).rates(times, q, v);
+          },
+          "scene"_a, "times"_a, "q"_a, "v"_a, "Rates of rows less those of targets (T, rows).")
+      .def(
+          "postures",
+          [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
+             const RowMajor &beside, const VectorXd &scales, const VectorXd &sizes, double largest_step) {
+            check_postures(model, scene, times, q);
+            check_size("scales", scales.size(), model.mechanism.n_v), check_size("sizes", sizes.size(), model.rows());
+            if (beside.size())
+              check_size("beside", beside.rows(), q.rows()), check_size("beside", beside.cols(), model.rows());
+            return Postures<Space>(model.mechanism, scene, model.w)
+                .solve(times, q, beside, {scales, sizes, largest_step});
+          },
+          "scene"_a, "times"_a, "q"_a, "beside"_a, "scales"_a, "sizes"_a, "largest_step"_a,
+          "q (T, n_q) moved onto the rows at times (T), and what is left (T) in natural sizes: see "
+          "mbs/core/recursion/inverse/postures.h.")
+      .def(
+          "without_work",
+          [](Model<Space> &model, const RowMajor &q, const RowMajor &forces) {
+            check_size("forces", forces.rows(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
+            check_size("forces", forces.cols(), Space::dim * static_cast<Index>(model.mechanism.nodes.size()));
+            return without_work(model.mechanism, q, forces, model.w);
+          },
+          "q"_a, "forces"_a,
+          "(T, dim bodies) what of forces with moments on outer sections of joints does no work along coordinates.")
       .def("required_forces", &required_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "M a - Q (T, n_v) along v at states q (T, n_q), v and a (T, n_v): what gravity, elasticity, damping and the "
            "forces of the scene leave for others.")
@@ -191,8 +263,7 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
           "states_totals",
           [](const Model<Space> &model, const Scene &scene, const RowMajor &q, const RowMajor &v) {
             check_scene(model, scene);
-            check_size("states", v.rows(), q.rows());
-            check_size("q", q.cols(), model.mechanism.n_q), check_size("v", v.cols(), model.mechanism.n_v);
+            check_states(model, q, v);
             return totals_of_states(model.mechanism, scene, q, v);
           },
           "scene"_a, "q"_a, "v"_a,

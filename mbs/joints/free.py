@@ -5,9 +5,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.rotations import exponential, of_quaternion, quaternions
+from ...common.rotations import exponential, quaternions
 from ..fields.spelling import SPATIAL
-from .joint import JointRecord, Place
+from .joint import JointRecord
 
 
 class FreeJoint(JointRecord):
@@ -26,16 +26,6 @@ class FreeJoint(JointRecord):
     freedoms = 6
     loop_equations = ()
     locates: ClassVar[bool] = False
-
-    def place(self, q: Array) -> Place:
-        """At q[:3], turned by the quaternion q[3:]."""
-        return Place(q[..., :3], of_quaternion(q[..., 3:]))
-
-    def motion(self, q: Array) -> Array:
-        """v: the velocity in axes of the inner triad, the angular velocity in those of the outer one."""
-        found = np.zeros((*q.shape[:-1], 6, 6))
-        found[..., :3, :3], found[..., 3:, 3:] = np.eye(3), of_quaternion(q[..., 3:])
-        return found
 
     def state(self, coordinates: Array) -> Array:
         """Place, and the quaternion of a rotation vector."""

@@ -1,4 +1,4 @@
-"""What all types of joints have in common: two triads, and how the outer one stands on the inner one.
+"""What all types of joints have in common: two triads, and how the scene counts the coordinates between them.
 
 Triads coincide where the coordinates are zero. Motion is along and about z, of universal joints about x of the inner
 triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the core's (mbs/core/recursion/joint): of
@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.rotations import about, of_rpy
+from ...common.rotations import of_rpy
 from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import (
@@ -55,13 +55,6 @@ class Friction:
 
 RecordType = type[Record]  # `type` is a key below
 Angles = tuple[Quantity, Quantity, Quantity]
-
-
-class Place(NamedTuple):
-    """The outer triad on the inner one: way d (…, 3) and axes C (…, 3, 3), columns, in axes of the inner one."""
-
-    d: Array
-    C: Array
 
 
 class LoopEquation(NamedTuple):
@@ -188,28 +181,6 @@ class JointRecord(Record):
         """The triads on the inner side and on the outer one, which is the first of `between` if `backwards`."""
         first, second = self.triads()
         return (second, first) if backwards else (first, second)
-
-    @property
-    def subspace(self) -> Array:
-        """S (6, freedoms), `motion` of a joint that moves alike everywhere: along all axes, about z."""
-        return np.eye(6)[:, list(self.axes)]
-
-    def place(self, q: Array) -> Place:
-        """Where q (…, q_count) puts the outer triad."""
-        moved = q @ self.subspace.T
-        return Place(moved[..., :3], about(2, moved[..., 5]))
-
-    def motion(self, q: Array) -> Array:
-        """(…, 6, freedoms): velocity and angular velocity of the outer triad by v, in axes of the inner one."""
-        return np.broadcast_to(self.subspace, (*q.shape[:-1], 6, self.freedoms))
-
-    def action(self, q: Array) -> Array:
-        """(…, 6, freedoms): force and moment of motors on the outer side, at its triad, by generalized forces along v.
-
-        In axes of the inner triad. Motors act along axes of the joint: a force where it slides, a moment where it
-        turns, `action`ᵀ `motion` = 1.
-        """
-        return self.motion(q)  # its columns are of length one and at right angles
 
     def turned_around(self, coordinates: Array) -> Array:
         """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""

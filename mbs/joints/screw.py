@@ -5,7 +5,6 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array
 from ..fields.spelling import SPATIAL
 from .moving_joint import AxialJoint
 
@@ -31,12 +30,3 @@ class ScrewJoint(AxialJoint):
     def rise(self) -> float:
         """The way h along the axis, m/rad."""
         return self.lead / (2 * np.pi)
-
-    @property
-    def subspace(self) -> Array:
-        """Along and about z."""
-        return np.array([[0.0, 0.0, self.rise, 0.0, 0.0, 1.0]]).T
-
-    def action(self, q: Array) -> Array:
-        """A moment about z: the thread makes of it what force there is."""
-        return np.broadcast_to(np.eye(6)[:, 5:], (*q.shape[:-1], 6, 1))

@@ -2,12 +2,10 @@
 
 from typing import ClassVar, Literal
 
-import numpy as np
-
 from ...common.arrays import Array, as_floats
-from ...common.rotations import exponential, of_quaternion, quaternions
+from ...common.rotations import exponential, quaternions
 from ..fields.spelling import SPATIAL
-from .joint import POINT, JointRecord, Place
+from .joint import POINT, JointRecord
 
 
 class SphericalJoint(JointRecord):
@@ -23,14 +21,6 @@ class SphericalJoint(JointRecord):
     freedoms = 3
     loop_equations = (POINT,)
     locates: ClassVar[bool] = False  # a loop is best cut here: three rows, no angle
-
-    def place(self, q: Array) -> Place:
-        """Turned by the quaternion q."""
-        return Place(np.zeros((*q.shape[:-1], 3)), of_quaternion(q))
-
-    def motion(self, q: Array) -> Array:
-        """v: the angular velocity in axes of the outer triad."""
-        return np.concatenate([np.zeros((*q.shape[:-1], 3, 3)), of_quaternion(q)], axis=-2)
 
     def state(self, coordinates: Array) -> Array:
         """The quaternion of a rotation vector."""

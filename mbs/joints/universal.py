@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import model_validator
 
 from ...common.arrays import Array
-from ...common.rotations import about, unit
+from ...common.rotations import unit
 from ..fields.field_types import Vector3
 from ..fields.spelling import SPATIAL
-from .joint import NOT_TURNED, POINT, Along, Place
+from .joint import NOT_TURNED, POINT, Along
 from .moving_joint import AxialJoint, check_direction
 
 SQUARE = 1e-6  # largest cosine between the two axes at zero coordinates
@@ -57,17 +57,6 @@ class UniversalJoint(AxialJoint):
         """Backwards, the axes change places: x is that of the inner side."""
         inner, outer = super().outward_triads(backwards)
         return (inner @ EXCHANGED, outer @ EXCHANGED) if backwards else (inner, outer)
-
-    def place(self, q: Array) -> Place:
-        """Turned by q[0] about x, then by q[1] about the new y."""
-        return Place(np.zeros((*q.shape[:-1], 3)), about(0, q[..., 0]) @ about(1, q[..., 1]))
-
-    def motion(self, q: Array) -> Array:
-        """About x of the inner triad and y of the outer one."""
-        found = np.zeros((*q.shape[:-1], 6, 2))
-        found[..., 3, 0] = 1.0
-        found[..., 4, 1], found[..., 5, 1] = np.cos(q[..., 0]), np.sin(q[..., 0])
-        return found
 
     def turned_around(self, coordinates: Array) -> Array:
         """Both backwards, the second first."""

@@ -17,8 +17,9 @@ from ...common.arrays import Array
 from .._core import TimeFunction
 from ..joints.joint import Friction, JointRecord
 from ..scene.mechanism import MechanismScene
-from .rows import ConstraintRow, value_and_gradient
-from .tree import KinematicTree, Motion
+from .kinematics import Kinematics
+from .rows import ConstraintRow
+from .tree import KinematicTree
 
 
 class CutCoordinate(NamedTuple):
@@ -50,9 +51,7 @@ def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[Cons
     rows = [cut_row(tree, joint) for joint in cut]
     found = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
     nodes = found.nodes[len(tree.nodes) :]
-    return found, [
-        replace(row, coordinate=node.v.start, q_index=node.q.start) for row, node in zip(rows, nodes, strict=True)
-    ]
+    return found, [replace(row, coordinate=node.v.start) for row, node in zip(rows, nodes, strict=True)]
 
 
 def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutCoordinate]:
@@ -78,42 +77,6 @@ def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> Constra
     return ConstraintRow(joint.name, along.kind, a, b, f, g, is_trajectory=False, sign=sign)
 
 
-def measured(
-    tree: KinematicTree, cut: Sequence[CutCoordinate], q: Array, frames: Sequence[Motion]
-) -> tuple[Array, Array]:
-    """Coordinates γ (T, cut), angles within ±π, and G (T, cut, n_v)."""
-    values, gradients = np.zeros((len(q), len(cut))), np.zeros((len(q), len(cut), tree.n_v))
-    for k, one in enumerate(cut):
-        a, b = (tree.motion(section, q, frames) for section in (one.row.a, one.row.b))
-        value, gradient = value_and_gradient(one.row, a, b, q, np.zeros(len(q)))
-        values[:, k], gradients[:, k] = one.row.sign * value, one.row.sign * gradient
-    return values, gradients
-
-
-def cut_resistance(
-    tree: KinematicTree, cut: Sequence[CutCoordinate], q: Array, v: Array, frames: Sequence[Motion] | None = None
-) -> Array:
-    """Generalized forces (T, n_v) by which friction in cut joints resists; `frames` of q where known."""
-    rough, found = [one for one in cut if one.friction is not None], np.zeros_like(v)
-    if rough:
-        _, gradients = measured(tree, rough, q, tree.frames(q) if frames is None else frames)
-        for k, one in enumerate(rough):
-            G = gradients[:, k]
-            found += one.resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
-    return found
-
-
-def cut_damping(tree: KinematicTree, cut: Sequence[CutCoordinate], q: Array) -> Array:
-    """D (n_v, n_v) of viscous friction in cut joints at q (n_q,)."""
-    rough, found = [one for one in cut if one.friction is not None], np.zeros((tree.n_v, tree.n_v))
-    if rough:
-        _, gradients = measured(tree, rough, q[None], tree.frames(q[None]))
-        for one, G in zip(rough, gradients[0], strict=True):
-            assert one.friction is not None
-            found += one.friction.viscous * np.outer(G, G)
-    return found
-
-
 class CutMotion(NamedTuple):
     """Of a coordinate along a joint at which a loop is cut."""
 
@@ -122,23 +85,50 @@ class CutMotion(NamedTuple):
     is_counted: bool  # whether the times are close enough together to count its turns
 
 
-def cut_motions(
-    tree: KinematicTree,
-    cut: Sequence[CutCoordinate],
-    q: Array,
-    v: Array,
-    times: Array,
-    frames: Sequence[Motion] | None = None,
-) -> list[CutMotion]:
-    """Of each of `cut` at q (T, n_q), v (T, n_v) and `times` (T,); angles begin nearest to their guesses."""
-    found = []
-    values, gradients = measured(tree, cut, q, tree.frames(q) if frames is None else frames)
-    for one, value, G in zip(cut, values.T, gradients.swapaxes(0, 1), strict=True):
-        rate = np.einsum("tj,tj->t", G, v)
-        turns = one.row.kind == "turn"
-        coordinate, is_counted = _unwound(value, rate, times, one.guess) if turns else (value, True)
-        found.append(CutMotion(coordinate, rate, is_counted))
-    return found
+class AlongCut:
+    """Coordinates γ of joints at which loops are cut, measured by the core."""
+
+    def __init__(self, tree: KinematicTree, cut: Sequence[CutCoordinate]) -> None:
+        self._n_v, self._all = tree.n_v, cut
+        self._rough = [k for k, one in enumerate(cut) if one.friction is not None]
+        self._kinematics = Kinematics(tree.nodes, rows=[one.row for one in cut]) if cut else None
+
+    def measured(self, q: Array) -> tuple[Array, Array]:
+        """γ (T, cut) at q (T, n_q), angles within ±π, and G (T, cut, n_v)."""
+        if self._kinematics is None:
+            return np.zeros((len(q), 0)), np.zeros((len(q), 0, self._n_v))
+        return self._kinematics.constraints(q, np.zeros(len(q)))
+
+    def resistance(self, q: Array, v: Array) -> Array:
+        """Generalized forces (T, n_v) by which friction resists at q (T, n_q) and v (T, n_v)."""
+        found = np.zeros_like(v)
+        gradients = self.measured(q)[1] if self._rough else found
+        for k in self._rough:
+            G = gradients[:, k]
+            found += self._all[k].resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
+        return found
+
+    def damping(self, q: Array) -> Array:
+        """D (n_v, n_v) of viscous friction at q (n_q,)."""
+        found = np.zeros((self._n_v, self._n_v))
+        gradients = self.measured(q[None])[1][0] if self._rough else found
+        for k in self._rough:
+            friction, G = self._all[k].friction, gradients[k]
+            assert friction is not None
+            found += friction.viscous * np.outer(G, G)
+        return found
+
+    def motions(self, q: Array, v: Array, times: Array) -> list[CutMotion]:
+        """Of each at q (T, n_q), v (T, n_v) and `times` (T,); angles begin nearest to their guesses."""
+        found = list[CutMotion]()
+        if self._kinematics is None:
+            return found
+        values, rates = self.measured(q)[0], self._kinematics.constraint_rates(q, v, np.zeros(len(q)))
+        for one, value, rate in zip(self._all, values.T, rates.T, strict=True):
+            turns = one.row.kind == "turn"
+            coordinate, is_counted = _unwound(value, rate, times, one.guess) if turns else (value, True)
+            found.append(CutMotion(coordinate, rate, is_counted))
+        return found
 
 
 def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Array, bool]:

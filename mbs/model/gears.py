@@ -5,7 +5,7 @@ Motors behind compliant gears are coordinates of their own, with springs to thos
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +16,11 @@ from ..joints.joint import Friction, JointRecord
 from ..joints.revolute import RevoluteJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.analysis import Analysis
-from .cut import cut_resistance
 from .drives import Drive
 from .model import Model
+from .nodes import Node, Section
 from .rows import ConstraintRow
-from .tree import CompliantGear, KinematicTree, Motion, Node, Section
+from .tree import CompliantGear, KinematicTree
 
 
 def elastic_joints(model: Model) -> list[Node]:
@@ -98,9 +98,7 @@ def _rows_at_motors(model: Model, tree: KinematicTree) -> Iterator[ConstraintRow
         if output is None:
             yield row
         else:  # the coordinate of an output counts as the joint of the scene does
-            yield replace(
-                row, a=output.inner, b=output.outer, coordinate=output.v.start, q_index=output.q.start, sign=1.0
-            )
+            yield replace(row, a=output.inner, b=output.outer, coordinate=output.v.start, sign=1.0)
 
 
 def _output(node: Node) -> tuple[JointRecord, str, Section]:
@@ -114,11 +112,6 @@ def _output(node: Node) -> tuple[JointRecord, str, Section]:
     return joint, label, node.outer if node.backwards else node.inner
 
 
-def rotor(node: Node) -> tuple[float, float]:
-    """Inertia J (kg·m²) of the rotor in the joint that carries a body, 0 without one, and its ratio N."""
-    return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))
-
-
 def compliance(node: Node) -> tuple[TwistSpring, float] | None:
     """Spring and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a rigid one."""
     joint = node.joint
@@ -127,9 +120,9 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
     return TwistSpring.of(joint.stiffness), joint.damping
 
 
-def resistance(model: Model, q: Array, v: Array, frames: Sequence[Motion] | None = None) -> Array:
-    """Generalized forces (T, n_v) by which friction in all joints resists; `frames` of q where known."""
-    return tree_resistance(model.tree, v) + cut_resistance(model.tree, model.cut, q, v, frames)
+def resistance(model: Model, q: Array, v: Array) -> Array:
+    """Generalized forces (T, n_v) by which friction in all joints resists."""
+    return tree_resistance(model.tree, v) + model.along_cut.resistance(q, v)
 
 
 def tree_resistance(tree: KinematicTree, v: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -12,8 +11,8 @@ from ...common.arrays import Array, as_floats
 from ...common.structs import struct
 from .. import _core
 from .model import Model
+from .nodes import Section
 from .system import MultibodySystem
-from .tree import KinematicTree, Node, Pose, Section
 
 
 class Wrench(NamedTuple):
@@ -29,18 +28,6 @@ class Wrench(NamedTuple):
     def plus(self, other: Wrench, sign: float = 1.0) -> Wrench:
         """The sum, or with sign −1 the difference."""
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
-
-
-def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, poses: Sequence[Pose]) -> Wrench:
-    """What a joint does to its outer side, about where that is, less what of it does work along the joint.
-
-    That is what drives, loads and brakes it along its coordinates: Sᵀ (force, moment) is 0 of the rest, S = `motion`.
-    """
-    F = tree.pose(node.inner, q, poses).F
-    in_axes = np.hstack([np.einsum("tji,tj->ti", F, part) for part in on_outer])
-    along = np.einsum("tik,ti->tk", node.joint.motion(q[:, node.q]), in_axes)
-    acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), along)
-    return on_outer.plus(Wrench(*(np.einsum("tij,tj->ti", F, part) for part in np.hsplit(acting, 2))), -1.0)
 
 
 @struct
@@ -104,6 +91,16 @@ class MotionForces:
         """Rate (T, 3) of the angular momentum of the rotor in the joint that carries body no. `number`."""
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
+    def carried(self, q: Array) -> list[Wrench]:
+        """Of each joint, about where its outer side is: what of `of_joint` does no work along it, at q (T, n_q).
+
+        What drives, loads and brakes joints along their coordinates does the rest.
+        """
+        numbers = range(len(self.system.model.tree.nodes))
+        of_joints = np.hstack([part for number in numbers for part in self.of_joint(number)])
+        table = self.system.core.without_work(q, of_joints)
+        return [_wrench(table, number) for number in numbers]
+
     def of_row(self, number: int) -> tuple[Wrench, Wrench]:
         """What row no. `number` does to its sections a and b; nothing where it is a joint coordinate of the tree."""
         return _wrench(self.found.constraints, 2 * number), _wrench(self.found.constraints, 2 * number + 1)
@@ -150,10 +147,10 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
     """J u̇ (T, bodies) N·m about the axis of each rotor in a revolute joint, by the body that the joint carries."""
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
-    poses, found = tree.poses(states.q), np.zeros((len(times), len(tree.nodes)))
+    places, found = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
     for number, node in enumerate(tree.nodes):
         if node.joint.type == "revolute":
-            axis = tree.pose(node.inner, states.q, poses).F[:, :, 2]
+            axis = places.at(node.inner).F[:, :, 2]
             found[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
     return found
 

@@ -9,10 +9,9 @@ none: a moment between frames has virtual work there, but no angle that goes wit
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
@@ -29,13 +28,13 @@ from ..scene.mechanism import MechanismScene
 from ..scene.topology import Edge, spanning_forest
 from ..scene.trajectories import Trajectory
 from .body import Body
-from .cut import CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
+from .cut import AlongCut, CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
 from .drives import Drive
+from .kinematics import Kinematics
 from .masses import welded_payloads
-from .rows import ConstraintRow, coordinate_row, is_turned_over, value_and_gradient
-from .tree import KinematicTree, Motion, Node, Section
-
-T = TypeVar("T")
+from .nodes import Node, Section
+from .rows import ConstraintRow, coordinate_row
+from .tree import KinematicTree
 
 
 @struct
@@ -55,6 +54,31 @@ class Model:
     def loop_rows(self) -> Booleans:
         """(rows,) which rows close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
+
+    @cached_property
+    def constraints(self) -> Kinematics:
+        """The tree with the rows, in the core."""
+        return Kinematics(self.tree.nodes, rows=self.rows)
+
+    @cached_property
+    def senses(self) -> tuple[list[str], Kinematics]:
+        """What tells axes that "dot" rows align from opposite ones: positive cosines, with the owners of the rows.
+
+        Of z of b against z of a and, of joints that do not turn, x against x. An owner's rows are of x and y of a with
+        z of b and, of such joints, of x of a with y of b.
+        """
+        aligned, found = dict[str, list[ConstraintRow]](), list[ConstraintRow]()
+        for row in (row for row in self.rows if row.kind == "dot"):
+            aligned.setdefault(row.owner, []).append(row)
+        for first, second, *still in (rows for rows in aligned.values() if len(rows) > 1):
+            found.append(replace(first, f=np.cross(first.f, second.f)))
+            found += [replace(row, g=np.cross(row.g, first.g)) for row in still]
+        return [row.owner for row in found], Kinematics(self.tree.nodes, rows=found)
+
+    @cached_property
+    def along_cut(self) -> AlongCut:
+        """What measures `cut`."""
+        return AlongCut(self.tree, self.cut)
 
     @cached_property
     def motors(self) -> dict[str, Array]:
@@ -210,15 +234,16 @@ def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: Ti
     return coordinate_row(owner, node, target, sign=node.sign)
 
 
-def row_values(model: Model, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> tuple[Array, Array]:
-    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v); `frames` of q where known."""
-    frames = model.tree.frames(q) if frames is None else frames
-    values, gradients = np.zeros((len(q), len(model.rows))), np.zeros((len(q), len(model.rows), model.tree.n_v))
-    motion = by_section(lambda section: model.tree.motion(section, q, frames))
-    for k, row in enumerate(model.rows):
-        a, b = motion(row.a), motion(row.b)
-        values[:, k], gradients[:, k] = value_and_gradient(row, a, b, q, times)
-    return values, gradients
+def constraint_values(model: Model, q: Array, times: Array) -> tuple[Array, Array]:
+    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v)."""
+    if not model.rows:
+        return np.zeros((len(q), 0)), np.zeros((len(q), 0, model.tree.n_v))
+    return model.constraints.constraints(q, times)
+
+
+def constraint_rates(model: Model, q: Array, v: Array, times: Array) -> Array:
+    """Ċ (T, rows) at q (T, n_q), v (T, n_v) and `times` (T,)."""
+    return model.constraints.constraint_rates(q, v, times) if model.rows else np.zeros((len(q), 0))
 
 
 def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
@@ -226,50 +251,17 @@ def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
 
     Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
     """
-    aligned: dict[str, list[ConstraintRow]] = {}
-    for row in (row for row in model.rows if row.kind == "dot"):
-        aligned.setdefault(row.owner, []).append(row)
-    aligned = {owner: rows for owner, rows in aligned.items() if len(rows) > 1}
-    if not aligned:
+    owners, senses = model.senses
+    if not owners:
         return {}
-    frames = model.tree.frames(q)
-    motion = by_section(lambda section: model.tree.motion(section, q, frames))
-    return {owner: is_turned_over(rows, motion(rows[0].a), motion(rows[0].b), times) for owner, rows in aligned.items()}
+    against = senses.constraints(q, times)[0] < 0.0
+    return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
 
 
 def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
     """By trajectory of `held` how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
-    C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
+    C, owners = constraint_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
     return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
-
-
-def by_section(compute: Callable[[Section], T]) -> Callable[[Section], T]:
-    """`compute` with what it found of each section kept: rows of one point share theirs."""
-    known: dict[int, T] = {}
-
-    def found(section: Section) -> T:
-        if id(section) not in known:
-            known[id(section)] = compute(section)
-        return known[id(section)]
-
-    return found
-
-
-def target_rates(model: Model, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> Array:
-    """What C_v v has to be (T, rows), for Ċ = 0; `frames` of q where known."""
-    found = np.zeros((len(q), len(model.rows)))
-    for k, row in enumerate(model.rows):
-        if row.target is not None:
-            found[:, k] = row.target.sample(times)[1]
-        elif row.law is not None:
-            omega = row.law.rates(times)[0]
-            if row.kind == "rotation":
-                found[:, k] = omega @ row.f
-            else:  # f·g with g turning by ω
-                frames = model.tree.frames(q) if frames is None else frames
-                f = np.einsum("tij,j->ti", model.tree.pose(row.a, q, frames).F, row.f)
-                found[:, k] = -np.sum(f * np.cross(omega, row.law.sample(times)[:, :, 2]), axis=-1)
-    return found
 
 
 def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:

@@ -88,10 +88,11 @@ class InCore(NamedTuple):
 
 def frames_in_core(model: Model, core: _core.SpatialModel, q: Array) -> list[InCore]:
     """Of all bodies, found at q (n_q,)."""
-    of_core, frames = core.frames(q, np.zeros(model.tree.n_v)), model.tree.poses(q[None])
+    places = model.tree.places(q[None])
+    own = [places.frame(number) for number in range(len(model.tree.nodes))]
     return [
-        InCore(frame.R.T @ own.F[0], frame.R.T @ (own.r[0] - frame.r))
-        for frame, own in zip(of_core, frames, strict=True)
+        InCore(frame.R.T @ at.F[0], frame.R.T @ (at.r[0] - frame.r))
+        for frame, at in zip(core.frames(q, np.zeros(model.tree.n_v)), own, strict=True)
     ]
 
 

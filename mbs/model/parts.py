@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Booleans
 from .. import _core
+from ..fields.orientations import OrientationLaw
 from .body import Body
-from .gears import rotor
-from .tree import Node, Section
+from .nodes import Node, Section, rotor
+from .rows import ConstraintRow
+
+ZERO = _core.TimeFunction.constant(0.0)
 
 Placed = tuple[int, int]  # body, −1 the ground, and number of its marker
 
@@ -41,6 +45,68 @@ class ModelParts(NamedTuple):
     def model(self) -> _core.SpatialModel:
         """Of the core."""
         return _core.SpatialModel(self.bodies, self.ground, self.rows, self.wrenches, self.gravity)
+
+
+class Markers:
+    """Where on the bodies of a tree, and on the ground, something is attached: made as it is asked for.
+
+    Attributes:
+        of_bodies: sections of each body, by the numbers of its markers.
+        turning: numbers of the ground's markers that follow a law in time, with it.
+    """
+
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        self._nodes = nodes
+        self.of_bodies: list[list[Section]] = [[] for _ in nodes]
+        self._ground: list[Section] = []
+        self.turning: list[tuple[int, OrientationLaw]] = []
+        self._sides = [(self.place(node.inner), self.place(node.outer)) for node in nodes]
+
+    def place(self, section: Section) -> Placed:
+        """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
+        known = self._ground if section.body < 0 else self.of_bodies[section.body]
+        for number, other in enumerate(known):
+            same = other.point == section.point and other.still == section.still
+            if same and np.array_equal(other.triad, section.triad) and np.array_equal(other.position, section.position):
+                return section.body, number
+        known.append(section)
+        return section.body, len(known) - 1
+
+    def row(self, row: ConstraintRow) -> _core.ConstraintModel:
+        """A row of constraints between markers."""
+        found = _core.ConstraintModel()
+        found.name, found.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
+        if row.kind == "coordinate":
+            found.coordinate = row.coordinate
+            return found
+        a, b = self.place(row.a), self.place(row.b)
+        if row.law is not None:  # see ConstraintRow: of "dot" rows it is that of b
+            turning = (-1, self._turning_marker(row.law))
+            a, b = (a, turning) if row.kind == "dot" else (turning, b)
+        found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
+        found.f, found.g, found.coordinate = np.array(row.f), np.array(row.g), row.coordinate
+        return found
+
+    def bodies(self, driven: Booleans | None = None) -> list[_core.SpatialBody]:
+        """With all markers; `driven` (n_v,): coordinates along which given forces act."""
+        return [
+            carried_body(node, *sides, markers, driven is not None and bool(driven[node.v].any()))
+            for node, sides, markers in zip(self._nodes, self._sides, self.of_bodies, strict=True)
+        ]
+
+    def standing(self) -> list[_core.SpatialMarker]:
+        """The ground's markers."""
+        turning = [number for number, _ in self.turning]
+        return [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
+
+    def _turning_marker(self, law: OrientationLaw) -> int:
+        """Number of the ground's marker that turns as `law` says; made where it is new."""
+        for number, known in self.turning:
+            if known is law:
+                return number
+        self._ground.append(Section(-1, f"turning {len(self.turning)}", np.eye(3), np.zeros(3)))
+        self.turning.append((len(self._ground) - 1, law))
+        return len(self._ground) - 1
 
 
 def carried_body(node: Node, inner: Placed, outer: Placed, markers: list[Section], driven: bool) -> _core.SpatialBody:

@@ -11,19 +11,16 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Integers
 from ...common.errors import InputError
 from .. import _core
-from ..fields.orientations import OrientationLaw
 from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .frame_motors import zero_order_hold
 from .model import Model
-from .parts import CutPlace, ModelParts, Placed, carried_body, standing_marker
+from .nodes import Section
+from .parts import ZERO, CutPlace, Markers, ModelParts, Placed
 from .plane import Plane, in_plane
 from .projection import EXACT
 from .rows import ConstraintRow
-from .tree import Section
-
-ZERO = _core.TimeFunction.constant(0.0)
 
 
 class Derivatives(NamedTuple):
@@ -60,11 +57,8 @@ class MultibodySystem:
     def __init__(self, model: Model, drives: Drives = NO_DRIVES, commands: Sequence[Command] = ()) -> None:
         """`drives` act beside the loads of the scene, and `commands` will, held."""
         self.model, tree, self.replayed = model, model.tree, drives.replayed
-        self._markers: list[list[Section]] = [[] for _ in tree.nodes]
-        self._ground: list[Section] = []
-        self._turning: list[tuple[int, OrientationLaw]] = []
-        sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
-        rows = [self._row(row) for row in model.rows]
+        self._markers = Markers(tree.nodes)
+        rows = [self._markers.row(row) for row in model.rows]
         self._wrenches: list[Placed] = []
         loads = [load for load in model.scene.load if load.point is not None]
         at_points = [*(PointDrive(str(load.point), load.components) for load in loads), *drives.at_points]
@@ -79,12 +73,7 @@ class MultibodySystem:
         moments = [drive for load in model.scene.load if load.joint in tree.carried for drive in self._drives(load)]
         self._along = [*moments, *model.modal_loads, *drives.along]
         driven = self._driven((*commands, *(drives.replayed.commands if drives.replayed else ())))
-        bodies = [
-            carried_body(node, *of_node, self._markers[number], bool(driven[node.v].any()))
-            for number, (node, of_node) in enumerate(zip(tree.nodes, sides, strict=True))
-        ]
-        turning = [number for number, _ in self._turning]
-        ground = [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
+        bodies, ground = self._markers.bodies(driven), self._markers.standing()
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
         for number, at in enumerate(wrenches):
             at.only_forces = number not in self._with_moments(cut)
@@ -144,11 +133,11 @@ class MultibodySystem:
     @property
     def sections(self) -> list[Section]:
         """Of the core's sections."""
-        return [self._markers[body][marker] for body, marker in self.core.sections]
+        return [self._markers.of_bodies[body][marker] for body, marker in self.core.sections]
 
     def point_number(self, point: str) -> int:
         """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
-        return self._wrenches.index(self._place(self.model.tree.section(point)))
+        return self._wrenches.index(self._markers.place(self.model.tree.section(point)))
 
     def forward_model(self) -> _core.ForwardModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
@@ -229,7 +218,7 @@ class MultibodySystem:
         has_loops = bool(self.model.loop_rows.any())
         scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
         scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
-        for number, law in self._turning:
+        for number, law in self._markers.turning:
             scene.turn_marker(number, law.in_core)
         return scene
 
@@ -252,41 +241,8 @@ class MultibodySystem:
 
     def _wrench(self, section: Section) -> int:
         """Number of a wrench on a section, made for it."""
-        self._wrenches.append(self._place(section))
+        self._wrenches.append(self._markers.place(section))
         return len(self._wrenches) - 1
-
-    def _turning_marker(self, law: OrientationLaw) -> int:
-        """Number of the ground's marker that turns as `law` says; made where it is new."""
-        for number, known in self._turning:
-            if known is law:
-                return number
-        self._ground.append(Section(-1, f"turning {len(self._turning)}", np.eye(3), np.zeros(3)))
-        self._turning.append((len(self._ground) - 1, law))
-        return len(self._ground) - 1
-
-    def _place(self, section: Section) -> Placed:
-        """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
-        known = self._ground if section.body < 0 else self._markers[section.body]
-        for number, other in enumerate(known):
-            same = other.point == section.point and other.still == section.still
-            if same and np.array_equal(other.triad, section.triad) and np.array_equal(other.position, section.position):
-                return section.body, number
-        known.append(section)
-        return section.body, len(known) - 1
-
-    def _row(self, row: ConstraintRow) -> _core.ConstraintModel:
-        found = _core.ConstraintModel()
-        found.name, found.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
-        if row.kind == "coordinate":
-            found.coordinate = row.coordinate
-            return found
-        a, b = self._place(row.a), self._place(row.b)
-        if row.law is not None:  # see ConstraintRow: of "dot" rows it is that of b
-            turning = (-1, self._turning_marker(row.law))
-            a, b = (a, turning) if row.kind == "dot" else (turning, b)
-        found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
-        found.f, found.g, found.coordinate = np.array(row.f), np.array(row.g), row.coordinate
-        return found
 
 
 def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:

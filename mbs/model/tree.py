@@ -13,80 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, as_floats
-from ...common.rotations import exponential, left_jacobian, of_quaternion, quaternions, skew
-from ...common.structs import struct
+from ...common.arrays import Array, Booleans
 from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
 from ..joints.joint import JointRecord
 from ..joints.planar_joint import PlanarJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.topology import Topology
-from .body import Body, bent_section, rigid_body
+from .body import Body, rigid_body
+from .kinematics import Kinematics, Places
+from .nodes import Node, Section
 
 AXES = np.eye(3)
 AXES.setflags(write=False)
-
-
-class Section(NamedTuple):
-    """A triad (3, 3), columns, on a section of body number `body`, or standing at `position` (m) on the ground (−1).
-
-    `still`: about its z it turns with the frame of the body, not with the section.
-    """
-
-    body: int
-    point: str
-    triad: Array
-    position: Array
-    still: bool = False
-
-    def turned(self, rotation: Array) -> Array:
-        """What modes turn it by, of rotations (…, 3, n) of the section, or (…, 3) with a last axis of length one."""
-        if not self.still:
-            return rotation
-        z = self.triad[:, 2]
-        return rotation - z[:, None] * np.einsum("i,...ij->...j", z, rotation)[..., None, :]
-
-
-class Pose(NamedTuple):
-    """Of a triad: place r (…, 3) and axes F (…, 3, 3)."""
-
-    r: Array
-    F: Array
-
-
-class Motion(NamedTuple):
-    """Of a triad: place r (…, 3), axes F (…, 3, 3), and L (…, 6, n_v): velocity and angular velocity by v."""
-
-    r: Array
-    F: Array
-    L: Array
-
-
-@struct
-class Node:
-    """A body on the joint that carries it."""
-
-    body: Body  # its constants
-    # that carries it; where the scene has none a free one at the origin, in planar scenes a planar one
-    joint: JointRecord
-    backwards: bool  # whether the joint's first side is on this body
-    inner: Section  # the joint's triad on what carries it
-    outer: Section  # its triad on this body
-    q: slice  # where the joint's coordinates stand in q
-    p_q: slice  # and those of the modes
-    v: slice  # likewise in v
-    p_v: slice
-
-    @property
-    def sign(self) -> float:
-        """−1 where the tree has the joint's coordinates the other way round."""
-        return -1.0 if self.backwards else 1.0
-
-    def coordinates(self, q: Array) -> Array:
-        """Those of the joint (…, k) as the scene counts them, at q (…, n_q)."""
-        found = self.joint.coordinates(q[..., self.q])
-        return self.joint.turned_around(found) if self.backwards else found
 
 
 class CompliantGear(NamedTuple):
@@ -113,11 +52,12 @@ class KinematicTree:
 
     `tools` are the points "BODY.POINT" with axes of their own, (3, 3) columns in those of the body. `gears` are between
     its joints: none where they are taken for rigid (see `gears.with_compliance`).
-    `on_frames` names joints whose angles are those of frames (see `frames_3d`).
+    `on_frames` names joints whose angles are those of frames (see `model.with_coordinates_of_frames`).
     """
 
     gears: tuple[CompliantGear, ...] = ()
     on_frames: frozenset[str] = frozenset()
+    _known: Kinematics | None = None
 
     def __init__(
         self,
@@ -208,100 +148,23 @@ class KinematicTree:
             q[node.q] = node.joint.state(node.joint.turned_around(given) if node.backwards else given)
         return q
 
+    def places(self, q: Array, v: Array | None = None) -> Places:
+        """Where all frames and sections are at states q (T, n_q), and how they move with v (T, n_v), else at rest."""
+        return self._moving.places(q, v)
+
     def integrate(self, q: Array, dv: Array) -> Array:
-        """Q moved by a small step dv (…, n_v): quaternions along the exponential."""
-        moved = np.broadcast_to(q, (*dv.shape[:-1], self.n_q)).copy()
-        for node in self.nodes:
-            moved[..., node.p_q] += dv[..., node.p_v]
-            own, step, straight = moved[..., node.q], dv[..., node.v], max(0, node.joint.q_count - 4)
-            if node.joint.q_count == node.joint.freedoms:
-                own += step
-                continue
-            own[..., :straight] += step[..., :straight]
-            turned = of_quaternion(own[..., straight:]) @ exponential(step[..., straight:])
-            e = quaternions(turned)
-            same = np.sum(e * own[..., straight:], axis=-1, keepdims=True) >= 0
-            own[..., straight:] = np.where(same, e, -e)
-        return moved
+        """Q (…, n_q) moved by a small step dv (…, n_v): quaternions along the exponential."""
+        shape = dv.shape[:-1]
+        at, count = np.broadcast_to(q, (*shape, self.n_q)), int(np.prod(shape))
+        moved = self._moving.core.moved(at.reshape(count, self.n_q), dv.reshape(count, self.n_v))
+        return moved.reshape(*shape, self.n_q)
 
-    def poses(self, q: Array) -> list[Pose]:
-        """Place and axes of each body's frame."""
-        found: list[Pose] = []
-        for node in self.nodes:
-            inner, place = self.pose(node.inner, q, found), node.joint.place(q[..., node.q])
-            u, E = _bent(node.body, node.outer, q[..., node.p_q])
-            A = inner.F @ place.C @ np.swapaxes(E @ node.outer.triad, -1, -2)
-            found.append(Pose(inner.r + _turned(inner.F, place.d) - _turned(A, u), A))
-        return found
-
-    def frames(self, q: Array, poses: Sequence[Pose] | None = None) -> list[Motion]:
-        """Motion of each body's frame, of which `poses` may be known; L is of (Ṙ, Ω)."""
-        found: list[Motion] = []
-        for node, (r, A) in zip(self.nodes, poses or self.poses(q), strict=True):
-            inner, S = self.motion(node.inner, q, found), node.joint.motion(q[..., node.q])
-            d = _turned(inner.F, node.joint.place(q[..., node.q]).d)
-            L = inner.L.copy()
-            L[..., :3, :] -= skew(d) @ inner.L[..., 3:, :]
-            L[..., :3, node.v] += inner.F @ S[..., :3, :]
-            L[..., 3:, node.v] += inner.F @ S[..., 3:, :]
-            if node.outer.point:  # from the section at the joint to the frame
-                Phi, turning = _by_modes(node.body, node.outer, q[..., node.p_q])
-                L[..., 3:, node.p_v] -= A @ turning
-                L[..., :3, :] += skew(inner.r + d - r) @ L[..., 3:, :]
-                L[..., :3, node.p_v] -= A @ Phi
-            found.append(Motion(r, A, L))
-        return found
-
-    def pose(self, section: Section, q: Array, frames: Sequence[Pose | Motion]) -> Pose:
-        """Of a section's triad, for less than its motion."""
-        if section.body < 0:
-            shape = q.shape[:-1]
-            return Pose(np.broadcast_to(section.position, (*shape, 3)), np.broadcast_to(section.triad, (*shape, 3, 3)))
-        arm, F = self._from_frame(section, q, frames)
-        return Pose(frames[section.body].r + arm, F)
-
-    def _from_frame(self, section: Section, q: Array, frames: Sequence[Pose | Motion]) -> tuple[Array, Array]:
-        """From the origin of its body's frame to a section, (…, 3), and the axes (…, 3, 3) of its triad."""
-        node, A = self.nodes[section.body], frames[section.body].F
-        u, E = _bent(node.body, section, q[..., node.p_q])
-        return _turned(A, u), A @ E @ section.triad
-
-    def motion(self, section: Section, q: Array, frames: Sequence[Motion]) -> Motion:
-        """Of a section's triad."""
-        if section.body < 0:
-            return Motion(*self.pose(section, q, frames), np.zeros((*q.shape[:-1], 6, self.n_v)))
-        node, frame = self.nodes[section.body], frames[section.body]
-        arm, F = self._from_frame(section, q, frames)
-        Phi, turning = _by_modes(node.body, section, q[..., node.p_q])
-        L = frame.L.copy()
-        L[..., :3, :] -= skew(arm) @ frame.L[..., 3:, :]
-        L[..., :3, node.p_v] += frame.F @ Phi
-        L[..., 3:, node.p_v] += frame.F @ turning
-        return Motion(frame.r + arm, F, L)
-
-
-def _turned(A: Array, vectors: Array) -> Array:
-    """A (…, 3, 3) times vectors (…, 3)."""
-    return as_floats(np.einsum("...ij,...j->...i", A, vectors))
-
-
-def _bent(body: Body, section: Section, p: Array) -> tuple[Array, Array]:
-    """In body axes: u (…, 3) and E (…, 3, 3) = exp φ~."""
-    if not section.point or not body.n_modes:
-        u, shape = body.points[section.point].position if section.point else np.zeros(3), (*p.shape[:-1], 3)
-        return np.broadcast_to(u, shape), np.broadcast_to(np.eye(3), (*shape, 3))
-    at = bent_section(body, section.point, p)
-    return at.u, exponential(section.turned(at.phi[..., None])[..., 0])
-
-
-def _by_modes(body: Body, section: Section, p: Array) -> tuple[Array, Array]:
-    """In body axes: Φ (…, 3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
-    if not section.point or not body.n_modes:
-        none = np.zeros((3, body.n_modes))
-        return none, none
-    at = bent_section(body, section.point, p)
-    phi = section.turned(at.phi[..., None])[..., 0]
-    return at.u_p, left_jacobian(phi) @ section.turned(at.phi_p)
+    @property
+    def _moving(self) -> Kinematics:
+        """Made for these nodes, of which copies of a tree have others."""
+        if self._known is None or self._known.nodes is not self.nodes:
+            self._known = Kinematics.of_points(self.nodes)
+        return self._known
 
 
 def _at_origin(body: str, floating: type[FreeJoint | PlanarJoint]) -> JointRecord:

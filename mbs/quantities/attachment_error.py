@@ -20,8 +20,8 @@ from ...common.arrays import Array, as_floats, null_space
 from ...common.rotations import exponential, left_jacobian, logarithm
 from ...fe_models.modal_body import ModalBody
 from ..model.body import Body, bent_section
+from ..model.kinematics import Motion
 from ..model.known_motion import mass_matrices
-from ..model.tree import Motion
 from .motion import RobotMotion
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too

@@ -18,7 +18,7 @@ from ..fields.field_types import split_point
 from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
 from ..model.masses import turns_as_a_body
 from ..model.motors import split_forces
-from ..model.tree import Section
+from ..model.nodes import Section
 from ..scene.bodies import Payload, tensor
 from .motion import RobotMotion
 
@@ -47,7 +47,7 @@ def _link_loads(motion: RobotMotion, bodies: Iterable[str], forces: MotionForces
     tree, gravity, found = motion.model.tree, np.array(motion.model.scene.gravity), {}
     for name in bodies:
         number = tree.index[name]
-        node, F = tree.nodes[number], motion.poses[number].F
+        node, F = tree.nodes[number], motion.places.frame(number).F
         at_points = _at_points(F, forces.at_points[number])
         left = forces.found.modal[:, node.p_v].copy()
         for point, wrench in at_points.items():
@@ -92,7 +92,7 @@ def _of_mass(motion: RobotMotion, payload: Payload) -> Array:
     """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
     of_point = motion.forces.of_point(payload.point)
     force = -payload.mass * (of_point.a - np.array(motion.model.scene.gravity))
-    F = motion.poses[motion.model.tree.index[split_point(payload.point)[0]]].F
+    F = motion.frame(split_point(payload.point)[0]).F
     return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))
 
 

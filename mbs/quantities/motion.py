@@ -18,15 +18,16 @@ from ...common.structs import struct
 from ..analysis.gears import Supplied, supplied_through_gears, with_motors
 from ..analysis.outcome import GearMotion
 from ..model.body import bent_section
-from ..model.cut import CutCoordinate, CutMotion, cut_motions
+from ..model.cut import CutCoordinate, CutMotion
 from ..model.drives import Drives, PointDrive
 from ..model.gears import compliance, with_compliance
+from ..model.kinematics import Motion, Places
 from ..model.known_motion import MotionForces, motion_forces, row_accelerations
 from ..model.masses import turns_as_a_body
-from ..model.model import Model, row_values, target_rates
+from ..model.model import Model, constraint_rates, constraint_values
 from ..model.motors import MotorForces, path_forces
+from ..model.nodes import Node, Section
 from ..model.system import MultibodySystem
-from ..model.tree import Motion, Node, Pose, Section
 from ..scene.space import SPACES, Space
 from ..scene.trajectories import Trajectory
 from ..solve.posture import mobility
@@ -115,14 +116,13 @@ class RobotMotion:
     twists: Mapping[str, BSpline] = field(default_factory=dict)
 
     @cached_property
-    def poses(self) -> list[Pose]:
-        """Of the frames of all bodies, in the order of the tree."""
-        return self.model.tree.poses(self.q)
+    def places(self) -> Places:
+        """Of frames and sections, and their velocities."""
+        return self.model.tree.places(self.q, self.v)
 
-    @cached_property
-    def frames(self) -> list[Motion]:
-        """Likewise with what moves them, which takes longer."""
-        return self.model.tree.frames(self.q, self.poses)
+    def frame(self, body: str) -> Motion:
+        """Of the frame of a body."""
+        return self.places.frame(self.model.tree.index[body])
 
     @cached_property
     def system(self) -> MultibodySystem:
@@ -139,23 +139,20 @@ class RobotMotion:
     @cached_property
     def rows(self) -> tuple[Array, Array]:
         """C (T, rows) and C_v (T, rows, n_v)."""
-        return row_values(self.model, self.q, self.time, self.frames)
+        return constraint_values(self.model, self.q, self.time)
 
     @cached_property
     def cut(self) -> list[tuple[CutCoordinate, CutMotion]]:
         """Coordinates of joints at which loops are cut."""
-        if not self.model.cut:  # saves the motion of all frames
-            return []
-        motions = cut_motions(self.model.tree, self.model.cut, self.q, self.v, self.time, self.frames)
+        motions = self.model.along_cut.motions(self.q, self.v, self.time)
         return list(zip(self.model.cut, motions, strict=True))
 
     @cached_property
     def violation(self) -> Array:
         """(T, 3) of C, Ċ, C̈: the largest of all rows over 1 + that of q, v, a; of an equilibrium, C alone."""
-        C, C_v = self.rows
-        levels = [(C, self.q)]
+        levels = [(self.rows[0], self.q)]
         if not self.is_at_rest:
-            C_dot = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time, self.frames)
+            C_dot = constraint_rates(self.model, self.q, self.v, self.time)
             levels += [(C_dot, self.v), (row_accelerations(self.system, self, self.time), self.a)]
         off = np.zeros((len(self.time), 3))
         for k, (values, size) in enumerate(levels):
@@ -178,10 +175,9 @@ class RobotMotion:
 
     def body(self, name: str) -> BodyMotion:
         """Of a body's frame and modes."""
-        node, frame = self.node(name), self.frames[self.model.tree.index[name]]
-        velocity = np.einsum("tij,tj->ti", frame.L, self.v)
+        node, frame = self.node(name), self.frame(name)
         return BodyMotion(
-            frame.r, continuous(quaternions(frame.F)), velocity[:, :3], velocity[:, 3:],
+            frame.r, continuous(quaternions(frame.F)), frame.velocity, frame.omega,
             RobotMotion.modal(self, name), self.v[:, node.p_v] @ node.body.modal_transform.T,
         )  # fmt: skip
 
@@ -206,7 +202,7 @@ class RobotMotion:
         node = self.node(body)
         coordinate = self.joint(node.joint.name)
         if node.joint.freedoms and coordinate is None:
-            A = self.poses[self.model.tree.index[body]].F
+            A = self.frame(body).F
             return np.unwrap(np.arctan2(A[:, 1, 0], A[:, 0, 0]))
         turn = node.joint.rpy[2] + np.zeros(len(self.time))
         if coordinate is not None and node.joint.units == ("rad",):
@@ -225,19 +221,18 @@ class RobotMotion:
 
     def section(self, point: str) -> Motion:
         """Of the section "BODY.POINT"."""
-        return self.model.tree.motion(self.model.tree.section(point), self.q, self.frames)
+        return self.places.at(self.model.tree.section(point))
 
     def point(self, point: str) -> PointMotion:
         """Of the section "BODY.POINT"."""
-        tree = self.model.tree
-        found = tree.pose(tree.section(point), self.q, self.poses)
+        found = self.section(point)
         turned = None if self.space.is_plane else continuous(quaternions(found.F))
         return PointMotion(found.r, self.deflection(point), turned)
 
     def place_and_rate(self, point: str) -> tuple[Array, Array]:
         """R (T, 3), m, of the section "BODY.POINT", and its velocity (T, 3), m/s."""
         section = self.section(point)
-        return section.r, np.einsum("tij,tj->ti", section.L[:, :3], self.v)
+        return section.r, section.velocity
 
     def deflection(self, point: str) -> Array:
         """Φ p (T, 3), m, of the section "BODY.POINT" in the axes of its body."""
@@ -266,7 +261,7 @@ class RobotMotion:
 
     @cached_property
     def supplied(self) -> Array:
-        """(T, n_v) what actuators supply along v: see `mbs.model.spatial_motors.path_forces`."""
+        """(T, n_v) what actuators supply along v: see `mbs.model.motors.path_forces`."""
         return (
             self.required if self.required is not None else path_forces(self.model, self.time, self.q, self.multipliers)
         )

@@ -16,8 +16,8 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
-from ..model.known_motion import MotionForces, Wrench, multiplier_forces, without_work
-from ..model.tree import Node
+from ..model.known_motion import MotionForces, Wrench, multiplier_forces
+from ..model.nodes import Node
 from ..scene.loads import OF_POINT
 from ..solve.posture import SINGULAR, robot_size, row_sizes
 from ..solve.statics import natural_sizes
@@ -30,27 +30,27 @@ def reactions(motion: RobotMotion) -> Mapping[str, Wrench]:
     A joint of the tree carries what its body and its outboard subtree need, less what else acts there and what acts
     along its coordinates: motors, friction, loads, rotors. One that closes a loop has its multipliers.
     """
-    return _carried(motion, motion.behind_gears.forces)
+    behind = motion.behind_gears
+    return _carried(motion, behind.forces, behind.q)
 
 
 def reactions_of_loops(motion: RobotMotion, forces: Array) -> Mapping[str, Wrench]:
     """What forces (T, rows that close loops) along these rows are in `reactions`."""
     multipliers = np.zeros_like(motion.multipliers)
     multipliers[:, motion.model.loop_rows] = -forces
-    return _carried(motion, multiplier_forces(motion.system, motion.q, motion.time, multipliers))
+    return _carried(motion, multiplier_forces(motion.system, motion.q, motion.time, multipliers), motion.q)
 
 
-def _carried(motion: RobotMotion, forces: MotionForces) -> dict[str, Wrench]:
-    """By joint what it carries but does no work along it."""
+def _carried(motion: RobotMotion, forces: MotionForces, q: Array) -> dict[str, Wrench]:
+    """By joint what it carries but does no work along it; q (T, n) are those of the tree of `forces`."""
     found, model = dict[str, Wrench](), motion.model
     for number, row in enumerate(model.rows):
         if not row.is_trajectory and row.coordinate < 0:  # else it turns a rotor, along the joint
             on_b = forces.of_row(number)[1]
             found[row.owner] = found[row.owner].plus(on_b) if row.owner in found else on_b
     loops = {joint.name for joint in model.tree.loops}
-    for number, node in enumerate(model.tree.nodes):
+    for node, carried in zip(model.tree.nodes, forces.carried(q), strict=False):
         if node.joint.name not in loops:
-            carried = without_work(model.tree, node, forces.of_joint(number), motion.q, motion.poses)
             found[node.joint.name] = _on_second(motion, node, carried)
     return found
 
@@ -59,7 +59,7 @@ def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
     """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
     if not node.backwards:
         return on_outer
-    outer, inner = (motion.model.tree.pose(section, motion.q, motion.poses).r for section in (node.outer, node.inner))
+    outer, inner = (motion.places.at(section).r for section in (node.outer, node.inner))
     return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
 
 

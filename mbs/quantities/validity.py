@@ -20,7 +20,7 @@ from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
 from ..model.body import Body
-from ..model.tree import Node
+from ..model.nodes import Node
 from .link_loads import loads_in_equations
 from .motion import RobotMotion
 from .second_order import (
@@ -168,8 +168,7 @@ def _turns_that_count(motion: RobotMotion, node: Node) -> Array:
     along = [row for row in motion.model.rows if row.is_trajectory and row.kind == "coordinate"]
     if node.joint.name in map(motion.model.joint_of, along):
         return np.eye(3)
-    turns = node.joint.motion(motion.q[0, node.q])[3:]
-    free = np.linalg.matrix_rank(turns) if turns.size else 0
+    free = (node.joint.guess_units or node.joint.units).count("rad")
     axis = node.outer.triad[:, 2:]
     return np.eye(3) - axis @ axis.T if free == 1 else np.eye(3) * (free == 0)
 
@@ -289,7 +288,7 @@ def _violated(motion: RobotMotion, allowed: float) -> Iterator[str]:
 
 def _extent(motion: RobotMotion) -> float:
     """A length (m) of the robot: its largest body, or the space in which its bodies move."""
-    places: Array = np.concatenate([pose.r for pose in motion.poses])
+    places: Array = np.concatenate([motion.places.frame(number).r for number in range(len(motion.model.tree.nodes))])
     bodies = [
         np.ptp([at.position for at in node.body.points.values()], axis=0)
         for node in motion.model.tree.nodes

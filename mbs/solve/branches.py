@@ -24,7 +24,7 @@ from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...common.toml_files import toml_line
 from ..model.model import Model
-from ..model.tree import Node, Section
+from ..model.nodes import Node, Section
 from ..scene.mechanism import Word
 from ..scene.space import SPACES
 from .posture import mobility, robot_size
@@ -171,8 +171,8 @@ def _chain(model: Model) -> list[Node]:
 
 def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:
     """Places (k, 3) of joints and directions (k, 3) of their positive turns, global axes."""
-    frames = model.tree.frames(q[None])
-    poses = [model.tree.pose(node.inner, q[None], frames) for node in joints]
+    places = model.tree.places(q[None])
+    poses = [places.at(node.inner) for node in joints]
     axes = [node.sign * pose.F[0, :, 2] for node, pose in zip(joints, poses, strict=True)]
     return np.reshape([pose.r[0] for pose in poses], (-1, 3)), np.reshape(axes, (-1, 3))
 
@@ -211,8 +211,7 @@ def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> A
     point = model.scene.tool_point
     if point is None:
         return as_floats(places[-1])
-    frames = model.tree.frames(q[None])
-    return as_floats(model.tree.pose(model.tree.section(point), q[None], frames).r[0])
+    return as_floats(model.tree.places(q[None]).at(model.tree.section(point)).r[0])
 
 
 def _cut_point(model: Model, body: str) -> str | None:
@@ -223,10 +222,10 @@ def _cut_point(model: Model, body: str) -> str | None:
 
 def _above(model: Model, q: Array, node: Node) -> bool:
     """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
-    tree, frames = model.tree, model.tree.frames(q[None])
+    tree, places = model.tree, model.tree.places(q[None])
 
     def place(section: Section) -> Array:
-        return tree.motion(section, q[None], frames).r[0]
+        return places.at(section).r[0]
 
     own, before, after = place(node.inner), node, node
     while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=NEAR):

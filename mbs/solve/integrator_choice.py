@@ -10,7 +10,6 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from ..model.cut import cut_damping
 from ..model.gears import tree_resistance_slope
 from ..model.known_motion import State
 from ..model.model import Model
@@ -78,7 +77,7 @@ def fastest_friction(system: MultibodySystem, at: State) -> tuple[float, str]:
     With D the slopes of friction at zero rates, the largest eigenvalue of M⁻¹ D, under what rows hold.
     """
     model, nothing = system.model, np.zeros(system.model.tree.n_v)
-    D = np.diag(tree_resistance_slope(model.tree, nothing[None])[0]) + cut_damping(model.tree, model.cut, at.q)
+    D = np.diag(tree_resistance_slope(model.tree, nothing[None])[0]) + model.along_cut.damping(at.q)
     if not D.any():
         return 0.0, ""
     by_forces = system.derivatives(0.0, at.q, at.v, nothing).a_f

@@ -15,9 +15,9 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..joints.joint import JointRecord
-from ..model.cut import cut_motions
 from ..model.model import Model
-from ..model.tree import KinematicTree, Node
+from ..model.nodes import Node
+from ..model.tree import KinematicTree
 
 ROUNDING = 1e-12  # of the largest value of a coordinate
 
@@ -105,5 +105,5 @@ def limited_coordinates(
         if _is_limited(node.joint) and (every or _is_sampled(node)):
             yield from ((node.joint, number, values) for number, values in enumerate(node.coordinates(q).T))
     if any(map(_is_limited, model.tree.cut_joints)):
-        for one, motion in zip(model.cut, cut_motions(model.tree, model.cut, q, v, times), strict=True):
+        for one, motion in zip(model.cut, model.along_cut.motions(q, v, times), strict=True):
             yield one.joint, one.number, motion.coordinate

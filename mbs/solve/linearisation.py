@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,14 +21,14 @@ from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ...common.structs import struct
-from ..model.cut import measured
 from ..model.frame_motors import turning_motors
 from ..model.gears import gear_matrices
-from ..model.known_motion import required_forces
-from ..model.model import Model, row_values
+from ..model.known_motion import KnownStates, required_forces
+from ..model.model import Model, constraint_values
 from ..model.motors import FrameShare, frame_share
+from ..model.nodes import Node
 from ..model.system import MultibodySystem
-from ..model.tree import CompliantGear, Motion, Node
+from ..model.tree import CompliantGear
 from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
@@ -71,15 +70,6 @@ class LinearMechanism:
         return [i for i, name in enumerate(self.names) if name.startswith(f"modal/{body}/")]
 
 
-class _State(NamedTuple):
-    """One state q (1, n_q), v and a (1, n_v) with the motion of its frames."""
-
-    q: Array
-    v: Array
-    a: Array
-    frames: Sequence[Motion]
-
-
 class LinearEquations:
     """What is the same at every posture: joints alone hold; given forces along s act, and loads.
 
@@ -105,7 +95,7 @@ class LinearEquations:
         Raises `SolveError` in a posture in which the independent coordinates do not determine the others.
         """
         tree, s = self.model.tree, self.independent
-        state = _State(q[None], v[None], a[None], tree.frames(q[None]))
+        state = KnownStates(q[None], v[None], a[None])
         H, determine = self._followers(state, t)
         force = H.T @ required_forces(self.model, state, np.array([t]))[0]
         along_s = np.zeros(tree.n_v)
@@ -133,13 +123,13 @@ class LinearEquations:
             MappingProxyType(tool_axes), H, H_dot, self._signs * force - on_modes @ H, self.names,
         )  # fmt: skip
 
-    def _followers(self, state: _State, t: float) -> tuple[Array, Array]:
+    def _followers(self, state: KnownStates, t: float) -> tuple[Array, Array]:
         """H (n_v, f), and what gives the coordinates that follow from the rates that rows would get (n_v − f, rows)."""
         n_v, s = self.model.tree.n_v, self.independent
         H = np.zeros((n_v, len(s)))
         H[s, np.arange(len(s))] = 1.0
         others = np.setdiff1d(np.arange(n_v), s)
-        C_v = row_values(self.model, state.q, np.array([t]), state.frames)[1][0]
+        C_v = constraint_values(self.model, state.q, np.array([t]))[1][0]
         if not len(others):
             return H, np.zeros((0, len(C_v)))
         sizes = np.linalg.svd(C_v[:, others], compute_uv=False)
@@ -162,27 +152,28 @@ class LinearEquations:
                 found[name] = self.model.sign(joint) * (H[k] + beside)
         return MappingProxyType(found | self._along_axes("force", points))
 
-    def _outputs(self, state: _State, H: Array, points: Mapping[str, Array]) -> Mapping[str, Array]:
+    def _outputs(self, state: KnownStates, H: Array, points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: joint coordinates, those of motors behind compliant gears, and places of points."""
         tree, found = self.model.tree, dict[str, Array]()
         for joint in self.model.scene.joint:
             if joint.name in tree.carried:
                 sign = tree.nodes[tree.carried[joint.name]].sign
                 found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
-        gradients = measured(tree, self.model.cut, state.q, state.frames)[1][0]
+        gradients = self.model.along_cut.measured(state.q)[1][0]
         for cut in tree.cut_joints:
             own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
             found |= dict(zip(_names(cut.name, len(own)), own, strict=True))
         found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
         return MappingProxyType(found | self._along_axes("point", points))
 
-    def _points(self, state: _State, H: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+    def _points(self, state: KnownStates, H: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """(k, f) translations along the axes of the space, then rotations, of each point; (k, k) axes of tools."""
         tree, space, found, axes = self.model.tree, SPACES[self.model.scene.space], {}, {}
         components = [*space.translations, *(3 + k for k in space.rotations)]
+        places = tree.places(np.tile(state.q, (H.shape[1], 1)), H.T)  # a unit of each of s by itself
         for point, place in self.points.items():
-            motion = tree.motion(tree.section(place), state.q, state.frames)
-            found[point] = motion.L[0, components] @ H
+            motion = places.at(tree.section(place))
+            found[point] = np.hstack([motion.velocity, motion.omega])[:, components].T
             if place in tree.tools:
                 axes[point] = np.kron(np.eye(2), motion.F[0].T)[np.ix_(components, components)]
         return found, axes
@@ -245,7 +236,7 @@ def _independent(model: Model, q: Array) -> Indices:
     modes = np.flatnonzero(~model.tree.joint_columns)
     motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
-    left = row_values(model, q[None], np.zeros(1))[1][0]
+    left = constraint_values(model, q[None], np.zeros(1))[1][0]
     size, free = np.abs(left).max(initial=0.0), []
     for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
         rank, order = 0, np.arange(len(group))

@@ -9,7 +9,7 @@ from ...common.errors import SolveError
 from ..model.gears import with_compliance
 from ..model.known_motion import State
 from ..model.model import Model, without_paths
-from ..model.tree import Section
+from ..model.nodes import Section
 from ..scene.space import SPACES
 from .joint_conditions import (
     COMPLIANT,
@@ -65,8 +65,8 @@ class PoseEvaluator:
             if len(self._omega):
                 response = frequency_response(found_there.free, mechanism.of_tool(self.point), self._omega)
                 found[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
-        frames = tree.frames(q[None])
-        found["robot"] = np.array([[tree.motion(end, q[None], frames).r[0] for end in pair] for pair in self.segments])
+        places = tree.places(q[None])
+        found["robot"] = np.array([[places.at(end).r[0] for end in pair] for pair in self.segments])
         return found
 
     def _all(self, q: Array) -> Array:
@@ -76,8 +76,7 @@ class PoseEvaluator:
 
     def _place(self, q: Array) -> Array:
         tree = self.model.tree
-        motion = tree.motion(tree.section(self.point), q[None], tree.frames(q[None]))
-        return self.space.along(motion.r[0])
+        return self.space.along(tree.places(q[None]).at(tree.section(self.point)).r[0])
 
     def _equilibrium(self, q: Array) -> tuple[LinearMechanism, LinearMechanism, Array]:
         """The linear equations in q (n_q,) and in the equilibrium near it with motors locked, and its coordinates."""

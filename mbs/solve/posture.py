@@ -12,8 +12,9 @@ from ...common.arrays import Array, Booleans, as_floats, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from .._core import TimeFunction
+from ..model.kinematics import PostureSearch
 from ..model.known_motion import State
-from ..model.model import Model, row_values, target_rates, turned_over, without_paths
+from ..model.model import Model, constraint_rates, constraint_values, turned_over, without_paths
 
 TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
 MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
@@ -23,7 +24,6 @@ BRANCHING = 0.05  # ratio below which bent links may take redundant loops from o
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
 BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where equations of loops are distinguished
-MOST_ITERATIONS = 60
 LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
 
 
@@ -50,35 +50,28 @@ def solve_posture(model: Model, t: float, q: Array, held: Booleans | None = None
     return found[0] if is_met[0] else None
 
 
+def posture_search(model: Model) -> PostureSearch:
+    """By steps of joints, modes staying as they are."""
+    # Coordinates by themselves have no branches
+    farthest = np.inf if all(row.kind == "coordinate" for row in model.rows) else LARGEST_TURN
+    return PostureSearch(joint_scales(model), row_sizes(model), farthest)
+
+
 def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None = None) -> tuple[Array, Booleans]:
     """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,).
 
     Where C = 0 with a joint or a tool turned over it did not.
     """
-    q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
-        return q, np.ones(len(q), dtype=bool)
-    scales, row_scales = joint_scales(model), row_sizes(model)
-    going, joints = np.arange(len(q)), scales > 0 if held is None else (scales > 0) & ~held
-    farthest = np.inf if all(row.kind == "coordinate" for row in model.rows) else LARGEST_TURN  # these have no branches
-    for _ in range(MOST_ITERATIONS):
-        with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
-            C, C_v = row_values(model, q[going], times[going])
-            J = C_v[:, :, joints] * scales[joints] / row_scales[:, None]
-        left[going] = np.where(np.isfinite(J).all(axis=(1, 2)), np.abs(C / row_scales).max(axis=1), np.nan)
-        on = left[going] > TOLERANCE
-        going = going[on]
-        if not len(going):
-            break
-        step = np.zeros((len(going), len(scales)))
-        step[:, joints] = -np.einsum("tij,tj->ti", np.linalg.pinv(J[on], rcond=1e-10), C[on] / row_scales)
-        longest = np.abs(step).max(axis=1, keepdims=True)
-        step *= np.minimum(1.0, farthest / np.maximum(longest, 1e-300))
-        q[going] = model.tree.integrate(q[going], step * scales)
+        return np.array(q), np.ones(len(q), dtype=bool)
+    search = posture_search(model)
+    if held is not None:
+        search.scales[held] = 0.0
+    found, left = model.constraints.postures(q, times, search)
     is_met = left <= MET
-    for is_turned_over in turned_over(model, q, times).values():
+    for is_turned_over in turned_over(model, found, times).values():
         is_met &= ~is_turned_over
-    return q, is_met
+    return found, is_met
 
 
 def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans | None = None) -> State:
@@ -88,8 +81,8 @@ def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans 
     scales, now = joint_scales(model), np.array([t])
     if held is not None:
         scales[held] = 0.0
-    C_v = row_values(model, q[None], now)[1][0]
-    left = target_rates(model, q[None], now)[0] - C_v @ v
+    C_v = constraint_values(model, q[None], now)[1][0]
+    left = -constraint_rates(model, q[None], v[None], now)[0]
     return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
 
 
@@ -239,7 +232,7 @@ def _scaled_rows(model: Model, q: Array, t: float = 0.0) -> Array:
 
 def _scaled_rows_at(model: Model, times: Array, q: Array) -> Array:
     """The same (T, rows, joint coordinates) at `times` (T,) and q (T, n_q)."""
-    C_v = row_values(model, q, times)[1]
+    C_v = constraint_values(model, q, times)[1]
     return as_floats((C_v * joint_scales(model) / row_sizes(model)[:, None])[:, :, model.tree.joint_columns])
 
 

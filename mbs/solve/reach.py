@@ -11,8 +11,8 @@ from ...common.arrays import Array, Booleans, Indices, as_floats
 from ...common.errors import InputError
 from ...common.toml_files import toml_line
 from ..fields.field_types import split_point
-from ..model.model import Model, row_values
-from ..model.tree import Node
+from ..model.model import Model, constraint_values
+from ..model.nodes import Node
 from ..scene.mechanism import MechanismKeys
 from ..scene.space import SPACES
 from ..scene.trajectories import Trajectory
@@ -137,7 +137,7 @@ def are_regular(model: Model, q: Array, times: Array) -> Booleans:
     """(T,) whether joints follow all rows at `times` (T,) in the postures q (T, n_q)."""
     joints = model.tree.joint_columns
     scales = joint_scales(model)[joints]
-    J = row_values(model, q, times)[1][:, :, joints] * scales / row_sizes(model)[:, None]
+    J = constraint_values(model, q, times)[1][:, :, joints] * scales / row_sizes(model)[:, None]
     values = np.linalg.svd(J, compute_uv=False)
     return np.asarray(values[:, -1] > REGULAR * values[:, 0])
 

@@ -17,10 +17,10 @@ from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, SolveError
 from .. import _core
 from ..fields.waypoints import spline
-from ..model.model import Model, row_values, target_rates
+from ..model.model import Model, constraint_rates, constraint_values
 from ..model.motors import driven_mechanism
+from ..model.nodes import Node
 from ..model.rows import coordinate_row
-from ..model.tree import Node
 from .posture import Mobility, joint_scales, mobility
 from .prescribed import joint_places, prescribed_motion
 from .start import undeformed_posture
@@ -96,12 +96,12 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
 
     if len(times) == 1:
         return q[None]
-    scales, places = joint_scales(model), joint_places(model)
+    scales, places, rest = joint_scales(model), joint_places(model), np.zeros((1, model.tree.n_v))
 
     def rates(t: float, way: Array) -> Array:
         at, now, q_dot = (q + way)[None], np.array([t]), np.zeros_like(q)
-        C_v = (row_values(model, at, now)[1][0] * scales)[:, model.tree.joint_columns]
-        least = np.linalg.pinv(C_v, rcond=RANK) @ target_rates(model, at, now)[0]
+        C_v = (constraint_values(model, at, now)[1][0] * scales)[:, model.tree.joint_columns]
+        least = -np.linalg.pinv(C_v, rcond=RANK) @ constraint_rates(model, at, rest, now)[0]
         q_dot[places] = scales[model.tree.joint_columns] * least
         return q_dot
 
@@ -159,7 +159,7 @@ def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[
 
     Raises `SolveError` where no such joints tell it all along the path.
     """
-    scales, C_v = joint_scales(model), row_values(model, q, times)[1]
+    scales, C_v = joint_scales(model), constraint_values(model, q, times)[1]
     joints = np.eye(len(scales))[:, scales > 0]
     free = [joints @ null_space(of_one * scales @ joints, RANK) for of_one in C_v]
     single = [node for node in model.tree.nodes if len(node.joint.units) == 1]

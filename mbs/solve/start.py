@@ -10,11 +10,10 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State, mass_matrices
-from ..model.model import Model, row_values, turned_over
+from ..model.model import Model, constraint_values, turned_over
 from ..scene.bodies import ROUNDING, tensor
 from .posture import (
     MET,
-    MOST_ITERATIONS,
     joint_scales,
     mobility,
     paths_by_bending,
@@ -53,7 +52,7 @@ def undeformed_posture(model: Model) -> State:
             advice.append(f"from [initial] {as_guess(turning_joints(model)[0], works)} it works")
         raise InputError(
             f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
-            f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps"
+            f" {owners} at t = 0, found none by Newton's method"
             f" ({'; '.join(advice) or 'out of reach, or on another branch?'})"
         )
     v, named = _guessed_rates(model), _named(model, "joint_rates")
@@ -104,7 +103,7 @@ def _turned_over(model: Model, guess: Array) -> Iterator[str]:
     """What is turned by π in the posture next to the guess that would meet all rows but for that."""
     times = np.zeros(1)
     q = solve_postures(model, times, guess[None])[0]
-    if np.abs(row_values(model, q, times)[0] / row_sizes(model)).max() <= MET:
+    if np.abs(constraint_values(model, q, times)[0] / row_sizes(model)).max() <= MET:
         for owner, is_so in turned_over(model, q, times).items():
             if is_so[0]:
                 yield f'next to it "{owner}" is turned over: axes that it aligns point against each other'
@@ -172,7 +171,7 @@ def _with_slides(model: Model, q: Array) -> Array:
     slides = [node for node in model.tree.nodes if node.joint.type == "prismatic" and node.joint.name not in guesses]
     if not (slides and model.scene.is_planar and is_loop.any()):
         return q
-    values, gradients = row_values(model, q[None], np.zeros(1))
+    values, gradients = constraint_values(model, q[None], np.zeros(1))
     dv, along = np.zeros(model.tree.n_v), [node.v.start for node in slides]
     dv[along] = np.linalg.lstsq(gradients[0, is_loop][:, along], -values[0, is_loop], rcond=1e-10)[0]
     return model.tree.integrate(q, dv)

@@ -14,10 +14,9 @@ from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from ..model.body import Body
-from ..model.cut import cut_damping
 from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
-from ..model.model import Model, row_values, without_paths
+from ..model.model import Model, constraint_values, without_paths
 from ..model.system import MultibodySystem
 from .posture import solve_posture
 from .redundancy import resolved
@@ -51,7 +50,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     gears, D their damping and viscous friction; neither gravity nor dry friction.
     """
     M = np.linalg.inv(unconstrained.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
-    C_v = row_values(model, q[None], np.array([t]))[1][0]
+    C_v = constraint_values(model, q[None], np.array([t]))[1][0]
     free = null_space(C_v, DEPENDENT)
     K, D = _springs(model, q)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
@@ -65,7 +64,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
 def _springs(model: Model, q: Array) -> tuple[Array, Array]:
     """K and D (n_v, n_v) of modes, gears and viscous friction at q (n_q,)."""
     K, D = gear_matrices(model.tree, q)
-    D += cut_damping(model.tree, model.cut, q)
+    D += model.along_cut.damping(q)
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
         D[node.p_v, node.p_v] = node.body.damping

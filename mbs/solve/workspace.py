@@ -16,7 +16,7 @@ from .._core import TimeFunction
 from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
 from ..fields.waypoints import spline
-from ..model.model import Model, row_of_joint, row_values, without_paths
+from ..model.model import Model, constraint_values, row_of_joint, without_paths
 from ..model.rows import ConstraintRow
 from .limits import limited_coordinates
 from .posture import solve_postures
@@ -60,7 +60,8 @@ def grid_postures(model: Model, axes: Sequence[GridAxis], point: str, *, keeps_o
     start, shape = undeformed_posture(model).q, tuple(len(axis.values) for axis in axes)
     values = np.stack(np.meshgrid(*(axis.values for axis in axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
     rows = [_row(model, axis, point, values[:, k]) for k, axis in enumerate(axes)]
-    measured = row_values(model=replace(model, rows=tuple(rows)), q=start[None], times=np.zeros(1))[0][0] + values[0]
+    along = replace(model, rows=tuple(rows))
+    measured = constraint_values(along, start[None], np.zeros(1))[0][0] + values[0]
     if keeps_orientation:
         rows += _orientation(model, point, start)
     robot = without_paths(model)
@@ -166,7 +167,7 @@ def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
     """Rows by which the body of `point` is turned as at the start: about z in the plane, about all axes else."""
     tree = model.tree
     ground, section = map(tree.section, (GROUND, point))
-    triad = tree.motion(section, start[None], tree.frames(start[None])).F[0]
+    triad = tree.places(start[None]).at(section).F[0]
     reference = logarithm(triad)
     law = OrientationLaw(
         "rotation_vector", (TimeFunction.constant(0.0),) * 3, (reference[0], reference[1], reference[2])

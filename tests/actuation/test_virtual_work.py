@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import tree_oracle
 from beam_links import paper_link
 from patches_on_links import CERAMIC
 
@@ -44,7 +45,7 @@ def limited():
 def velocity(result, body):
     """(T, 6 + n): of the frame and its turn, in axes of the body, and p."""
     moving, node = result.motion.body(body), result.motion.node(body)
-    F = result.motion.frames[result.motion.model.tree.index[body]].F
+    F = tree_oracle.frames(result.motion.model.tree, result.motion.q)[result.motion.model.tree.index[body]].F
     frame = [np.einsum("tji,tj->ti", F, of) for of in (moving.velocity, moving.angular_velocity)]
     return np.column_stack([*frame, result.motion.v[:, node.p_v]])
 

@@ -9,10 +9,10 @@ and 0.9 with modes from 50 on (what does not depend on their number still counts
 
 import numpy as np
 import pytest
+from tree_oracle import row_values
 
 from bench.growth import LINKS, MODES, MODES_IN_CHAINS, chain, evaluation_timer
 from bench.hand_written import start_at_rest, targets
-from ffrobot.mbs.model.model import row_values
 
 pytestmark = pytest.mark.alone
 

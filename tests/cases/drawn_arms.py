@@ -2,6 +2,7 @@
 
 import numpy as np
 import tomli_w
+import tree_oracle
 from scipy.spatial.transform import Rotation
 
 from ffrobot.run.solve import prepare_scene
@@ -115,7 +116,7 @@ def posed(scene, postures, tool, end, path, tolerance=1e-6):
     places = []
     for posture in postures:
         q = tree.at_rest({name: [value] for name, value in posture.items()})[None]
-        at = tree.motion(tree.section(tool, np.eye(3)), q, tree.frames(q))
+        at = tree_oracle.motion(tree, tree.section(tool, np.eye(3)), q, tree_oracle.frames(tree, q))
         turn = Rotation.from_matrix(at.F[0]).as_euler("xyz").tolist() if len(posture) == 6 else []
         places.append([round(x, 6) for x in (*at.r[0], *turn)])
     scene["trajectory"] = [{"name": "tool", "point": tool, "via": places, "duration": end}]

@@ -6,13 +6,14 @@ SI units, global axes, states (T, …).
 from typing import NamedTuple
 
 import numpy as np
+import tree_oracle
 from oracle_3d import Mechanism
 from rotations import quaternion
 from triad_measures import Ground, Joint, Section, Spinning
 
 from ffrobot.common.arrays import Array
-from ffrobot.mbs.model.cut import measured
-from ffrobot.mbs.model.gears import resistance, rotor
+from ffrobot.mbs.model.gears import resistance
+from ffrobot.mbs.model.nodes import rotor
 from ffrobot.mbs.quantities.motion import Energies, Momentum
 
 
@@ -27,7 +28,7 @@ class Accelerated(NamedTuple):
 
 
 def accelerated(motion) -> Accelerated:
-    return Accelerated(motion.model.tree, motion.q, motion.v, motion.a, motion.frames)
+    return Accelerated(motion.model.tree, motion.q, motion.v, motion.a, tree_oracle.frames(motion.model.tree, motion.q))
 
 
 class Absolute(NamedTuple):
@@ -112,7 +113,7 @@ def required_forces(model, state, times):
     """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
     mechanism = mechanism_of(state.tree, model.scene.gravity)
     accelerations = absolute_accelerations(mechanism, state)
-    found = resistance(model, state.q, state.v, state.frames) - given_forces(model, state.q, state.frames, times)
+    found = resistance(model, state.q, state.v) - given_forces(model, state.q, state.frames, times)
     found -= gear_forces(model.tree, state.q, state.v)
     for k, (at, a) in enumerate(zip(absolute_states(mechanism, state), accelerations, strict=True)):
         found[k] += at.B.T @ (mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v))
@@ -146,13 +147,13 @@ def body_forces(state: Accelerated, gravity) -> list[BodyForces]:
 
 def given_forces(model, q: Array, frames, times: Array) -> Array:
     """Generalized forces (T, n_v) of all given loads at q (T, n_q) and `times` (T,)."""
-    tree, found = model.tree, cut_loads(model.tree, model.cut, q, frames, times)
+    tree, found = model.tree, cut_loads(model, q, times)
     for direction, size in model.modal_loads:
         found += size.sample(times)[0][:, None] * direction
     for load in model.scene.load:
         values = {name: function.sample(times)[0] for name, function in load.components.items()}
         if load.point is not None:
-            L = tree.motion(tree.section(load.point, np.eye(3)), q, frames).L
+            L = tree_oracle.motion(tree, tree.section(load.point, np.eye(3)), q, frames).L
             none = np.zeros(len(times))
             wrench = np.stack([values.get(name, none) for name in ("x", "y", "z", "mx", "my", "mz")], axis=1)
             found += np.einsum("tij,ti->tj", L, wrench)
@@ -166,12 +167,12 @@ def along_cut(one, times):
     return sum((load.sample(times)[0] for load in one.loads), np.zeros(len(times)))
 
 
-def cut_loads(tree, cut, q, frames, times) -> Array:
+def cut_loads(model, q, times) -> Array:
     """Generalized forces (T, n_v) of given loads along cut joints at `times` (T,)."""
-    loaded, found = [one for one in cut if one.loads], np.zeros((len(q), tree.n_v))
-    if loaded:
-        _, gradients = measured(tree, loaded, q, frames)
-        for k, one in enumerate(loaded):
+    found = np.zeros((len(q), model.tree.n_v))
+    if model.cut:
+        gradients = tree_oracle.cut_coordinates(model, q)[1]
+        for k, one in enumerate(model.cut):
             found += along_cut(one, times)[:, None] * gradients[:, k]
     return found
 
@@ -213,7 +214,7 @@ def energies(motion) -> Energies:
     found = [mechanism.energies(at.q, at.v) for at in absolute_states(mechanism, accelerated(motion))]
     kinetic, strain, gravitational = np.array(found).T
     of_gears, dissipated = gear_energy(tree, motion.q, motion.v)
-    dissipated += np.sum(motion.v * resistance(model, motion.q, motion.v, motion.frames), axis=1)
+    dissipated += np.sum(motion.v * resistance(model, motion.q, motion.v), axis=1)
     for node in tree.nodes:
         p_dot = motion.v[:, node.p_v]
         dissipated += np.einsum("ti,ij,tj->t", p_dot, node.body.damping, p_dot)
@@ -231,7 +232,7 @@ def momentum(motion) -> Momentum:
         for row, inertia in (one for node in tree.nodes for one in spinning_rotor(tree, node)):
             axis = mechanism.marker(row.a, at.q, at.v).F[:, 2]
             angular[k] += inertia * mechanism.row(row, at.q, at.v).rate * axis
-        for node, frame in zip(tree.nodes, motion.frames, strict=True):
+        for node, frame in zip(tree.nodes, tree_oracle.frames(motion.model.tree, motion.q), strict=True):
             along, about, _ = mechanism.coordinates.rates(of_all, node.body.name)
             linear[k] += along
             angular[k] += frame.F[k] @ about + np.cross(frame.r[k], along)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import tree_oracle
 from checkpoint_scenes import as_scene, coordinates, rpy, tree_model
 from random_mechanisms import Tree, random_tree
 
@@ -64,7 +65,9 @@ def closed_chain(rng, types, kinds, size=0.01, rotors=False):
     for node in model.tree.nodes:
         q[node.p_q] = p[node.body.name]
     end = f"b{len(tree.bodies)}.tip"
-    tip = model.tree.motion(model.tree.section(end, np.eye(3)), q[None], model.tree.frames(q[None]))
+    tip = tree_oracle.motion(
+        model.tree, model.tree.section(end, np.eye(3)), q[None], tree_oracle.frames(model.tree, q[None])
+    )
     name, type_, axis = f"j{len(types)}", types[-1], rng.standard_normal(3)
     R = tip.F[0]
     last = {"name": name, "type": type_, "between": ("ground", end), "at": tip.r[0].tolist(), "rpy": rpy(R)}

@@ -3,8 +3,8 @@
 import numpy as np
 from checkpoint_scenes import as_scene, coordinates, tree_model
 from random_mechanisms import random_tree
+from tree_oracle import row_values
 
-from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.motion import RobotMotion
 

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from mechanisms import always, random_state
 from scipy.integrate import simpson
+from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.analysis.outcome import Motion, Outcome
-from ffrobot.mbs.model.model import row_values, target_rates
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.motion import RobotMotion, totals
 from ffrobot.mbs.quantities.reactions import reactions

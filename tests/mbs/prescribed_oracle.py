@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import tree_oracle
 from body_equations import (
     absolute_accelerations,
     absolute_states,
@@ -16,9 +17,8 @@ from body_equations import (
     triad,
 )
 from row_wrenches import spin_of_modes
+from tree_oracle import row_values
 from triad_measures import Along, Dot, Way
-
-from ffrobot.mbs.model.model import row_values
 
 
 def residuals(motion):
@@ -84,13 +84,13 @@ class Motor(NamedTuple):
 
 def unmet(model, found, motors):
     """Forces (T, n_v) that motors and loops leave of `found.required`, by its τ and multipliers of loops."""
-    C_v, frames = row_values(model, found.q, np.zeros(len(found.q)))[1], model.tree.frames(found.q)
+    C_v, frames = row_values(model, found.q, np.zeros(len(found.q)))[1], tree_oracle.frames(model.tree, found.q)
     left = found.required + np.einsum("tij,ti->tj", C_v[:, model.loop_rows], found.loops)
     for k, motor in enumerate(motors):
         left[:, motor.coordinate] -= motor.sign * found.tau[:, k]
         if motor.turns_frames:
             node = next(node for node in model.tree.nodes if node.v.start == motor.coordinate)
-            axis = model.tree.motion(node.inner, found.q, frames).F[:, :, 2]
+            axis = tree_oracle.motion(model.tree, node.inner, found.q, frames).F[:, :, 2]
             for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
                 if section.body >= 0:
                     turn = side * motor.sign * found.tau[:, k, None] * axis

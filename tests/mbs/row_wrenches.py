@@ -1,15 +1,19 @@
 """What constraint equations of trees in 3D do on sections and bodies, in NumPy: an oracle of the core."""
 
 import numpy as np
+import tree_oracle
+from tree_oracle import turning_axis
 
 from ffrobot.common.rotations import left_jacobian
 from ffrobot.mbs.model.known_motion import Wrench
-from ffrobot.mbs.model.rows import turning_axis
 
 
 def along_joint(tree, node, force, q, frames):
     """What `force` (T, freedoms) along the joint that carries a body does on its outer side, about where that is."""
-    F, acting = tree.pose(node.inner, q, frames).F, np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
+    F, acting = (
+        tree_oracle.pose(tree, node.inner, q, frames).F,
+        np.einsum("tij,tj->ti", tree_oracle.action(node.joint, q[:, node.q]), force),
+    )
     return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
 
 
@@ -19,7 +23,7 @@ def row_wrenches(tree, row, size, q, times, frames):
     At q (T, n_q) and `times` (T,), with the `frames` there.
     """
     zero = np.zeros((len(times), 3))
-    a, b = (tree.motion(section, q, frames) for section in (row.a, row.b))
+    a, b = (tree_oracle.motion(tree, section, q, frames) for section in (row.a, row.b))
     if row.kind == "coordinate":
         on_b = along_joint(tree, tree.nodes[row.b.body], row.sign * size[:, None], q, frames).seen_from(b.r)
     elif row.kind in ("point", "slide"):
@@ -38,7 +42,11 @@ def row_wrenches(tree, row, size, q, times, frames):
 
 def on_body(model, q, frames, section, wrench):
     """(T, 6 + n) of a wrench on a section, moments about the global origin: on frame and modes of its body."""
-    node, frame, at = model.tree.nodes[section.body], frames[section.body], model.tree.motion(section, q, frames)
+    node, frame, at = (
+        model.tree.nodes[section.body],
+        frames[section.body],
+        tree_oracle.motion(model.tree, section, q, frames),
+    )
     on_frame = [np.einsum("tji,tj->ti", frame.F, x) for x in wrench.seen_from(-frame.r)]
     on_modes = np.einsum("ti,tij->tj", wrench.seen_from(-at.r).moment, spin_of_modes(model, q, frames, section))
     if section.point:

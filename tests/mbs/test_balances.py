@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import tree_oracle
 from body_equations import given_forces
 from links import arm, arm_links
 from mechanisms import forward, pcid
@@ -31,7 +32,7 @@ def test_work_of_given_loads_is_energy_gained_and_dissipated():
     model = arm(arm_links(damping_ratio=0.02), trajectory=[], load=loads)
     outcome = run(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance))
     run_of = outcome.outcome
-    given = given_forces(model.model, run_of.q, model.model.tree.frames(run_of.q), run_of.time)
+    given = given_forces(model.model, run_of.q, tree_oracle.frames(model.model.tree, run_of.q), run_of.time)
     power = np.sum(given * run_of.v, axis=1)
     work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
     assert losses > 1e-3

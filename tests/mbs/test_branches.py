@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tree_oracle
 from rods import arm_of_rods
 
 from ffrobot import make_scene, solve
@@ -95,7 +96,10 @@ def test_shoulder_elbow_and_wrist_of_six_axes(six_axes):
     pivots = [tree.nodes[tree.carried[name]].inner for name in ("shoulder", "elbow", "wrist_pitch")]
     held = []
     for one, ((shoulder, elbow, wrist), q) in zip(found, angles.items(), strict=True):
-        at = [tree.motion(section, one.q[None], tree.frames(one.q[None])) for section in (tool, *pivots)]
+        at = [
+            tree_oracle.motion(tree, section, one.q[None], tree_oracle.frames(tree, one.q[None]))
+            for section in (tool, *pivots)
+        ]
         held.append(at[0])
         a, b, c = (motion.r[0] for motion in at[1:])
         middle = a + (c - a) * ((b - a) @ (c - a)) / ((c - a) @ (c - a))

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+import tree_oracle
 from body_equations import absolute_accelerations, accelerated
 from closed_chains import NOW, closed_chain, evaluated
 from oracle_3d import Mechanism
 from prescribed_oracle import residuals
+from tree_oracle import row_values
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.motion import totals
 from ffrobot.mbs.quantities.reactions import reactions
@@ -39,7 +40,7 @@ def moving_chains(chain):
     for cut in chain.tables:
         model = chain.model(cut)
         q = chain.position(model)
-        frames = model.tree.frames(q[None])
+        frames = tree_oracle.frames(model.tree, q[None])
         L = {node.body.name: frame.L[0] for node, frame in zip(model.tree.nodes, frames, strict=True)}
         modes = {node.body.name: np.eye(model.tree.n_v)[node.p_v] for node in model.tree.nodes}
         along = np.vstack([np.vstack([L[body.name], modes[body.name]]) for body in chain.tree.bodies])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import tree_oracle
 from body_equations import (
     absolute_accelerations,
     accelerated,
@@ -100,8 +101,8 @@ def check_points(motion):
     for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
         force, moment = 0.0, 0.0
         for section, acting in motion.forces.at_points[number]:
-            place = tree.motion(section, motion.q, motion.frames)
-            at_frame = acting.seen_from(place.r - motion.frames[number].r)
+            place = tree_oracle.motion(tree, section, motion.q, tree_oracle.frames(motion.model.tree, motion.q))
+            at_frame = acting.seen_from(place.r - tree_oracle.frames(motion.model.tree, motion.q)[number].r)
             force, moment = force + at_frame.force, moment + at_frame.moment
         size = np.abs(expected.force).max() + np.abs(expected.moment).max()
         np.testing.assert_allclose(force, expected.force, rtol=0, atol=1e-11 * size)
@@ -110,6 +111,6 @@ def check_points(motion):
         np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
         of_body = motion.forces.of_body(number)
         a, alpha, _ = np.split(of_all[:, mechanism.coordinates.columns(node.body.name)], [3, 6], axis=1)
-        alpha = np.einsum("tij,tj->ti", motion.frames[number].F, alpha)
+        alpha = np.einsum("tij,tj->ti", tree_oracle.frames(motion.model.tree, motion.q)[number].F, alpha)
         for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from moving_trees import moving
 from random_mechanisms import TYPES
+from tree_oracle import row_values
 
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import StateFunction
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.loads import Load
 from ffrobot.mbs.solve.linearisation import LinearEquations

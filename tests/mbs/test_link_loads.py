@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import tree_oracle
 import zoo
 from body_equations import accelerated, body_forces
 from links import arm, arm_links
@@ -31,7 +32,9 @@ def missing(outcome):
     """By body (T, 6 + n) what it needs beside its loads at points, moments about its frame; the largest."""
     motion, found = outcome.motion, {}
     of_all = body_forces(accelerated(motion), outcome.robot.scene.gravity)
-    for node, frame, needed in zip(motion.model.tree.nodes, motion.frames, of_all, strict=True):
+    for node, frame, needed in zip(
+        motion.model.tree.nodes, tree_oracle.frames(motion.model.tree, motion.q), of_all, strict=True
+    ):
         if node.body.name not in [body.name for body in outcome.robot.bodies]:
             continue  # output of a rotor
         loads, p = link_loads(outcome, [node.body.name])[node.body.name].sizes, motion.q[:, node.p_q]

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import tree_oracle
 from body_equations import Accelerated, required_forces
 from closed_chains import closed_chain
 from moving_trees import SMALL, moving
@@ -13,14 +14,14 @@ from prescribed_oracle import Motor, row_accelerations, unmet
 from random_mechanisms import TYPES
 from rotations import random_rotation
 from scipy.linalg import qr
+from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.model.drives import Command, Drive
-from ffrobot.mbs.model.model import row_values, target_rates
+from ffrobot.mbs.model.nodes import Section
 from ffrobot.mbs.model.rows import ConstraintRow
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.model.tree import Section
 from ffrobot.mbs.scene.loads import Load
 from ffrobot.mbs.solve.servo import Servo
 
@@ -38,13 +39,13 @@ def polynomial(value, rate, acceleration):
 def candidates(rng, model, q):
     """Rows of all kinds that may follow a path, which measure 0 at q (n_q,): several for each body."""
     tree = model.tree
-    frames = tree.frames(q[None])
+    frames = tree_oracle.frames(tree, q[None])
     for number, node in enumerate(tree.nodes):
         for label in ("tip", "side"):
             section = Section(number, label, np.eye(3), np.zeros(3))
             yield from (ConstraintRow("path", "point", GROUND, section, f, f) for f in rng.standard_normal((3, 3)))
             for f in rng.standard_normal((3, 3)):
-                g = tree.motion(section, q[None], frames).F[0].T @ np.cross(f, rng.standard_normal(3))
+                g = tree_oracle.motion(tree, section, q[None], frames).F[0].T @ np.cross(f, rng.standard_normal(3))
                 yield ConstraintRow("path", "dot", GROUND, section, f, g)
         if number:
             a, f = Section(number - 1, "side", np.eye(3), np.zeros(3)), rng.standard_normal(3)
@@ -64,8 +65,7 @@ def coordinate_rows(node, coordinates):
     """Of a joint whose coordinates are numbers; the core has none of planar joints."""
     zero = np.zeros(3)
     for k in coordinates if node.joint.q_count == node.joint.freedoms and node.joint.type != "planar" else ():
-        place = node.q.start + k - node.v.start
-        yield ConstraintRow("path", "coordinate", node.inner, node.outer, zero, zero, coordinate=k, q_index=place)
+        yield ConstraintRow("path", "coordinate", node.inner, node.outer, zero, zero, coordinate=k)
 
 
 def following(rng, model, q, count_more=0, pool=()):
@@ -130,7 +130,7 @@ def drawn(seed, types, loops=0, count_more=0, pool=lambda *_: ()):
 def check(found, model, motors, modes):
     """Modes move as told; rows, d'Alembert's principle and the motors' share of forces hold as they do in NumPy."""
     tree, joints = model.tree, model.tree.joint_columns
-    state = Accelerated(tree, found.q, found.v, found.a, tree.frames(found.q))
+    state = Accelerated(tree, found.q, found.v, found.a, tree_oracle.frames(tree, found.q))
     C, C_v = row_values(model, found.q, TIMES)
     required, of_rows = required_forces(model, state, TIMES), np.einsum("tji,tj->ti", C_v, found.multipliers)
     for p, told in zip((found.q[:, modal_columns(tree)], found.v[:, ~joints], found.a[:, ~joints]), modes, strict=True):
@@ -204,7 +204,7 @@ def test_motors_of_a_redefined_output_are_those_of_less_deflection(types, loops)
     of_loops = model.loop_rows
     assert np.abs(C[:, of_loops]).max(initial=0.0) < 1e-11
     assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, of_loops]).max(initial=0.0) < 1e-10
-    state = Accelerated(model.tree, found.q, found.v, found.a, model.tree.frames(found.q))
+    state = Accelerated(model.tree, found.q, found.v, found.a, tree_oracle.frames(model.tree, found.q))
     required = required_forces(model, state, TIMES)
     left = unmet(model, SimpleNamespace(q=found.q, required=required, tau=found.tau, loops=found.loops), motors)
     np.testing.assert_allclose(found.left, left, atol=1e-11 * np.abs(required).max())

@@ -7,10 +7,10 @@ from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, relative, revolute
 from numpy.polynomial import Polynomial
 from oracle_runs import evaluated, point_motion, run
+from tree_oracle import row_values
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase
-from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.solve import stable_inversion
 from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.zero_dynamics import (

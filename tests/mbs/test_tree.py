@@ -1,12 +1,28 @@
 """The tree of a scene in 3D against the oracle: places, coordinates, gradients, loops, both orders of sides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import tree_oracle
 from checkpoint_scenes import as_scene, coordinates, tree_model
 from random_mechanisms import TYPES, placed, random_tree
-from rotations import quaternion
+from rotations import quaternion, random_rotation
+from tree_oracle import row_values, target_rates
+from trees_in_a_plane import TYPES as IN_PLANE
+from trees_in_a_plane import planar_model
 
-from ffrobot.mbs.model.model import row_values
+from ffrobot.mbs import _core
+from ffrobot.mbs.fields.orientations import OrientationLaw
+from ffrobot.mbs.model.model import constraint_rates, constraint_values
+from ffrobot.mbs.model.nodes import Section
+from ffrobot.mbs.model.rows import ConstraintRow, coordinate_row
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.solve.posture import solve_postures
+
+CLOSE = 1e-12
+GROUND = Section(-1, "", np.eye(3), np.zeros(3))
+JOINT = (tree_oracle.motion_of_joint, tree_oracle.action)
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
@@ -22,7 +38,7 @@ def test_bodies_stand_where_the_oracle_has_them(seed, turned):
     expected = placed(plain, p)
     for node in model.tree.nodes:
         q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
-    for node, frame in zip(model.tree.nodes, model.tree.frames(q[None]), strict=True):
+    for node, frame in zip(model.tree.nodes, tree_oracle.frames(model.tree, q[None]), strict=True):
         R, e, _ = mechanism.coordinates.parts(expected, node.body.name)
         np.testing.assert_allclose(frame.r[0], R, atol=1e-13)
         np.testing.assert_allclose(quaternion(frame.F[0]) * np.sign(e @ quaternion(frame.F[0])), e, atol=1e-13)
@@ -45,8 +61,11 @@ def test_jacobians_by_differences(turned):
     difference = (row_values(model, ahead, times)[0] - row_values(model, behind, times)[0]) / (2 * h)
     np.testing.assert_allclose(difference.T, C_v[0], atol=2e-8)
     section = model.tree.section("b9.tip", np.eye(3))
-    found = model.tree.motion(section, q[None], model.tree.frames(q[None]))
-    r = [model.tree.motion(section, moved, model.tree.frames(moved)) for moved in (ahead, behind)]
+    found = tree_oracle.motion(model.tree, section, q[None], tree_oracle.frames(model.tree, q[None]))
+    r = [
+        tree_oracle.motion(model.tree, section, moved, tree_oracle.frames(model.tree, moved))
+        for moved in (ahead, behind)
+    ]
     np.testing.assert_allclose((r[0].r - r[1].r).T / (2 * h), found.L[0, :3], atol=2e-8)
     turn = (r[0].F - r[1].F) @ found.F[0].T / (2 * h)
     np.testing.assert_allclose(np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]]), found.L[0, 3:], atol=2e-8)
@@ -67,3 +86,100 @@ def test_rows_of_loops_hold_where_the_oracle_has_them():
         C, _ = row_values(model, q[None], np.zeros(1))
         assert C.shape[1] == sum(len(joint.rows()) for joint in tree.loops)
         assert np.abs(C).max() < 1e-12
+
+
+def every_row(rng, model):
+    """Rows of all kinds between random sections, with targets and orientations that move, for each body."""
+    number, axes = _core.TimeFunction.polynomial, np.eye(3)
+    moving = [number(np.array([-1.0, 1.0]), rng.standard_normal((1, 4))) for _ in range(6)]
+    laws = [OrientationLaw(kind, tuple(moving[:3]), (0.1, 0.2, 0.3)) for kind in ("rotation_vector", "direction")]
+    for k, node in enumerate(model.tree.nodes):
+        a, b = (Section(body, "tip", random_rotation(rng), np.zeros(3)) for body in (int(rng.integers(-1, k)), k))
+        a = a if a.body >= 0 else Section(-1, "", a.triad, rng.standard_normal(3))
+        f, g = rng.standard_normal((2, 3))
+        for kind in ("point", "slide", "dot"):
+            yield ConstraintRow("path", kind, a, b, f, g, target=None if kind == "dot" else moving[3])
+        yield ConstraintRow("path", "turn", a, b, axes[0], axes[1], target=moving[4])
+        yield from (ConstraintRow("path", "rotation", GROUND, b, e, e, law=laws[0]) for e in axes)
+        yield from (ConstraintRow("path", "dot", b, GROUND, e, axes[2], law=laws[1]) for e in axes[:2])
+        if node.joint.units and node.joint.type != "planar":
+            yield coordinate_row("path", node, moving[5], sign=-1.0)
+            if node.joint.units[0] == "rad":
+                yield ConstraintRow("loop", "turn", a, b, axes[2], axes[0], coordinate=node.v.start)
+
+
+def states_of(rng, model):
+    """Random q and v of three states."""
+    q = np.tile(model.tree.at_rest({}), (3, 1))
+    q = tree_oracle.integrate(model.tree, q, rng.standard_normal((3, model.tree.n_v)))
+    for node in model.tree.nodes:
+        q[:, node.p_q] = 0.1 * rng.standard_normal((3, node.body.n_modes))
+    return q, rng.standard_normal((3, model.tree.n_v))
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+@pytest.mark.parametrize("seed", range(4))
+def test_core_moves_trees_and_measures_rows_as_numpy_does(seed, turned):
+    """Frames, sections, increments, C, C_v, Ċ and what joints carry, of all types of joints with loops."""
+    rng = np.random.default_rng(100 + seed)
+    kinds = ("rigid", "solid", "beam", "supported beam") if seed % 2 else ("stiffened solid", "stiffened beam", "rigid")
+    tree = random_tree(rng, rng.permutation(TYPES), kinds, chain=seed > 1, loops=3 * (seed % 2))
+    plain, tables = as_scene(tree, turned)
+    assert_core_is_the_oracle(rng, tree_model(plain, tables))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_core_moves_trees_in_a_plane_as_numpy_does(seed):
+    rng = np.random.default_rng(seed)
+    assert_core_is_the_oracle(rng, planar_model(rng, rng.permutation(IN_PLANE * 2)))
+
+
+def assert_core_is_the_oracle(rng, model):
+    tree, (q, v) = model.tree, states_of(rng, model)
+    places, frames = tree.places(q, v), tree_oracle.frames(tree, q)
+    sections = [side for node in tree.nodes for side in (node.inner, node.outer)]
+    sections += [tree.section(f"{node.body.name}.{point}", random_rotation(rng)) for node in tree.nodes
+                 for point in node.body.points]  # fmt: skip
+    found = [places.frame(number) for number in range(len(frames))] + [places.at(section) for section in sections]
+    expected = frames + [tree_oracle.motion(tree, section, q, frames) for section in sections]
+    for at, of in zip(found, expected, strict=True):
+        rates = np.einsum("tij,tj->ti", of.L, v)
+        for ours, numpys in zip(at, (of.r, of.F, rates[:, :3], rates[:, 3:]), strict=True):
+            np.testing.assert_allclose(ours, numpys, rtol=0, atol=CLOSE * max(1.0, np.abs(numpys).max()))
+    moved = tree_oracle.integrate(tree, q, 0.3 * v)
+    np.testing.assert_allclose(tree.integrate(q, 0.3 * v), moved, rtol=0, atol=CLOSE * np.abs(moved).max())
+    model, times = replace(model, rows=(*model.rows, *every_row(rng, model))), np.array([0.0, 0.2, 0.5])
+    C, C_v = constraint_values(model, q, times)
+    for ours, numpys in zip((C, C_v), row_values(model, q, times), strict=True):
+        np.testing.assert_allclose(ours, numpys, rtol=0, atol=CLOSE * np.abs(numpys).max())
+    rates = np.einsum("tij,tj->ti", C_v, v) - target_rates(model, q, times)
+    np.testing.assert_allclose(constraint_rates(model, q, v, times), rates, rtol=0, atol=CLOSE * np.abs(rates).max())
+    assert_joints_carry_what_does_no_work(rng, model, q, frames)
+
+
+def assert_joints_carry_what_does_no_work(rng, model, q, frames):
+    tree, forces = model.tree, rng.standard_normal((len(q), 6 * len(model.tree.nodes)))
+    found = MultibodySystem(replace(model, rows=())).core.without_work(q, forces)
+    for number, node in enumerate(tree.nodes):
+        F, of = tree_oracle.motion(tree, node.inner, q, frames).F, slice(6 * number, 6 * number + 6)
+        axes = np.zeros((len(q), 6, 6))
+        axes[:, :3, :3] = axes[:, 3:, 3:] = F
+        S, acts = (axes @ of_joint(node.joint, q[:, node.q]) for of_joint in JOINT)
+        left = forces[:, of] - np.einsum("tik,tjk,tj->ti", acts, S, forces[:, of])
+        np.testing.assert_allclose(found[:, of], left, rtol=0, atol=CLOSE)
+
+
+@pytest.mark.parametrize("types", [("revolute", "universal", "spherical"), ("cylindrical", "revolute", "planar")])
+def test_postures_keep_to_loops(types):
+    """Where Newton's method converges in the core, NumPy's C is zero, and modes are where they were."""
+    rng = np.random.default_rng(5)
+    tree = random_tree(rng, types, ("rigid", "solid"), chain=True, loops=1)
+    plain, tables = as_scene(tree, turned=False)
+    model = tree_model(plain, tables)
+    q = np.tile(model.tree.at_rest(coordinates(model, plain, turned=False)), (5, 1))
+    q = tree_oracle.integrate(model.tree, q, 0.1 * rng.standard_normal((5, model.tree.n_v)))
+    found, is_met = solve_postures(model, np.zeros(5), q)
+    assert is_met.any()
+    np.testing.assert_allclose(row_values(model, found[is_met], np.zeros(5)[is_met])[0], 0.0, atol=1e-11)
+    for node in model.tree.nodes:
+        np.testing.assert_array_equal(found[:, node.p_q], q[:, node.p_q])

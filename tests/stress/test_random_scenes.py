@@ -1,6 +1,7 @@
 """Scenes at random: what holds for every mechanism holds for each of them."""
 
 import numpy as np
+import tree_oracle
 import zoo
 from body_equations import accelerated, given_forces, required_forces
 from hypothesis import given, settings
@@ -56,7 +57,7 @@ def test_power_is_the_rate_of_energy(system):
 
     rate = (energy(h)[0] - energy(-h)[0]) / (2 * h)
     motion, power = found.motion, -energy(0.0)[2]
-    given = given_forces(motion.model, motion.q, motion.frames, motion.time)[0]
+    given = given_forces(motion.model, motion.q, tree_oracle.frames(motion.model.tree, motion.q), motion.time)[0]
     power += given @ v - motion.multipliers[0] @ motion.rows[1][0] @ v
     terms = np.abs(v) @ np.abs(required_forces(motion.model, accelerated(motion), motion.time)[0] + given) + abs(power)
     rounding = 1e-15 * energy(0.0)[1] / h  # of the differences; allowed beside the bound on the rest

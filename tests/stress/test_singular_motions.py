@@ -7,9 +7,9 @@ from mechanisms import make_model, relative, revolute
 from oracle_runs import joint_forces
 from robots import free_run, inverse, parallelogram, reaching, slider_crank, through_dead_centre
 from rods import rod
+from tree_oracle import target_rates
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.model import target_rates
 
 
 def refused(run, *says):

@@ -17,8 +17,8 @@ from ...mbs.analysis.forward import Forward
 from ...mbs.joints.free import FreeJoint
 from ...mbs.joints.joints import JOINT_TYPES
 from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.nodes import Node
 from ...mbs.model.system import MultibodySystem
-from ...mbs.model.tree import Node
 from ...mbs.solve.integrator_choice import integrator_of
 from ...mbs.solve.integrators import METHODS
 from ...mbs.solve.statics import initial_state

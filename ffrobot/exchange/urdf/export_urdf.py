@@ -18,7 +18,8 @@ from ...mbs.joints.joint import JointRecord
 from ...mbs.joints.moving_joint import MovingJoint
 from ...mbs.joints.screw import ScrewJoint
 from ...mbs.model.model import build_model
-from ...mbs.model.tree import KinematicTree, Node
+from ...mbs.model.nodes import Node
+from ...mbs.model.tree import KinematicTree
 from ...mbs.solve.posture import robot_size
 from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_robot

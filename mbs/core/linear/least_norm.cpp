@@ -13,8 +13,8 @@ constexpr double dependent = 1e-10; // of the largest pivot: rounding leaves 1e-
 
 } // namespace
 
-void LeastNorm::compute(const MatrixXd &A) {
-  is_square_ = A.rows() == A.cols();
+void LeastNorm::compute(const MatrixXd &A, bool may_be_singular) {
+  is_square_ = A.rows() == A.cols() && !may_be_singular;
   if (is_square_) {
     lu_.compute(A);
     return;

@@ -8,7 +8,7 @@ namespace ffrobot {
 
 class LeastNorm {
 public:
-  void compute(const Eigen::MatrixXd &A);
+  void compute(const Eigen::MatrixXd &A, bool may_be_singular = false); // a square one
   Eigen::VectorXd solve(const Eigen::VectorXd &b) const;
   Eigen::MatrixXd solve(const Eigen::MatrixXd &b) const; // column by column
   Eigen::VectorXd solve_transposed(const Eigen::VectorXd &c) const;

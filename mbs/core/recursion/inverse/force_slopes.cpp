@@ -1,12 +1,11 @@
 #include "core/recursion/inverse/force_slopes.h"
 
 #include "core/linear/products.h"
-#include "core/recursion/constrained_aba/gradients.h"
+#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/natural_sizes.h"
 #include "core/recursion/motion/scene_forces.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace ffrobot::recursion {
 
@@ -99,9 +98,7 @@ ForcesAtRest forces_at_rest(const Mechanism<Space> &m, const Scene &scene, doubl
   AtRest<Space> at(m, scene, t, q, w);
   ForcesAtRest found{{}, VectorXd(rows), MatrixXd(rows, m.n_v), 0, 0};
   if (rows) {
-    std::vector<int> all(static_cast<std::size_t>(m.n_v));
-    std::iota(all.begin(), all.end(), 0);
-    found.C_q = gradients(m, q.data(), all, w);
+    found.C_q = gradients(m, q.data(), w);
     VectorXd rate(rows);
     measure(m, q.data(), at.still.data(), w, found.value.data(), rate.data());
     const std::vector<Jet> targets = targets_at(scene, t);

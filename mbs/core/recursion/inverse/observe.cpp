@@ -1,5 +1,6 @@
 #include "core/recursion/inverse/observe.h"
 
+#include "core/recursion/constrained_aba/joint_elimination.h"
 #include "core/recursion/constrained_aba/once.h"
 
 #include <Eigen/Geometry>
@@ -78,15 +79,22 @@ template <class Body> double damping_power(const Body &b, const double *p_dot) {
   return rates.cwiseAbs2().dot(Eigen::Map<const Eigen::VectorXd>(b.D.data(), b.n));
 }
 
-// z of the section that the joint holds
+// Axes of the section that the joint holds
 template <class Space>
-Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
+Matrix3d outer_axes(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
   const Node<Space> &node = m.nodes[i];
   if (node.inboard < 0)
-    return axes(w.frames[i]).col(2);
+    return axes(w.frames[i]);
   Pose<double> section;
   section_pose(node.body, node.inboard, w.bodies[i], w.frames[i], section);
-  return axes(section).col(2);
+  return axes(section);
+}
+
+void write_motion(const Pose<double> &of, double *to) {
+  const Matrix3d R = axes(of);
+  Eigen::Map<Eigen::Matrix<double, 18, 1>> found(to);
+  found << vector(of.r), R.row(0).transpose(), R.row(1).transpose(), R.row(2).transpose(), vector(of.v),
+      vector(of.omega);
 }
 
 } // namespace
@@ -142,7 +150,7 @@ template <class Space> Totals totals(const Placed<Space, double> &at) {
     if (node.rotor_inertia > 0) {
       const double spin = w.hinges[i].spin;
       sum.kinetic += 0.5 * node.rotor_inertia * spin * spin;
-      sum.angular_momentum += node.rotor_turns * node.rotor_inertia * spin * joint_axis(m, i, w);
+      sum.angular_momentum += node.rotor_turns * node.rotor_inertia * spin * outer_axes(m, i, w).col(2);
     }
   }
   return sum;
@@ -173,6 +181,48 @@ Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, co
 } // namespace
 
 template <class Space>
+RowMajor motions_of_states(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &v,
+                           Workspace<Space, double> &w) {
+  RowMajor found(q.rows(), 18 * static_cast<Eigen::Index>(m.nodes.size() + m.wrenches.size()));
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const Placed<Space, double> at = place_all(m, q.row(i).data(), v.row(i).data(), nullptr, w);
+    double *to = found.row(i).data();
+    for (const Pose<double> &frame : w.frames)
+      write_motion(frame, to), to += 18;
+    for (std::size_t k = 0; k < m.wrenches.size(); ++k, to += 18)
+      write_motion(wrench_pose(at, static_cast<int>(k)), to);
+  }
+  return found;
+}
+
+template <class Space>
+RowMajor without_work(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &forces,
+                      Workspace<Space, double> &w) {
+  constexpr int d = Space::dim, linear = Space::linear;
+  const std::vector<double> still(static_cast<std::size_t>(m.n_v));
+  RowMajor found(forces.rows(), forces.cols());
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    place_all(m, q.row(i).data(), still.data(), nullptr, w);
+    for (std::size_t k = 0; k < m.nodes.size(); ++k) {
+      const Node<Space> &node = m.nodes[k];
+      Eigen::Matrix<double, d, d> axes = Eigen::Matrix<double, d, d>::Identity();
+      const Matrix3d R = outer_axes(m, k, w);
+      axes.template topLeftCorner<linear, linear>() = R.topLeftCorner<linear, linear>();
+      if constexpr (d == 6)
+        axes.template bottomRightCorner<3, 3>() = R;
+      const auto place = static_cast<Eigen::Index>(k) * d;
+      Eigen::Matrix<double, d, 1> f = axes.transpose() * forces.row(i).segment<d>(place).transpose();
+      forces_to_freedoms(node, w.hinges[k], f.data());
+      for (int c = 0; c < node.shape.freedoms.count; ++c)
+        f[node.shape.freedoms.component[c]] = 0;
+      forces_from_freedoms(node, w.hinges[k], f.data());
+      found.row(i).segment<d>(place) = axes * f;
+    }
+  }
+  return found;
+}
+
+template <class Space>
 RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v) {
   Workspace<Space, double> w(m);
   RowMajor found(q.rows(), 10);
@@ -188,6 +238,14 @@ template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const
                                                 Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,
                                                 Workspace<Spatial, double> &);
+template RowMajor motions_of_states(const Mechanism<Planar> &, const RowMajor &, const RowMajor &,
+                                    Workspace<Planar, double> &);
+template RowMajor motions_of_states(const Mechanism<Spatial> &, const RowMajor &, const RowMajor &,
+                                    Workspace<Spatial, double> &);
+template RowMajor without_work(const Mechanism<Planar> &, const RowMajor &, const RowMajor &,
+                               Workspace<Planar, double> &);
+template RowMajor without_work(const Mechanism<Spatial> &, const RowMajor &, const RowMajor &,
+                               Workspace<Spatial, double> &);
 template RowMajor totals_of_states(const Mechanism<Planar> &, const Scene &, const RowMajor &, const RowMajor &);
 template RowMajor totals_of_states(const Mechanism<Spatial> &, const Scene &, const RowMajor &, const RowMajor &);
 

@@ -1,6 +1,7 @@
 // What a mechanism does at a state, in global axes: for outputs and tests, not for steps.
 #pragma once
 
+#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/motion.h"
 
 namespace ffrobot::recursion {
@@ -19,10 +20,21 @@ template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w);
 
+// Of states q (T, n_q), v (T, n_v): of each frame and of each section on which wrenches may act (T, 18 each) position,
+// axes (3, 3) row by row, velocity and angular velocity.
+template <class Space>
+RowMajor motions_of_states(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &v,
+                           Workspace<Space, double> &w);
+
+// Of forces with moments (T, dim of each body) on outer sections of joints, global axes, at q (T, n_q): what does no
+// work along the joints' coordinates. Motors, loads and brakes do the rest, as forces along and moments about axes.
+template <class Space>
+RowMajor without_work(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &forces,
+                      Workspace<Space, double> &w);
+
 // Of states q (T, n_q), v (T, n_v), with what springs and friction of a scene store and dissipate: (T, 10) kinetic,
 // strain and gravitational energy (J), the power (W) that is dissipated, and momentum: linear, angular about the origin
 // (3 each).
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 template <class Space>
 RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v);
 

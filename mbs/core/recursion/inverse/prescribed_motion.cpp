@@ -1,6 +1,6 @@
 #include "core/recursion/inverse/prescribed_motion.h"
 
-#include "core/recursion/constrained_aba/gradients.h"
+#include "core/recursion/inverse/postures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -89,7 +89,7 @@ template <class Space> void PrescribedMotion<Space>::measure() {
 }
 
 template <class Space> void PrescribedMotion<Space>::factorise() {
-  factors_.compute(gradients(driven_.mechanism, q(), driven_.of_joints, w_)); // C_J
+  factors_.compute(gradients(driven_.mechanism, q(), w_)(Eigen::all, driven_.of_joints)); // C_J
 }
 
 template <class Space> void PrescribedMotion<Space>::go(double factor, const VectorXd &values) {
@@ -100,22 +100,17 @@ template <class Space> void PrescribedMotion<Space>::go(double factor, const Vec
 template <class Space> bool PrescribedMotion<Space>::find_position() {
   constexpr double tolerance = 1e-15, floor = 1e-11; // second derivatives of splines through shapes are taken
   constexpr double largest_turn = 0.5;               // rad, of a step: keeps to the branch of the guess
-  constexpr int most_iterations = 60;
-  double previous = 1e300;
-  for (int i = 0; i < most_iterations; ++i) {
+  const auto off = [&] {
     measure();
     factorise();
-    const double left = largest(value_) / (1 + largest(state_.head(driven_.mechanism.n_q)));
-    if (left <= tolerance || (left <= floor && left > 0.2 * previous))
-      return true;
-    if (!std::isfinite(left))
-      return false;
-    previous = left;
+    return largest(value_) / (1 + largest(state_.head(driven_.mechanism.n_q)));
+  };
+  const auto step_on = [&] {
     const VectorXd step = -factors_.solve(value_);
     const double turn = angles_.empty() ? 0 : largest(step(angles_));
     go(turn > largest_turn ? largest_turn / turn : 1, step);
-  }
-  return false;
+  };
+  return iterate_to_posture(tolerance, floor, off, step_on) <= floor;
 }
 
 template <class Space> bool PrescribedMotion<Space>::move(double t, const ModalMotion &modes) {

@@ -1,11 +1,10 @@
 #include "core/recursion/motion/loop_watch.h"
 
-#include "core/recursion/constrained_aba/gradients.h"
+#include "core/recursion/inverse/postures.h"
 
 #include <Eigen/LU>
 
 #include <cmath>
-#include <numeric>
 
 namespace ffrobot::recursion {
 
@@ -37,9 +36,7 @@ LoopWatch<Space>::LoopWatch(const Mechanism<Space> &mechanism, const Workspace<S
 
 template <class Space>
 void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
-  std::vector<int> all(static_cast<std::size_t>(mechanism_.n_v));
-  std::iota(all.begin(), all.end(), 0);
-  C_0_ = gradients(mechanism_, q, all, other)(w.active, Eigen::all);
+  C_0_ = gradients(mechanism_, q, other)(w.active, Eigen::all);
   product_.resize(C_0_.rows(), C_0_.rows());
   volume_ = volume(w), cosine_ = 1;
 }

@@ -1,7 +1,7 @@
 #include "core/recursion/motion/singular_posture.h"
 
 #include "core/linear/singular_values.h"
-#include "core/recursion/constrained_aba/gradients.h"
+#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/natural_sizes.h"
 
 #include <Eigen/LU>
@@ -28,7 +28,7 @@ MatrixXd gradients_by_joints(const Mechanism<Space> &m, double length, const dou
         ways.push_back(static_cast<int>(joints.size()));
       joints.push_back(node.v + k);
     }
-  MatrixXd J = gradients(m, q, joints, w);
+  MatrixXd J = gradients(m, q, w)(Eigen::all, joints);
   J(Eigen::all, ways) *= length;
   for (std::size_t r = 0; r < m.constraints.size(); ++r)
     if (!is_moment(m, m.constraints[r]))

@@ -1,0 +1,128 @@
+#include "core/recursion/inverse/postures.h"
+
+#include "core/linear/least_norm.h"
+#include "core/space/configuration_space.h"
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Times = std::vector<double>;
+
+namespace {
+
+// C_v at the state that `w` has
+template <class Space>
+MatrixXd gradients_there(const Mechanism<Space> &m, const double *q, NewtonEuler<Space> &forces,
+                         Workspace<Space, double> &w) {
+  const auto count = static_cast<Index>(m.constraints.size());
+  VectorXd unit = VectorXd::Zero(count), along(m.n_v);
+  MatrixXd found(count, m.n_v);
+  for (Index r = 0; r < count; ++r) {
+    unit[r] = -1; // loads are of -lambda
+    forces.load(unit.data(), nullptr, w);
+    unit[r] = 0;
+    forces.project(q, w, along.data());
+    found.row(r) = along.transpose();
+  }
+  return found;
+}
+
+} // namespace
+
+template <class Space> MatrixXd gradients(const Mechanism<Space> &m, const double *q, Workspace<Space, double> &w) {
+  place_all(m, q, VectorXd::Zero(m.n_v).eval().data(), nullptr, w);
+  NewtonEuler<Space> forces(m);
+  return gradients_there(m, q, forces, w);
+}
+
+template <class Space>
+Postures<Space>::Postures(const Mechanism<Space> &m, const Scene &scene, Workspace<Space, double> &w)
+    : m_(m), scene_(scene), w_(w), forces_(m), value_(static_cast<Index>(m.constraints.size())), rate_(value_),
+      still_(VectorXd::Zero(m.n_v)) {}
+
+template <class Space> void Postures<Space>::go_to(double t) {
+  turn_markers(scene_, t, w_);
+  targets_ = targets_at(scene_, t);
+}
+
+template <class Space> void Postures<Space>::measure(const double *q, const double *v) {
+  recursion::measure(m_, q, v, w_, value_.data(), rate_.data());
+  for (std::size_t r = 0; r < targets_.size(); ++r) {
+    double &value = value_[static_cast<Index>(r)];
+    value = m_.constraints[r].apart(value, targets_[r].value);
+    rate_[static_cast<Index>(r)] -= targets_[r].rate;
+  }
+}
+
+template <class Space>
+std::pair<RowMajor, RowMajor> Postures<Space>::constraints(const Times &times, const RowMajor &q) {
+  RowMajor values(q.rows(), value_.size()), slopes(q.rows(), value_.size() * m_.n_v);
+  for (Index i = 0; i < q.rows(); ++i) {
+    const double *at = q.row(i).data();
+    go_to(times[static_cast<std::size_t>(i)]);
+    measure(at, still_.data());
+    values.row(i) = value_.transpose();
+    Eigen::Map<RowMajor>(slopes.row(i).data(), value_.size(), m_.n_v) = gradients_there(m_, at, forces_, w_);
+  }
+  return {values, slopes};
+}
+
+template <class Space> RowMajor Postures<Space>::rates(const Times &times, const RowMajor &q, const RowMajor &v) {
+  RowMajor found(q.rows(), rate_.size());
+  for (Index i = 0; i < q.rows(); ++i) {
+    go_to(times[static_cast<std::size_t>(i)]);
+    measure(q.row(i).data(), v.row(i).data());
+    found.row(i) = rate_.transpose();
+  }
+  return found;
+}
+
+template <class Space>
+std::pair<RowMajor, VectorXd> Postures<Space>::solve(const Times &times, RowMajor q, const RowMajor &beside,
+                                                     const PostureSearch &search) {
+  constexpr double tolerance = 1e-13, floor = 1e-12;
+  const ConfigurationSpace space(m_.n_v, m_.rotations);
+  LeastNorm factors;
+  std::vector<Index> moving;
+  for (Index k = 0; k < m_.n_v; ++k)
+    if (search.scales[k] > 0)
+      moving.push_back(k);
+  const VectorXd scales = search.scales(moving);
+  VectorXd step = still_, left = VectorXd::Zero(q.rows());
+  for (Index i = 0; value_.size() && i < q.rows(); ++i) {
+    go_to(times[static_cast<std::size_t>(i)]);
+    for (Index r = 0; beside.size() && r < value_.size(); ++r)
+      targets_[static_cast<std::size_t>(r)].value += beside(i, r);
+    double *at = q.row(i).data();
+    MatrixXd J;
+    const auto off = [&] {
+      measure(at, still_.data());
+      value_.array() /= search.sizes.array();
+      J = gradients_there(m_, at, forces_, w_)(Eigen::all, moving);
+      J.array().colwise() /= search.sizes.array();
+      J.array().rowwise() *= scales.transpose().array();
+      return J.allFinite() ? value_.template lpNorm<Eigen::Infinity>() : std::nan("");
+    };
+    const auto go = [&] {
+      if (moving.empty())
+        return;
+      factors.compute(J, true);
+      VectorXd moved = -factors.solve(value_);
+      const double longest = moved.template lpNorm<Eigen::Infinity>();
+      moved *= longest > search.largest_step ? search.largest_step / longest : 1;
+      step(moving) = moved.cwiseProduct(scales);
+      space.integrate(at, 1, step.data(), at);
+    };
+    left[i] = iterate_to_posture(tolerance, floor, off, go);
+  }
+  return {std::move(q), left};
+}
+
+template MatrixXd gradients(const Mechanism<Planar> &, const double *, Workspace<Planar, double> &);
+template MatrixXd gradients(const Mechanism<Spatial> &, const double *, Workspace<Spatial, double> &);
+template class Postures<Planar>;
+template class Postures<Spatial>;
+
+} // namespace ffrobot::recursion
