@@ -255,6 +255,8 @@ def _scaled(columns: Array, names: Sequence[str]) -> Array:
 
     None of what is still to round-off next to the largest of its kind.
     """
+    if not columns.size:  # a robot that cannot move
+        return columns
     groups = [name.rpartition("/")[0] if name.startswith(("point/", "force/")) else name for name in names]
     found, largest = np.zeros_like(columns), dict[str, float]()
     sizes = {of: float(np.linalg.norm(columns[:, [of == other for other in groups]], 2)) for of in groups}

@@ -249,7 +249,9 @@ def _independent(J: Array) -> list[int]:
 
 def _scales(K: Array, size: float) -> Array:
     """Increments (n,) that single stiffnesses make of one size."""
-    return as_floats(1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, SLACKEST * np.abs(K).max(), TINY))))
+    return as_floats(
+        1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, SLACKEST * np.abs(K).max(initial=0.0), TINY)))
+    )
 
 
 def _step(at: Balance, K: Array, free: Indices) -> Array:
