@@ -238,7 +238,8 @@ def _result(solution: Solution, run: Outcome, earlier: Mapping[str, AnalysisResu
 def _settling(solution: Solution, run: Outcome, earlier: Mapping[str, AnalysisResult]) -> dict[str, Settling]:
     """By point, of a run that goes on after the paths that it, or the analysis that it replays, follows."""
     analysis = run.analysis
-    commanding = earlier[analysis.source].run if analysis.takes_actuation and analysis.source in earlier else run
+    source = earlier.get(analysis.source or "") if analysis.takes_actuation else None
+    commanding = run if source is None else source.run
     if not isinstance(analysis, TimedAnalysis) or run.status != "completed":
         return {}
     rest, closer = commanded_rest(commanding), run.closer
