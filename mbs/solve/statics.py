@@ -35,6 +35,7 @@ DEPENDENT = 1e-12  # of the largest singular value of rows: below it they depend
 UNSTABLE = -1e-7  # of the stiffness of single coordinates: closer to none is round-off
 SETTLED = 1e-14  # of a shape's size: what the next step would change
 SLOW = 0.1  # of a step, the next one: derivatives are taken again
+NEIGHBORS = 20  # times that begin with the derivatives of the first of them
 STRAIGHT = 1e-3  # of the size of modes, below which a shape counts as none
 INDEPENDENT = 1e-7  # of the largest row, what others must leave of one that has a multiplier
 MISSED = 1e-6  # rad, sizes of the robot: constraint equations that are off by more are the cause
@@ -281,14 +282,17 @@ def static_shapes(
     """Shapes p (T, n) of all bodies on which `forces` leave nothing, at T = `count` times, and which are met (T,).
 
     Joints follow the shapes: `forces`(p, numbers of times) are those on modes (k, n), `stiffness` is their derivative
-    (k, n, n), which is taken again where steps shrink slowly. `omega` (n,) are frequencies, rad/s. Modes bend their
-    links by about the length at `sizes` (n,): shapes beyond are not met.
+    (k, n, n): of one of `NEIGHBORS` times at first, and of each where steps shrink slowly. `omega` (n,) are
+    frequencies, rad/s. Modes bend their links by about the length at `sizes` (n,): shapes beyond are not met.
     """
-    K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, np.inf), np.full(count, np.inf)
+    K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, SLOW), np.full(count, np.inf)
     least = STRAIGHT * float((omega * sizes).min(initial=np.inf))
 
     def correct(p: Array, going: Indices) -> Correction:
         r, slow = forces(p, going), ratio[going] > SLOW
+        if not K.any():
+            K[:] = stiffness(p[::NEIGHBORS], going[::NEIGHBORS])[going // NEIGHBORS]
+            slow = ~np.isfinite(K).all(axis=(1, 2))
         if slow.any():
             K[going[slow]] = stiffness(p[slow], going[slow])
         known = np.isfinite(r).all(axis=1) & np.isfinite(K[going]).all(axis=(1, 2))
