@@ -91,10 +91,22 @@ class Browser:
         return self.driver.find_element("css selector", selector).screenshot_as_png
 
 
+OPEN = []
+
+
 @pytest.fixture(scope="session")
 def browser():
     if CHROMIUM is None or DRIVER is None:
         pytest.skip("chromium and chromium-driver are not installed; test.sh installs them")
     browser = Browser()
+    OPEN.append(browser)
     yield browser
     browser.driver.quit()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def empty_page_at_the_end():
+    """What a page draws would slow down tests that measure times."""
+    yield
+    for browser in OPEN:
+        browser.driver.get("about:blank")
