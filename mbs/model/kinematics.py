@@ -39,6 +39,7 @@ class Kinematics:
     def __init__(
         self, nodes: Sequence[Node], sections: Sequence[Section] = (), rows: Sequence[ConstraintRow] = ()
     ) -> None:
+        sections = list({_key(section): section for section in sections}.values())  # joints may share one
         markers, self._scene = Markers(nodes), _core.TreeScene()
         measures = [markers.row(row) for row in rows]
         places = [_core.MarkerAt(*markers.place(section)) for section in sections]
