@@ -1,5 +1,7 @@
 #include "core/recursion/constrained_aba/independent_constraints.h"
 
+#include "core/recursion/inverse/postures.h"
+
 #include <algorithm>
 #include <numeric>
 
@@ -11,17 +13,18 @@ namespace {
 // constraint 1e-7.
 constexpr double dependent = 1e-10;
 
-// Nothing moves a constraint whose mobility is below this part of the largest: rounding leaves 1e-30, and units of
-// constraints (m, mm, rad) make a difference of 1e6.
+// Nothing moves a constraint whose mobility, or squared gradient, is below this part of the largest: rounding leaves
+// 1e-30 of gradients, and units of constraints (m, mm, rad) make a difference of 1e6. Mobilities of constraints across
+// the plane of a mechanism are rounding of the elimination, which may be more.
 constexpr double immobile = 1e-24;
 
-std::vector<int> pivots(Eigen::MatrixXd S) {
+std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
   const Eigen::VectorXd own = S.diagonal();
-  const double least = immobile * own.maxCoeff();
+  const double least = immobile * own.maxCoeff(), smallest = immobile * squares.maxCoeff();
   std::vector<int> left(static_cast<std::size_t>(S.rows())), kept;
   std::iota(left.begin(), left.end(), 0);
   while (!left.empty()) {
-    const auto part = [&](int i) { return own[i] > least ? S(i, i) / own[i] : 0; };
+    const auto part = [&](int i) { return own[i] > least && squares[i] > smallest ? S(i, i) / own[i] : 0; };
     const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return part(i) < part(j); });
     const int k = *best;
     if (!(part(k) > dependent))
@@ -46,13 +49,14 @@ std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const d
   w.keep(all);
   if (count == 0)
     return all;
+  const Eigen::VectorXd squares = gradients(m, q, w).rowwise().squaredNorm();
   const std::vector<double> target(m.constraints.size(), 0.0);
   std::vector<double> a(static_cast<std::size_t>(m.n_v));
   w.keeps_delassus = true;
   accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_delassus = false;
   const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(w.delassus.data(), count, count);
-  w.keep(pivots(S));
+  w.keep(pivots(S, squares));
   return w.active;
 }
 
