@@ -19,6 +19,7 @@ from ..fields.field_types import Expression, Name
 from ..fields.waypoints import spline
 from ..model.body import Body
 from ..model.divided_link import DividedLink
+from ..model.frame_motors import turning_motors
 from ..model.gears import refuse_prescribed_motors
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.system import MultibodySystem
@@ -27,6 +28,7 @@ from ..solve.posture import check_path, mobility
 from ..solve.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
 from ..solve.reach import check_reach
 from ..solve.redundancy import resolved
+from ..solve.servo import slopes_by_differences
 from ..solve.start import shape_in_redundant_loops, undeformed_posture
 from ..solve.statics import static_shapes
 from .context import Context
@@ -109,7 +111,7 @@ class Fcid(TimedAnalysis):
             )  # fmt: skip
 
         try:
-            shape = _shape(context, self, motion, q)
+            shape = _shape(context, self, motion, q, turns_frames=has_motors and bool(turning_motors(model)))
             run = at(self.times)
         except SolveError as error:
             cause = shape_in_redundant_loops(model, MultibodySystem(model).integrated.rows)
@@ -120,14 +122,14 @@ class Fcid(TimedAnalysis):
         return replace(run, statistics=statistics).with_look(at)
 
 
-def _shape(context: Context, analysis: Fcid, motion: PrescribedMotion, q: Array) -> Shape:
+def _shape(context: Context, analysis: Fcid, motion: PrescribedMotion, q: Array, *, turns_frames: bool) -> Shape:
     """P(t) of all bodies; expressions are those of whole links."""
     path, whole = context.model.scene.path, context.whole
     bodies = [node.body for node in context.model.tree.nodes]
     if analysis.shape == "given" and whole is not None:
         links = [node.body for node in whole.model.tree.nodes]
         return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
-    return prescribed_shape(path, bodies, analysis, motion, q)
+    return prescribed_shape(path, bodies, analysis, motion, q, turns_frames=turns_frames)
 
 
 def shape_nodes(analysis: Fcid) -> Array:
@@ -179,20 +181,24 @@ def given_shape_of_pieces(
 
 
 def prescribed_shape(
-    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array
+    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array, *, turns_frames: bool
 ) -> Shape:
     """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start.
+
+    `turns_frames`: whether motors turn frames, of whose forces the core has no exact slopes.
 
     Raises `SolveError` where no posture, or no static shape, is found.
     """
     if analysis.shape == "given":
         return given_shape(scene_path, bodies, analysis)
     if analysis.shape == "static":
-        return _static(scene_path, bodies, analysis, motion, posture)
+        return _static(scene_path, bodies, analysis, motion, posture, turns_frames)
     return [[ZERO] * body.n_modes for body in bodies]
 
 
-def _static(scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
+def _static(
+    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array, turns_frames: bool
+) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
     nodes = shape_nodes(analysis)
     near: Array = np.empty((0, len(posture)))
@@ -206,6 +212,13 @@ def _static(scene_path: Path, bodies: Bodies, analysis: Fcid, motion: Prescribed
         return left
 
     def stiffness(p: Array, at: Indices) -> Array:
+        if turns_frames:
+            around = near[at].repeat(2 * p.shape[1], axis=0)
+
+            def left(times: Array, p: Array, v: Array, a: Array) -> Array:
+                return motion.left_on_modes(as_list(times), p, v, a, around)[1]
+
+            return slopes_by_differences(left, sizes, nodes[at], p, 0 * p, 0 * p)[2]
         K = motion.derivatives(as_list(nodes[at]), p, 0 * p, 0 * p, near[at])[2]
         return K.reshape(len(at), -1, p.shape[1])[:, : p.shape[1]]
 
