@@ -97,8 +97,5 @@ def chosen_posture(results: Results, model: Model) -> str:
         if found:
             branch = branch_names(model, undeformed_posture(model).q)
             as_line = f" ({in_words(branch)})" if branch else ""
-            return (
-                f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}; where"
-                " another posture reaches the path as well (elbow up or down), [initial] chooses"
-            )
+            return f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}"
     return ""

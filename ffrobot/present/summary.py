@@ -12,6 +12,7 @@ from .lines import alike, folded
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
 
+VIBRATION = "vibration"
 LINES = 15  # that a summary has at most
 MOTORS = 6  # rows of motors for which analyses make room
 TEXTS, MOST_TEXTS = 2, 5  # lines of warnings and advice for which analyses, and motors, make room
@@ -122,7 +123,7 @@ def _texts(verdict: Verdict, remarks: Sequence[str]) -> Iterator[str]:
     yield from _labelled("warning", alike(warnings))
     yield from _labelled("to try", alike(advice))
     settled = ((one.name, one.settled.in_words) for one in verdict.analyses if one.settled is not None)
-    yield from _labelled("vibration", alike(settled))
+    yield from _labelled(VIBRATION, alike(settled))
     yield from remarks
     yield from _labelled("at rest", alike((one.name, one.held) for one in verdict.analyses if one.held))
     yield from _labelled("note", alike((one.name, text) for one in verdict.analyses for text in one.notes))
@@ -135,12 +136,12 @@ def _labelled(label: str, texts: Iterable[str]) -> Iterator[str]:
 def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
     """Whole texts, wrapped, as far as there is room: the first with each label before others; the last counts the rest.
 
-    The first of all ends early where it has more lines than the first of another label leaves.
+    The first of all ends early where it has more lines than the first of another label leaves. Vibrations come last.
     """
     if not texts or room < 1:
         return []
     labels = [text[:LABEL] for text in texts]
-    order = sorted(range(len(texts)), key=lambda k: labels[k] in labels[:k])
+    order = sorted(range(len(texts)), key=lambda k: labels[k].startswith(VIBRATION) or labels[k] in labels[:k])
     beside = len(_wrapped(texts[order[1]], width)) if len(texts) > 1 else 0
     free = room - beside if beside <= room - 2 else room
     ends_early = len(_wrapped(_counted(texts[0], len(texts) - 1), width)) > free
