@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MOVED = 1e-6  # of the range of a target: by more it is not yet at its end
 GRID, ROUNDS = 2001, 3  # times at which a target is compared with its end, and how often between two of them
-NEXT = 0.02  # of the run: an instant at which a target changes, this soon after it, ends it exactly
+NEXT = 0.02  # of the run: an instant at which a target changes, or the run ends, this soon after it, ends it exactly
 PERIOD = 800  # times of the last period
 DEPENDENT = 1e-9  # of the largest singular value of rows: below it they depend on others
 FLOOR, FREE = 1e-7, 1e-3  # of the largest stiffness, and of stiffnesses above that: less is none
@@ -120,7 +120,7 @@ def _breaks(path: Trajectory) -> Sequence[float]:
 
 
 def _end(target: TimeFunction, end: float, breaks: Sequence[float]) -> float:
-    """When the target is at its value at `end` for good: at the next of the `breaks`, where one is near."""
+    """When the target is at its value at `end` for good: at the next of the `breaks`, or `end`, where one is near."""
 
     def off(times: Array) -> Array:
         return np.abs(target.sample(times)[0] - last)
@@ -134,7 +134,7 @@ def _end(target: TimeFunction, end: float, breaks: Sequence[float]) -> float:
         times = np.linspace(first, then, GRID)
         k = int(np.flatnonzero(off(times) > level)[-1])
         first, then = float(times[k]), float(times[k + 1])
-    return next((t for t in sorted(breaks) if first <= t <= first + NEXT * end), then)
+    return next((t for t in sorted([*breaks, end]) if first <= t <= first + NEXT * end), then)
 
 
 def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> Iterator[str]:
