@@ -184,7 +184,7 @@ def test_degrees_in_a_urdf_are_told(tmp_path):
         f'<robot name="r"><link name="a"/><link name="b">{inertial}</link>{joint}{origin}</joint></robot>', "utf-8"
     )
     robot = read_urdf(path)
-    assert [text.partition(":")[0] for text in robot.turned] == ['link "b"', 'joint "j"']
+    assert [text.partition(":")[0] for text in robot.remarks] == ['link "b"', 'joint "j"']
     expected = Rotation.from_euler("z", 90.0).as_matrix()
     np.testing.assert_allclose(robot.joints["j"].origin.place.C, expected, atol=1e-14)
     J = robot.links["b"].inertial.inertia
