@@ -33,6 +33,8 @@ MEASURES = {
     "distance": "position", "distance_rms": "position", "mean_power": "rms_power",
     "modal_velocity": "velocity", "strain": "kinetic", "modal_force": "reaction", "mode_required": "reaction",
     "reaction_moment": "reaction", "linear": "velocity", "angular": "angular_velocity",
+    "settling_residual": "settling_tolerance", "settling_at_path_end": "settling_tolerance",
+    "settling_at_end": "settling_tolerance", "settling_time_to": "settling_path_end",
 }  # fmt: skip
 """What numbers may be small against, until only rounding errors of them are left."""
 FLOORS = dict.fromkeys(
@@ -206,7 +208,10 @@ def _words(name, of):
 def quantity(name):
     """Analysis, and what a dataset or an attribute is of; peaks and means are of their dataset."""
     dataset, _, key = name.partition("@")
-    return dataset.partition("/")[0], dataset.rpartition("/")[2] if key in ("", "peak", "rms", "mean") else key
+    analysis, _, within = dataset.partition("/")
+    if within.startswith("settling/"):
+        return analysis, f"settling_{key}"
+    return analysis, dataset.rpartition("/")[2] if key in ("", "peak", "rms", "mean") else key
 
 
 def _scales(entries):
