@@ -54,6 +54,7 @@ def changed(tmp_path):
                 file["inverse/joints/A"].attrs["type"] = "revolute"
                 file["inverse/joints/O/moment"].attrs["peak"] = 4.0
                 file["inverse"].attrs["status"] = "completed"
+                file.create_group("inverse/settling/A.tip").attrs.update(residual=1e-4, at_end=1e-15, tolerance=1e-3)
                 if number:
                     change(file["inverse"])
                 found.append(reference_numbers.reduced(file))
@@ -87,6 +88,10 @@ def a_gap(group):
             lambda group: group["joints/O/moment"].attrs.__setitem__("peak", 4.1),
             "inverse/joints/O/moment@peak: differs",
         ),
+        (
+            lambda group: group["settling/A.tip"].attrs.__setitem__("residual", 1.1e-4),
+            "inverse/settling/A.tip@residual: differs by 1e-05, allowed 2e-06",
+        ),
     ],
 )
 def test_a_change_is_found_and_named(changed, change, message):
@@ -100,5 +105,6 @@ def test_rounding_is_none(changed):
     def round_off(group):
         group["joints/O/moment"][...] *= 1 + 1e-9
         group["joints/A/moment"][...] = 2e-9  # next to nothing beside that of the other joint
+        group["settling/A.tip"].attrs["at_end"] = 3e-15  # m, next to nothing beside the tolerance
 
     assert changed(round_off)[0].share <= 1
