@@ -84,7 +84,7 @@ def read_foreign(path: Path, where: str) -> RawMesh:
         reason = " ".join(reason.replace(str(path), path.name).split())
         if isinstance(error, meshio.ReadError) and path.suffix.lower() not in meshio.extension_to_filetypes:
             reason = f"its ending is not one of {', '.join(_ENDINGS)}: another program has to convert it"
-        raise InputError(f"{where}: expected a mesh that meshio can read; meshio reports: {reason}") from None
+        raise InputError(f"{where}: expected a mesh that meshio can read, found that it cannot: {reason}") from None
     words = " ".join(said.getvalue().replace(str(path), path.name).split())
     return replace(raw, remarks=(f"meshio on {path.name}: {words}",)) if words else raw
 
@@ -118,12 +118,16 @@ def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
         if pyvista is None:
             raise
         said.truncate(said.seek(0))
-    failed = list[str]()
+    failed = list[object]()
     reader = pyvista.get_reader(path)
-    reader.reader.AddObserver("ErrorEvent", lambda *_: failed.append("VTK finds an error in it"))
-    found = reader.read()
+    reader.reader.AddObserver("ErrorEvent", lambda *_: failed.append(None))
+    try:
+        found = reader.read()
+    except RuntimeError:  # of later versions of PyVista
+        failed.append(None)
     if failed:
-        raise ValueError(failed[0])
+        said.truncate(said.seek(0))
+        raise ValueError("VTK finds an error in it")
     _check_ghosts(found.cell_data)
     types = getattr(found, "celltypes", None)
     if types is not None and (flat := np.isin(types, list(_VTK_TYPES))).any() and not flat.all():
