@@ -263,7 +263,7 @@ def study_files(path: Path) -> list[Path]:
     found = [file for name in NAMES if (file := path / f"{name}.json").is_file()]
     if not found:
         raise InputError(
-            f"{path}: expected a folder of ffrobot sensitivity, optimize or uncertainty, with one of"
+            f"{path}: expected a folder of ffrobot sensitivity, optimise or uncertainty, with one of"
             f" {quoted(f'{name}.json' for name in NAMES)}, found none: has the command come to its end?"
         )
     return found
