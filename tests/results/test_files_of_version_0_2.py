@@ -28,8 +28,14 @@ def old(tmp_path):
 
 
 def test_they_are_read_as_new_ones(old):
-    """Every history, the verdict, skipped lines and warnings, against a new solve of the same scene."""
+    """Every history, the verdict, skipped lines and warnings, against a new solve of the same scene.
+
+    Steps of both end alike but for round-off: they differ by far less than both are off a solve in finer steps.
+    """
     new = library.solve(old / "scene.toml")
+    text = (old / "scene.toml").read_text(encoding="utf-8")
+    (old / "finer.toml").write_text(text.replace("tolerance = 1e-6", "tolerance = 1e-10"), encoding="utf-8")
+    finer = library.solve(old / "finer.toml")
     with Results(old / "complete.h5") as results:
         assert results.analyses == new.analyses == ["inverse", "forward"]
         assert results.skipped == new.skipped
@@ -41,7 +47,9 @@ def test_they_are_read_as_new_ones(old):
                 if name.startswith("constraint_violation"):
                     continue  # rounding
                 found = new.data(f"{analysis}/{name}")[:, 0]
-                np.testing.assert_allclose(found, values, rtol=0, atol=1e-6 * np.abs(values).max(), err_msg=name)
+                error = np.abs(finer.data(f"{analysis}/{name}")[:, 0] - values).max()
+                atol = max(1e-6 * np.abs(values).max(), 0.05 * error)
+                np.testing.assert_allclose(found, values, rtol=0, atol=atol, err_msg=name)
         np.testing.assert_allclose(results.modal("inverse", "arm"), new.modal("inverse", "arm"), atol=1e-9)
         assert results.modal_body("arm").mode_count == 2
 
