@@ -1,6 +1,7 @@
 """What `python -m bench` measures, for tests of each part."""
 
 import csv
+import gc
 import os
 import subprocess
 import sys
@@ -23,3 +24,12 @@ def bench(tmp_path_factory):
             return list(csv.DictReader(stream))
 
     return rows
+
+
+@pytest.fixture(autouse=True)
+def without_what_other_tests_left():
+    """The garbage collector looks through what is measured alone, not through a heap of other tests."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
