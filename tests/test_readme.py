@@ -1,13 +1,17 @@
-"""The README's own arm, as a reader would copy it."""
+"""The README's own arm, as a reader would copy it; and its numbers, against runs, scenes and records."""
 
+import csv
+import math
 import re
 import shlex
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+import test_two_link
 
 from ffrobot.cli import cli
 
@@ -104,6 +108,77 @@ def test_first_screen_has_the_numbers_of_the_cases(claim):
     lines = (ROOT / "cases" / case / "README.md").read_text(encoding="utf-8").partition(f"\n| {table} |")[2]
     cells = next(line.split("|") for line in lines.splitlines() if line.startswith(f"| {row}"))[2:]
     assert f"{float(cells[column]) * unit:.{len(number.partition('.')[2])}f}" == number
+
+
+def scene(case):
+    return tomllib.loads((ROOT / "cases" / case / "scene.toml").read_text(encoding="utf-8"))
+
+
+def printed(case, text):
+    """Numbers of a case's README, which its own tests compare with runs."""
+    return re.search(text, (ROOT / "cases" / case / "README.md").read_text(encoding="utf-8")).groups()
+
+
+def record(name, **key):
+    """The row of a table that `python -m bench` writes."""
+    with (ROOT / "docs" / "benchmarks" / "two_link" / name).open(encoding="utf-8") as file:
+        return next(row for row in csv.DictReader(file) if key.items() <= row.items())
+
+
+def of_line():
+    """Length of the line between (3/2, √3/2) and cos(π/4) times that, and its time."""
+    return math.hypot(1.5, math.sqrt(3) / 2) * (1 - math.cos(math.pi / 4)), scene("two_link_tracking")["analysis"][0][
+        "end"
+    ]
+
+
+def measured_beam():
+    settles, frequency = r"settled within 0.5 mm +([\d.]+) +([\d.]+)", r"lowest frequency .*\+([\d.]+) %"
+    return (*printed("piezo_beam_measured", settles), *printed("piezo_beam_measured", frequency))
+
+
+def benchmark():
+    row = record("work_precision.csv", integrator="dop853", tolerance="0.0001")
+    return row["error_force"], row["seconds"]
+
+
+FACTS = {  # text of the README, and its numbers by their source
+    r"along a ([\d.]+) m line in ([\d.]+) s": of_line,
+    r"sample time of (\d+) ms": lambda: (1e3 * scene("two_link_rest_to_rest")["analysis"][-1]["sample_time"],),
+    r"arm\]\S+ carries (\d+) kg": lambda: (scene("arm_6r")["payload"][0]["mass"],),
+    r"load of (\d+) kg; deflections are drawn (\d+) times": lambda: (
+        scene("arm_6r")["payload"][0]["mass"], *printed("arm_6r", r"motion\.gif.*--scale (\d+)")),
+    r"settles in ([\d.]+) s in the model and in ([\d.]+) s": lambda: measured_beam()[:2],
+    r"settles in ([\d.]+) s, measured ([\d.]+) s; lowest frequency ([\d.]+) % high": measured_beam,
+    r"independent code \| (1e-\d) of each peak in motions": lambda: (test_two_link.RELATIVE,),
+    r"fourteen 3D cases \S+ \S+ \S+ code \| (1e-\d) of each peak": lambda: (
+        {14: 1e-6}[len(list((ROOT / "tests" / "checkpoints" / "spatial").glob("*.json")))],),
+    r"within (\de-\d) of its peak \| ([\d.]+) s on one core": benchmark,
+    r"mesh (\d+) %, modes (\d+) %": lambda: [
+        100 * float(record("axes.csv", axis=axis, times="1")["error_force"]) for axis in ("mesh", "modes")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fact", FACTS)
+def test_numbers_are_those_of_their_source(fact):
+    """To the digits that they have."""
+    numbers = re.search(fact, " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())).groups()
+    for number, found in zip(numbers, FACTS[fact](), strict=True):
+        exact = format(float(found), ".0e" if "e" in number else f".{len(number.partition('.')[2])}f")
+        assert float(exact) == float(number)
+
+
+def test_no_number_stands_without_a_source():
+    """Numbers with a unit, outside the arm that is to be copied."""
+    text = re.sub(r"```.*?```|^    .*?$", "", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+    text = " ".join(text.split())
+    claims = [
+        match.span() for claim in (*FACTS, *CLAIMS, *CELLS, "less than 10 nm") for match in re.finditer(claim, text)
+    ]
+    numbers = re.finditer(r"(?<![\w.-])\d[\d.]*(?:e-\d+|\*{0,2} (?:[nµmk]?m|m?s|kg|V|%|times|minutes|hours)\b)", text)
+    missing = [number[0] for number in numbers if not any(a <= number.start() < b for a, b in claims)]
+    assert not missing
+    assert f"Version {version('ffrobot')}, " in text
 
 
 DOCUMENTS = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("cases/*/README.md"))]

@@ -11,7 +11,7 @@ from ffrobot.fe_models.modal_body_file import read_modal_body
 
 CHECKPOINTS = reference("two_link/reference.csv")
 VOLTAGES = reference("two_link/reference_voltages.csv")
-RELATIVE = 1e-6  # of each quantity's peak
+RELATIVE = 1e-7  # of each quantity's peak
 TIMES = np.arange(1001) * 0.001
 TIMES[-1] = 1.0
 PZT = ("link1", "link2")
