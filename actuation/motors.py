@@ -96,7 +96,6 @@ def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeas
 
 
 def _load_inertias(motion: RobotMotion) -> dict[str, tuple[float, ...]]:
-    """By joint of an open chain, along each of its coordinates; see `load_inertia`."""
     model = motion.model
     if model.loop_rows.any() or not len(motion.time):
         return {}

@@ -16,6 +16,5 @@ def struct(cls: type[T]) -> type[T]:
 
 
 def _shown(self: object) -> str:
-    """As dataclasses are shown."""
     values = (f"{one.name}={getattr(self, one.name)!r}" for one in fields(self) if one.repr)  # type: ignore[arg-type]
     return f"{type(self).__qualname__}({', '.join(values)})"

@@ -168,7 +168,6 @@ class _Problem(NamedTuple):
 
 
 def _merge(problems: Sequence[_Problem]) -> list[str]:
-    """One line for each wrong key: the alternatives of a union come as one problem each."""
     expected: dict[tuple[str, str], list[str]] = {}
     for problem in problems:
         alternatives = expected.setdefault((problem.key, problem.found), [])
@@ -249,7 +248,6 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
 
 
 def _show(value: object) -> str:
-    """`value` as TOML writes it, shortened."""
     text = json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "…"
 

@@ -228,7 +228,6 @@ def loops_about(
 
 
 def _exciting(model: Model, analysis: ClosedLoop) -> Iterator[TimeFunction]:
-    """Paths and loads."""
     for path in model.scene.trajectory:
         yield from (target for _, target in path.targets)
     yield from model.scene.load_functions
@@ -308,7 +307,6 @@ def _position(model: Model, q: Array, point: str) -> Array:
 
 
 def _default_tip(model: Model) -> str:
-    """The tool of the scene, or the last tip."""
     if (tool := model.scene.tool_point) is not None:
         return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)

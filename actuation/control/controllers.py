@@ -224,7 +224,6 @@ class PythonControl:
 
 
 def _in_words(error: BaseException) -> str:
-    """What the user's code has raised, and in which line."""
     count_failed(error)
     last = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} (line {last.lineno} of {Path(last.filename).name}, in {last.name})"

@@ -154,7 +154,6 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
 
 
 def _some(names: tuple[str, ...]) -> str:
-    """The first few of many names."""
     return ", ".join(names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
 
 

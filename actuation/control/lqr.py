@@ -120,7 +120,6 @@ def _is_kept(name: str, modes: int) -> bool:
 
 
 def _restricted(mechanism: LinearMechanism, keep: Sequence[int]) -> LinearMechanism:
-    """With only these of its coordinates."""
     block, chosen = np.ix_(keep, keep), list(keep)
     return replace(
         mechanism,
@@ -185,7 +184,6 @@ def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequenc
 
 
 def _rigid_outputs(setup: Setup) -> list[str]:
-    """Joints with motors, and these motors behind gears that give."""
     joints = [f"joint/{name}" for name in setup.robot.motors]
     return [*joints, *(f"motor/{name}" for name in setup.robot.elastic_joints)]
 

@@ -113,7 +113,6 @@ class RigidArm:
 
 
 def _rigid(body: Body) -> Body:
-    """The undeformed body."""
     none, empty = np.zeros((3, 0)), np.zeros((0, 0))
     points = {name: replace(at, translation=none, rotation=none) for name, at in body.points.items()}
     return replace(

@@ -128,7 +128,6 @@ class Settings:
     budget: float
 
     def __post_init__(self) -> None:
-        """Raise `InputError` for what is no integrator and no tolerance, and where there is nothing to do."""
         for name in self.integrators:
             if name not in INTEGRATORS:
                 raise InputError(

@@ -147,7 +147,6 @@ def measure_points(
 
 
 def _is_hopeless(points: Sequence[Point], integrator: str, tolerance: float) -> bool:
-    """Whether an integrator was that slow at this tolerance, or a looser one, against others at the same."""
     for point in (one for one in points if one.integrator == integrator and one.tolerance >= tolerance):
         alike = [one for one in points if one.tolerance == point.tolerance and one.first.completed]
         rivals = [one.seconds[0] for one in alike if one.integrator != integrator]
@@ -283,7 +282,6 @@ class _Trials:
         return self.done[key]
 
     def row(self, axis: str, elements: float, modes: float, tolerance: float, best: Run | str | None) -> Row:
-        """The error of a combination against the run `best`."""
         found, scene = self(elements, modes, tolerance), self._scene(elements, modes)
         assert scene is not None
         completed = isinstance(found, Run) and found.completed

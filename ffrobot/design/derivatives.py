@@ -188,7 +188,6 @@ def _method(base: Base, offsets: Array, value: float) -> Method:
 
 
 def _notes(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Iterator[str]:
-    """What to mind of runs: those that failed, and peaks that another overtakes."""
     nearest = sorted(samples, key=lambda one: abs(one.offset))
     name = ".".join(base.keys[k])
 

@@ -149,6 +149,5 @@ def failed_runs(failures: Sequence[str], runs: int) -> Iterator[str]:
 
 
 def _fact(line: str) -> str:
-    """`price      text` of the terminal as `price: text`."""
     word, blanks, text = line.strip().partition("  ")
     return f"{word}: {text.strip()}" if blanks else word

@@ -96,7 +96,6 @@ class Front(Finding):
         yield Section(heading, self._rows())
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        """Of each design both goals, what one unit less of the second costs, the keys, and what is wrong."""
         for one in self.points:
             cost = f"{-one.price:.4g}" if np.isfinite(one.price) else ""
             yield (f"{one.goal:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
@@ -128,7 +127,6 @@ class Front(Finding):
         return [self._curve(), parallel(self.space, goals, self.tried, states, "on the curve")]
 
     def _curve(self) -> Points:
-        """Both goals, designs that have not converged hollow."""
         goal, against = self.values.T
         price = [f"price {-p:.4g}" if p is not None else "" for p in numbers(one.price for one in self.points)]
         return Points(
@@ -180,7 +178,6 @@ class _Searches:
     tried: dict[Path, Evaluated] = field(default_factory=dict)
 
     def front(self, count: int) -> Front:
-        """The ends, then from the first one on to the second."""
         assert self.space.start_place is not None  # which `check_start` has seen to
         first = self._least(self.problem, self.space.start_place, f"1 of {count}")
         last = self._least(replace(self.problem, objective=self.against), first.design.place, f"{count} of {count}")

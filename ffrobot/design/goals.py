@@ -55,7 +55,6 @@ class OfMotors(Goal):
 
 
 def _of_scene(results: Results, variable: Variable) -> tuple[CatalogMotor, float]:
-    """The motor that a joint has, and its ratio."""
     row = tuple(value_of(results.scene, key) for key in variable.keys)
     return variable.motors[variable.rows.index(row)], row[0]
 
@@ -232,17 +231,14 @@ def _duration(history: History) -> float:
 
 
 def _integral(history: History, by_all: bool) -> float:
-    """By the trapezoidal rule."""
     return _mean(history, by_all) * _duration(history)
 
 
 def _mean(history: History, by_all: bool) -> float:
-    """Over time."""
     return history.mean if by_all else float(shares(history.time) @ history.values[:, 0])
 
 
 def _rms(history: History, by_all: bool) -> float:
-    """Over time."""
     return history.rms if by_all else root_mean_square(history.time, history.values[:, 0])
 
 

@@ -148,7 +148,6 @@ class Steps:
         return self._gradients[one.place]
 
     def _gradients_at(self, one: Evaluated) -> Array:
-        """Of the goals; judged ones where the gradient has come down since there were some."""
         for judged in (self._judged, True):
             slopes = self._differentiation.slopes(one, judged=judged)
             if np.isnan(slopes.gradient[:, self._free]).any():
@@ -276,7 +275,6 @@ def _pass(
 
 
 def _stands(differentiation: Differentiation, best: Evaluated) -> Optimality:
-    """By judged gradients."""
     return optimality(differentiation.evaluations, best, differentiation.slopes(best, judged=True))
 
 

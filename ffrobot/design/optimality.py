@@ -148,7 +148,6 @@ class Differentiation:
         return [h, -h] if u - h >= 0.0 and u + h <= 1.0 else [x, 2.0 * x]
 
     def _step(self, base: Evaluated, j: int, noise: float) -> float:
-        """Of one coordinate of the unit cube."""
         return self.evaluations.space.variables[j].step(base.place[j], 2.0 * float(np.sqrt(noise)))
 
     def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:

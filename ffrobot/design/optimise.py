@@ -128,7 +128,6 @@ def _search(
 def _from_starts(
     method: str, differentiation: Differentiation, starts: Sequence[Place], watcher: Watcher
 ) -> list[Local]:
-    """A search from each, as long as runs are left."""
     found: list[Local] = []
     for k, place in enumerate(starts):
         title = f"start {k + 1} of {len(starts)}: " if len(starts) > 1 else ""

@@ -72,7 +72,6 @@ def progress(problem: Problem, designs: Sequence[Evaluated], states: tuple[State
 
 
 def _best_so_far(problem: Problem, designs: Sequence[Evaluated], values: Sequence[float]) -> Numbers:
-    """Of those that keep all limits; None before the first one."""
     kept = [
         problem.sense * value if one.completed and problem.violation(one.readings) <= KEPT else np.inf
         for one, value in zip(designs, values, strict=True)
@@ -81,7 +80,6 @@ def _best_so_far(problem: Problem, designs: Sequence[Evaluated], values: Sequenc
 
 
 def _axis(variable: Variable, k: int, values: Sequence[object]) -> Axis:
-    """Of a number between its bounds, or of column k of a catalog."""
     if not variable.is_catalogue:
         low, high = variable.low, variable.high
         numbers_of = tuple(float(value) for value in values)  # type: ignore[arg-type]
@@ -239,7 +237,6 @@ class Optimum(Finding):
         yield from self.verdict.lines()
 
     def _prices_in_words(self) -> Iterator[str]:
-        """What a little more room saves, for each limit and bound that is reached."""
         if not self.feasible:
             return
         for limit, price in zip(self.problem.limits, self.prices, strict=True):
@@ -284,7 +281,6 @@ class Optimum(Finding):
         return [parallel(self.space, goals, self.tried, states, best), progress(problem, self.tried, states)]
 
     def _key_rows(self) -> Iterator[tuple[str, str, str, str]]:
-        """Of each key its name, where the search began, its best value, and its bounds."""
         owners = [variable for variable in self.space.variables for _ in variable.keys]
         start = self.space.point(self.start.place)
         for name, begin, best, of in zip(self.keys, start, self.values, owners, strict=True):
@@ -292,7 +288,6 @@ class Optimum(Finding):
             yield name, number(begin), number(best), bounds
 
     def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
-        """Of each limit its text, the goal at first and in the best design, whether it is reached, its price."""
         for k, (limit, price) in enumerate(zip(self.problem.limits, self.prices, strict=True)):
             cost = f"{price:.4g}" if self.feasible and np.isfinite(price) else ""
             yield limit.text, _at(self.start, k + 1), _at(self.best, k + 1), self._state(k), cost
@@ -313,14 +308,12 @@ class Optimum(Finding):
         return f"{bound + room:.6g}{f' {unit}' if unit else ''} instead of {bound:g} {verb} {gained:.4g}{of}{share}"
 
     def _starts(self) -> str:
-        """How many of the searches end at the best design."""
         ends = [one.best.values[0] for one in self.searches if one.best.completed]
         near = sum(abs(end - self.value) <= AIM * abs(self.value) for end in ends)
         worst = max((self.problem.sense * end for end in ends), default=np.nan) * self.problem.sense
         return f"{near} of {len(self.searches)} end at this value, within {AIM:g}; the worst at {worst:.6g}"
 
     def _standing(self) -> str:
-        """How near to an optimum it is."""
         if self.optimality is None:
             return "the best of the designs that were tried"
         stands = self.optimality

@@ -75,7 +75,6 @@ def _checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _problem(kind: object, about: Sequence[object], value: object) -> str:
-    """What is wrong with the value of a parameter; empty if nothing is."""
     if get_origin(kind) is Literal and value not in get_args(kind):
         return f"expected {either(get_args(kind))}, found {value!r}"
     if isinstance(value, float) and kind is int:

@@ -76,8 +76,6 @@ def is_history(text: str) -> bool:
 
 
 class _Study:
-    """Runs, and what they say."""
-
     def __init__(self, designs: SpreadDesigns, curves: tuple[Curve, ...]) -> None:
         self._designs, self._curves = designs, curves
         self._spreads, self._goals, self._readings = designs.spreads, designs.goals, designs.readings
@@ -158,7 +156,6 @@ class _Study:
         return [one.value for one in found] or [float("nan")] * len(self._goals)
 
     def _values(self, m: int, design: Design) -> Array:
-        """History m (T,), at the times of the one in the middle."""
         found = self._curves[m].history(design)
         time = self._nominal[m].time
         if found.time.shape != time.shape or not np.allclose(found.time, time, rtol=1e-9, atol=1e-12):

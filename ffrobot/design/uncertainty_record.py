@@ -103,7 +103,6 @@ class Uncertainty(Finding):
             yield Section(BAND_HEADINGS, self._band_rows()).for_report()
 
     def _statistics_row(self, g: int) -> tuple[str, ...]:
-        """Of goal g, each with its error."""
         s = self.statistics
         cells = (with_error(value[g], error[g]) for value, error in s.named.values())
         return (*cells, f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
@@ -127,7 +126,6 @@ class Uncertainty(Finding):
         return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
 
     def _band_rows(self) -> Iterator[tuple[str, ...]]:
-        """Where each history is least sure."""
         for band in self.bands:
             width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
             cells: list[str] = []
@@ -190,7 +188,6 @@ class Uncertainty(Finding):
         return [*(self._ranking(g) for g in range(len(self.goals))), *map(self._band, self.bands)]
 
     def _ranking(self, g: int) -> Bars:
-        """Shares of the variance, or Sobol indices with their errors, in percent."""
         order = self.ranked(g)
         if i := self.indices:
             pairs = {"alone": (i.first, i.first_error), "with others": (i.total, i.total_error)}

@@ -77,8 +77,6 @@ def _of_motion(convert: Callable[[RobotMotion], Converted], what: str) -> Make:
 
 
 def _of_body(convert: Callable[[ModalBody], Converted]) -> Make:
-    """From a modal body file."""
-
     def make(path: Path, analysis: str | None, side: Side) -> Made:
         body = read_modal_body(path)
         content, remarks = convert(body)

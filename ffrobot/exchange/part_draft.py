@@ -81,7 +81,6 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
 
 
 def _material(density: float | None) -> tuple[dict[str, float], str]:
-    """Keys of the material, and a comment on it."""
     wanted = MATERIALS[0][-1] if density is None else density
     name, E, nu, rho = min(MATERIALS, key=lambda one: abs(one[-1] / wanted - 1.0))
     keys = {"youngs_modulus": E, "poissons_ratio": nu, "density": wanted}

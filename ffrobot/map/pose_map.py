@@ -275,7 +275,6 @@ def _write(path: Path, found: Mapping[str, Array]) -> None:
 
 
 def _request(plan: MapPlan) -> dict[str, Any]:
-    """What a map is of, and fingerprints of its input."""
     asked = {
         "scene": str(plan.scene.absolute()),
         "axes": [[axis.name, axis.values.tolist()] for axis in plan.axes],

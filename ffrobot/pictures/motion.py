@@ -92,7 +92,6 @@ def moving_bodies(results: Results, analysis: str, frames: Indices) -> list[Movi
 
 
 def _moving_body(results: Results, analysis: str, name: str, frames: Indices) -> MovingBody:
-    """Not shifted."""
     group, points = f"{analysis}/bodies/{name}", f"{analysis}/points"
     position, orientation = in_3d(results[f"{group}/position"][frames]), _orientation(results, group, frames)
     labels = [label for label in results.names(points) if label.startswith(f"{name}.")]

@@ -42,7 +42,6 @@ Rows = Iterator[tuple[str, Cells]]
 
 
 def _linear(name: str, found: LinearModels) -> Rows:
-    """Frequencies and growth at every time."""
     for model, modes in zip(found.models, found.modes, strict=True):
         cells = {
             "t (s)": f"{model.time:g}",
@@ -58,7 +57,6 @@ def _lowest(frequency: Array) -> str:
 
 
 def _conditions(name: str, found: LinearModels | RobotAtRest) -> Rows:
-    """Natural frequencies with motors at rest, and the stiffness of points, at every time."""
     for t, at in zip(found.times, found.conditions, strict=True):
         for condition, held in at.items():
             stiffness = [(point, *_stiffness(C)) for point, C in held.compliance.items()] or [("", "", "")]

@@ -54,12 +54,10 @@ def print_details(solution: Solution, results: Results, seconds: Mapping[str, fl
 
 
 def _details(solution: Solution) -> dict[str, Details]:
-    """What only kinds of analyses find, by analysis."""
     return {name: result.run.details for name, result in solution.analyses.items()}
 
 
 def _tables(solution: Solution, results: Results) -> Iterator[Table]:
-    """What was found of each kind, where there is any."""
     rows = ((name, cells) for name in results.analyses for cells in voltage_cells(results, name))
     yield from named_tables("voltages of", rows)
     rows = ((name, cells) for name in results.analyses for cells in settling_cells(results, name))
@@ -90,7 +88,6 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
 
 
 def _inversion(run: Outcome, around: AroundPath) -> str:
-    """What the zeros are, how the path was inverted, and what that leaves of it."""
     inversion = around.inversion
     assert inversion is not None
     linear, factor = inversion.linearisation, inversion.servo.factor
@@ -110,7 +107,6 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
 
 
 def _stresses(name: str, result: AnalysisResult) -> Iterator[tuple[str, Cells]]:
-    """The largest stress of each body, at outputs and between."""
     for body, stress in result.histories.stresses.items():
         value, k, place = stress.largest()
         most, at, by = f"{value / 1e6:.4g}", f"{result.histories.run.time[k]:g}", stress.recovery.method

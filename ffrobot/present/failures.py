@@ -31,12 +31,10 @@ class _Output(TextIOWrapper):
     """Standard output whose errors have its name: libraries raise others without one."""
 
     def write(self, text: str, /) -> int:
-        """As every stream."""
         with _named():
             return super().write(text)
 
     def flush(self) -> None:
-        """As every stream."""
         with _named():
             super().flush()
 

@@ -61,7 +61,6 @@ def _modal_body(body: ModalBody) -> str:
 
 
 def _modes(body: ModalBody) -> Table:
-    """A line for each mode, with what the model says where the frequency was measured."""
     computed = None if body.measured is None else body.measured.computed_frequency
     more = () if computed is None else ("of the model (Hz)",)
     table = Table("mode", "family", "frequency (Hz)", *more, "ω (rad/s)", "damping ratio")
@@ -86,7 +85,6 @@ def _place(body: ModalBody, position: Array) -> str:
 
 
 def _optional(body: ModalBody) -> Iterator[str]:
-    """Lines on what only some modal bodies have."""
     if body.measured is not None:
         yield f"measured: {body.measured.in_words()}; shapes are those of the model"
     stresses = f"modal{' and static' if body.stress_loads else ''} stresses"
@@ -128,8 +126,6 @@ def _results(file: h5py.File) -> str:
 
 
 def _add_datasets(table: Table, group: h5py.Group, meanings: Mapping[str, Meaning]) -> None:
-    """A line for each dataset below a group: name, shape, unit, a few words."""
-
     def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
             found = meaning(name, meanings) or Meaning("", "")

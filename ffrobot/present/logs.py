@@ -26,7 +26,6 @@ class _FileName(click.Path):
     """The name of a file, there or not; what can be none is refused."""
 
     def convert(self, value: str | PathLike[str], param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """As a path."""
         return check_file_name(os.fspath(value))
 
 
@@ -96,7 +95,6 @@ class _LogFile(logging.FileHandler):
     """A log that ends where it cannot be written, with one message: what it is about goes on."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Say so, and write no more."""
         error = sys.exc_info()[1]
         LOGGER.removeHandler(self)
         click.echo(
@@ -104,7 +102,6 @@ class _LogFile(logging.FileHandler):
         )
 
     def close(self) -> None:
-        """Without what cannot be written any more."""
         with suppress(OSError):
             super().close()
 

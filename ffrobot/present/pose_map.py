@@ -30,7 +30,6 @@ def _rows(found: PoseMap) -> Iterator[tuple[str, ...]]:
 
 
 def _place(found: PoseMap, number: int) -> str:
-    """The values of the axes that have more than one, angles in degrees."""
     place = np.unravel_index(number, found.plan.shape)
     pairs = zip(found.plan.axes, place, strict=True)
     numbers = ((axis, axis.values[k]) for axis, k in pairs if len(axis.values) > 1)

@@ -68,7 +68,6 @@ def _analysis(one: AnalysisVerdict) -> Row:
 
 
 def _remark(one: AnalysisVerdict) -> str:
-    """What matters most beside the numbers."""
     if one.status != "completed":
         return f"{one.status} at {one.reached_in_words} s"
     name, factor = one.worst
@@ -88,7 +87,6 @@ def _judged(analyses: Sequence[AnalysisVerdict]) -> list[AnalysisVerdict]:
 
 
 def _motors(analyses: Sequence[AnalysisVerdict]) -> Iterator[Row]:
-    """Every motor in every analysis."""
     for one in _judged(analyses):
         yield from (_motor(name, motor, one) for name, motor in one.motors.items())
 
@@ -165,7 +163,6 @@ def _counted(text: str, left: int) -> str:
 
 
 def _shortened(text: str, room: int, width: int) -> list[str]:
-    """Up to the end of a word."""
     *whole, last = _wrapped(text, width)[:room]
     ending = f" (in full: {REST})"
     return [*whole, wrap(last, width - len(ending))[0] + ending]
@@ -176,7 +173,6 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def _at_most(rows: Sequence[Row], room: int) -> list[Row]:
-    """The first ones, and how many more there are."""
     room = max(room, 1)
     if len(rows) <= room:
         return list(rows)

@@ -57,7 +57,6 @@ def check_functions(scene: SceneKeys, path: Path) -> None:
 
 
 def _check_trajectory(trajectory: Trajectory, times: Array, label: str) -> None:
-    """Of places or coordinates, and of an orientation, at `times` (T,)."""
     places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
     for component, function in trajectory.components.items():
         _check_path(function, times, f"{label}: {places or component}")
@@ -96,7 +95,6 @@ def _all_duplicates(scene: SceneKeys) -> Iterator[str]:
 
 
 def _reference_problems(scene: SceneKeys) -> Iterator[str]:
-    """What records refer to that does not exist, or is of another kind."""
     bodies = {body.name: body for body in scene.body}
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'

@@ -102,7 +102,6 @@ T = TypeVar("T")
 
 
 def _renamed(value: T, places: Mapping[str, str]) -> T:
-    """A record, or several of them, with names of points replaced."""
     new: Any = value
     if isinstance(value, str):
         new = places.get(value, value)

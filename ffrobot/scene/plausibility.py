@@ -114,7 +114,6 @@ def _beam(link: BeamLink, label: str) -> Iterator[str]:
 
 
 def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
-    """Payloads that are far heavier than the robot that carries them, and bodies heavier than any."""
     robot = 0.0
     for body in scene.body:
         if body.rigid is not None:
@@ -159,7 +158,6 @@ def _inertias(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
 
 
 def _joints(scene: Scene) -> Iterator[str]:
-    """Places, rotors, ranges and first angles of joints."""
     for joint in scene.joint:
         label = f'joint "{joint.name}"'
         if (away := float(np.linalg.norm(joint.at))) > LONGEST:
@@ -179,7 +177,6 @@ def _joints(scene: Scene) -> Iterator[str]:
 
 
 def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
-    """Patches larger than their face, of another unit, or on each other."""
     for layout in scene.pzt:
         label = f'pzt "{layout.label}"'
         if layout.modulus < SOFTEST_PATCH:
@@ -224,7 +221,6 @@ def _shared(first: Array, second: Array) -> tuple[float, float]:
 
 
 def _voltages(scene: Scene) -> Iterator[str]:
-    """Prescribed voltages beyond the limit of their patches."""
     layouts = {layout.label: layout for layout in scene.pzt}
     last = max((analysis.last_time for analysis in scene.analysis), default=0.0)
     for k, load in enumerate(scene.load, 1):
@@ -262,7 +258,6 @@ def _long(length: float, label: str) -> Iterator[str]:
 
 
 def _angles(scene: Scene) -> Iterator[str]:
-    """Paths of angles that come to rest many turns away, and of poses more than half a turn apart."""
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
     sliding = {joint.name for joint in scene.joint if joint.type == "prismatic"}
     last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
@@ -303,7 +298,6 @@ def _tracked(scene: Scene) -> Iterator[str]:
 
 
 def _times(scene: Scene) -> Iterator[str]:
-    """Paths with times of their own that do not fit those of the analyses that follow them."""
     for analysis in scene.analysis:
         if not analysis.follows_trajectories or not analysis.last_time:
             continue

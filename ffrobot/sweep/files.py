@@ -142,7 +142,6 @@ def _body(scene: Table, name: str) -> Table:
 
 
 def _bodies(scene: Table) -> list[Table]:
-    """The bodies with a name: that the scene is right otherwise is seen later."""
     bodies = scene.get("body")
     tables = [body for body in bodies if isinstance(body, dict)] if isinstance(bodies, list) else []
     return [body for body in tables if isinstance(body.get("name"), str)]

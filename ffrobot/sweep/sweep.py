@@ -81,7 +81,6 @@ class Sweep:
         return {**self.fixed, **{key: value for v, value, own in points if value != own for key in v.keys}}
 
     def _name(self, number: int, values: Sequence[Value]) -> str:
-        """Of the run's folder."""
         if not self.growing:
             return f"{number:04d}"
         changes = {".".join(key): value for key, value in self.changes(values).items()}
@@ -182,7 +181,6 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
 
 @contextmanager
 def _performed(runs: Sequence[Run], side_by_side: int, workers: Workers) -> Iterator[Iterable[Row | None]]:
-    """Rows of the runs as they finish; the body of the `with` ends when the last one is there."""
     if processes() > 1:
         from mpi4py.futures import MPICommExecutor
 

@@ -50,12 +50,10 @@ def print_table(
 
 
 def _broken(header: str) -> str:
-    """A header in lines, broken at its slashes and blanks."""
     return header.replace("/", "/\n").replace(" ", "\n")
 
 
 def _width(header: str) -> int:
-    """Of its column: of the longest line, and of a number."""
     return max([8, *(len(line) for line in _broken(header).splitlines())])
 
 

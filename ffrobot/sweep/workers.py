@@ -106,7 +106,6 @@ class Workers:
                 worker.stop()
 
     def _take(self) -> Worker:
-        """One that is idle and would be made the same now, or a new one."""
         with self._lock:
             fit = [worker for worker in self._idle if worker.place == _place() and worker.is_alive]
             _close([worker for worker in self._idle if worker not in fit])
@@ -122,5 +121,4 @@ def _close(idle: list[Worker]) -> None:
 
 
 def _place() -> tuple[Path, dict[str, str]]:
-    """What a process inherits."""
     return Path.cwd(), dict(os.environ)

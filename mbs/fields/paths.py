@@ -72,7 +72,6 @@ def _laws(legs: Legs, changes: Array) -> Sequence[Piecewise]:
 
 
 def _peak(motion: Piecewise, order: int) -> float:
-    """Largest norm of a derivative."""
     times = np.concatenate([np.linspace(a, b, SAMPLES) for a, b in zip(motion.breaks, motion.breaks[1:], strict=False)])
     return float(np.linalg.norm(motion.sample(times, order), axis=1).max())
 

@@ -85,7 +85,6 @@ class Waypoints:
 
     @property
     def _ways(self) -> tuple[Indices, Indices]:
-        """First and last row of each part that moves."""
         moves = np.any(np.diff(self.values, axis=0), axis=1)
         begins = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
         return begins, np.flatnonzero(moves & ~np.append(moves[1:], False)) + 1

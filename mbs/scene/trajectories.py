@@ -132,7 +132,6 @@ class Trajectory(MotionKeys):
             raise ValueError(f"expected tool_axis with a direction, found {list(self.tool_axis)}")
 
     def _check_poses(self) -> None:
-        """Of places with an orientation."""
         if not self._has_poses:
             return
         if found := [key for key in ORIENTATIONS if getattr(self, key) is not None]:
@@ -246,7 +245,6 @@ class Trajectory(MotionKeys):
 
     @property
     def _places(self) -> Array:
-        """(k + 1, n) of `via`."""
         assert self.via is not None
         return np.array(self.via, dtype=float).reshape(len(self.via), -1)
 
@@ -262,7 +260,6 @@ class Trajectory(MotionKeys):
 
     @cached_property
     def _turning(self) -> Piecewise | None:
-        """Their motion, with the times of the places."""
         if self._turns is None:
             return None
         vectors = self._turns[0]

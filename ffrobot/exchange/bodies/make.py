@@ -140,7 +140,6 @@ def _stations(nodes: Sequence[Node], interfaces: Mapping[str, Interface], length
 
 
 def _line(interfaces: Mapping[str, Interface], n: int) -> PictureMesh:
-    """From root to tip, for pictures."""
     ends = [interfaces["root"], interfaces["tip"]]
     shapes = np.array([at.translation for at in ends]).reshape(2, 3, n)
     return PictureMesh(np.array([at.position for at in ends]), np.array([[0, 1]], dtype=np.int64), shapes)

@@ -160,7 +160,6 @@ def _is_in_both(modal: Section, slope: Array, layout: Layout) -> bool:
 
 
 def _inertia(J: Taylor) -> tuple[Array, Array]:
-    """(3, 3) and (3, 3, n), from six rows or from (3, 3)."""
     if len(J.m0) == 3:
         return J.m0, J.m1.transpose(0, 2, 1)
     J0, J1 = np.zeros((3, 3)), np.zeros((3, 3, J.m1.shape[1]))

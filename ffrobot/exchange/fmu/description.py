@@ -171,7 +171,6 @@ def _structure(parent: ElementTree.Element, unit: Unit) -> None:
 
 
 def _unknowns(first: int, matrix: Array, columns: Array) -> list[tuple[int, Iterable[int]]]:
-    """Index of each row's variable, and of those that it depends on."""
     return [(first + k, columns[row != 0].tolist()) for k, row in enumerate(matrix)]
 
 

@@ -61,15 +61,11 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
 
 
 class _Logged(Watcher):
-    """Stages in the log."""
-
     def stage(self, title: str) -> None:
-        """Of a link that is computed."""
         logger.info("%s", title)
 
 
 def _unit(scene: Scene, analysis: Forward) -> tuple[Model, ForwardUnit]:
-    """The motion of `analysis`."""
     prepared = prepare_scene(scene, _Logged())
     bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
     model = with_compliance(without_paths(with_bodies(prepared, bodies).model))
@@ -85,7 +81,6 @@ def _silent(model: Model) -> list[str]:
 
 
 def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
-    """The analysis of this name, or the first that fits."""
     found = {each.name: each for each in scene.analysis}
     if name is not None and name not in found:
         raise InputError(f'{path}: --analysis: expected one of {quoted(found)}, found "{name}"')

@@ -104,7 +104,6 @@ def voltage(layout: str, number: int) -> Variable:
 
 
 def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Unit and description of a coordinate of the robot."""
     kind, _, rest = name.partition("/")
     place, _, last = rest.rpartition("/")
     if kind == "modal":
@@ -244,7 +243,6 @@ def _strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[tuple[Var
 
 
 def _places(model: Model) -> Iterator[tuple[str, _core.PlaceOutput]]:
-    """By "BODY.POINT"."""
     for number, node in enumerate(model.tree.nodes):
         for label, at in node.body.points.items():
             K = [] if node.body.stiffening is None else list(node.body.stiffening.at(label)[:3])

@@ -338,7 +338,6 @@ def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> Robo
 
 
 def _moving(results: Results, analysis: str) -> Iterator[str]:
-    """Joints that have a coordinate at each output, in the order of the scene."""
     names = [str(entry["name"]) for entry in results.scene.get("joint", ())]
     return (name for name in names if results.has(f"{analysis}/joints/{name}/coordinate"))
 
@@ -428,7 +427,6 @@ def joint_trajectory_text(motion: RobotMotion) -> tuple[str, tuple[str, ...]]:
 
 
 def _duration(time: float) -> dict[str, int]:
-    """builtin_interfaces/Duration, to the nearest nanosecond."""
     sec, nanosec = divmod(round(time * NANO), NANO)
     return {"sec": sec, "nanosec": nanosec}
 
@@ -459,7 +457,6 @@ def joint_trajectory_bag(motion: RobotMotion) -> tuple[Mapping[str, bytes], tupl
 
 
 def _ros(message: Mapping[str, Any], types: Mapping[str, Any]) -> Any:  # noqa: ANN401 (classes are made at run time)
-    """The message as an object of ROS's class."""
     stamp = types["builtin_interfaces/msg/Time"](**message["header"]["stamp"])
     header = types["std_msgs/msg/Header"](stamp=stamp, frame_id=message["header"]["frame_id"])
     points = [_point(point, types) for point in message["points"]]

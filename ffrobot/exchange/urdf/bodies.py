@@ -162,7 +162,6 @@ def least_change(inertia: Array) -> Array:
 
 
 def _fixed(bodies: list[Body]) -> list[str]:
-    """Change inertias that no body has; a remark on each."""
     remarks = []
     for body in bodies:
         before = body.inertial.inertia

@@ -99,7 +99,6 @@ def conversion_losses(
 
 
 def _of_types(tree: KinematicTree) -> Iterator[str]:
-    """Joints that are several there, and those whose coordinates are others."""
     for node in tree.nodes:
         joint, count = node.joint, len(STEPS[node.joint.type])
         if count > 1:
@@ -111,7 +110,6 @@ def _of_types(tree: KinematicTree) -> Iterator[str]:
 
 
 def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
-    """Keys of joints."""
     joints = [node.joint for node in tree.nodes]
     sliding = [joint for joint in joints if joint.type in ("prismatic", "cylindrical")]
     if endless := [joint.name for joint in sliding if np.isinf(joint.position_limits[-1]).any()]:

@@ -158,7 +158,6 @@ def _interfaces(
 
 
 def _axes_of_joints(robot: Robot, name: str, point_of: Mapping[str, str], place: Place) -> dict[str, Axis]:
-    """The joints of a link that move, by their interfaces."""
     moving = [joint for joint in robot.joints.values() if joint.type in ("revolute", "continuous")]
     found = dict[str, Axis]()
     for joint in moving:

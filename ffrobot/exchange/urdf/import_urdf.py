@@ -246,7 +246,6 @@ def _meshes(robot: Robot, urdf: Path, folder: Path) -> dict[str, str]:
 def _compared(
     robot: Robot, links: Mapping[str, FlexibleLink], folder: Path, scene: SceneOfRobot, *, keep_rest: bool
 ) -> tuple[list[dict[str, Any]], list[str]]:
-    """Payloads that make up for what flexible links lack of the URDF's masses, and remarks on what they replace."""
     payloads, remarks = [], list[str]()
     for link in links.values():
         try:

@@ -104,7 +104,6 @@ class SceneOfRobot:
         ]
 
     def _frame(self, body: Body, link: str) -> str:
-        """The name of the point where a link fixed to the body has its frame."""
         return self.points[body.top][f"link {link}" if link in self.robot.joints else link]
 
     def _tool_records(self) -> Iterator[dict[str, Any]]:

@@ -50,7 +50,6 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
 def _frames(
     results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
 ) -> Iterator[Frame]:
-    """One after the other; of planar scenes seen along z, of 3D ones from a corner."""
     scene = moving_scene(results, analysis, outputs, scale, notes)
     exaggerated = "" if scene.scale == 1.0 else f", deformations × {scene.scale:g}"
     picture = _Picture(results, f"{results.name}: {analysis}{exaggerated}", results.time(analysis)[outputs], scene)

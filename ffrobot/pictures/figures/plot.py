@@ -94,7 +94,6 @@ T = TypeVar("T")
 
 
 def _records(figures: Sequence[FigureRecord], only: Sequence[str]) -> list[FigureRecord]:
-    """Those that are wanted, names that come twice included."""
     names = chosen(dict.fromkeys(figure.name for figure in figures), only)
     return [figure for figure in figures if figure.name in names]
 

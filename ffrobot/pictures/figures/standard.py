@@ -75,7 +75,6 @@ def _histories(
     y_label: str,
     **more: Any,  # noqa: ANN401
 ) -> Iterator[FigureRecord]:
-    """Curves over time, if there are any; `name` in parts, `more` keys of `FigureRecord`."""
     if drawn := tuple(curves):
         yield FigureRecord(name=file_name(*name), title=title, curves=drawn, y_label=y_label, **more)
 
@@ -116,7 +115,6 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
 
 
 def _tip_errors(results: Results) -> Iterator[FigureRecord]:
-    """Of all closed loops in one figure."""
     curves = curves_of(results, "tip_error")
     yield from _histories(("tip_error",), "tip position error", curves, "error (mm)", scale=1e3)
 
@@ -199,7 +197,6 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
 
 
 def _components(results: Results, group: str) -> list[str]:
-    """Of a trajectory: what its forces act along or about."""
     return [str(each) for each in results.attributes(group)["components"]]
 
 
@@ -210,7 +207,6 @@ def _actuators(results: Results) -> Iterator[FigureRecord]:
 
 
 def _motors(results: Results) -> Iterator[FigureRecord]:
-    """Torque or force of every motor, and over its speed where that or the power has limits."""
     for joint, coordinate in _coordinates(results):
         label = joint + coordinate.label
         limit = coordinate.limits.moment
@@ -222,7 +218,6 @@ def _motors(results: Results) -> Iterator[FigureRecord]:
 
 
 def _joints(results: Results) -> Iterator[FigureRecord]:
-    """Coordinates, torques over speed, and sizes of reactions, of every joint."""
     for joint, coordinate in _coordinates(results):
         moved = curves_of(results, f"joints/{joint}/coordinate", coordinate.column)
         if any(np.ptp(results.data(curve.data)) for curve in moved):
@@ -257,7 +252,6 @@ def _torque_speed(results: Results, joint: str, coordinate: Coordinate) -> Itera
 
 
 def _stresses(results: Results) -> Iterator[FigureRecord]:
-    """Von Mises stress at stress points, and the largest on surfaces."""
     for body in members(results, "stress"):
         found = (point for a in results.analyses for point in results.names(f"{a}/stress/{body}/points"))
         places = [(f"points/{point}/von_mises", point) for point in dict.fromkeys(found)]
@@ -268,7 +262,6 @@ def _stresses(results: Results) -> Iterator[FigureRecord]:
 
 
 def _energies(results: Results) -> Iterator[FigureRecord]:
-    """Energies of every analysis."""
     for analysis in results.analyses:
         names = ((kind, f"{analysis}/energy/{kind}") for kind in ENERGIES)
         curves = (Curve(data=data, label=kind) for kind, data in names if results.has(data))
@@ -276,10 +269,6 @@ def _energies(results: Results) -> Iterator[FigureRecord]:
 
 
 def _voltages(results: Results) -> Iterator[FigureRecord]:
-    """Voltages of all patches of a layout: required, and where these are too large, within their limit.
-
-    The name of a layout is the body's if it has none.
-    """
     limits = {layout.get("name", layout["body"]): layout.get("limit") for layout in results.scene.get("pzt", [])}
     for analysis in results.analyses:
         if results.attributes(analysis)["kind"] == "motors-only":
@@ -312,7 +301,6 @@ def _linear(results: Results) -> Iterator[FigureRecord]:
 
 
 def _responses(results: Results) -> Iterator[FigureRecord]:
-    """Of linear models the responses to other inputs than the first."""
     for analysis in results.analyses:
         yield from islice(_responses_of(results, analysis), 1, None)
 

@@ -135,7 +135,6 @@ def _value_text(axis: Axis, row: int) -> str:
 
 
 def _limits(limits: list[tuple[int, Axis]]) -> Trace:
-    """A mark for each that points to the side that is forbidden."""
     return {
         "type": "scatter", "mode": "markers", "name": "limit, pointing beyond it",
         "x": [k for k, _ in limits], "y": [float(axis.place(np.array(axis.limit))) for _, axis in limits],
@@ -149,7 +148,6 @@ def _limits(limits: list[tuple[int, Axis]]) -> Trace:
 
 
 def _texts(k: int, axis: Axis) -> Iterator[dict[str, Any]]:
-    """The name above an axis and its ticks at the left."""
     name = _broken(axis.label, LETTERS)
     yield {"x": k, "y": 1.03, "text": name, "showarrow": False, "yanchor": "bottom", "font": {"size": 11}}
     look = {"showarrow": False, "xanchor": "right", "font": {"size": 10}}

@@ -96,7 +96,6 @@ def _run_data(run: Run, bodies: list[MovingBody], size: float, notes: list[str])
 
 
 def _body_data(run: Run, body: MovingBody, bar: float, notes: list[str]) -> dict[str, Any]:
-    """Surface points x (p, 3), their displacements Φ (p, 3, n), and the motion R, e, p of the body with its shift."""
     shape = thickened(surface_shape(run.results, body, notes), bar)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
     return {
@@ -124,7 +123,6 @@ def _marker_data(marker: Marker) -> dict[str, Any]:
 
 
 def _path_data(run: Run, target: Target) -> dict[str, Any]:
-    """A point to be followed, and the path it should take where all components are specified."""
     data: dict[str, Any] = {"name": plain(target.point)}
     if target.columns == run.results.space.translations:
         frames = _frames(run)

@@ -61,7 +61,6 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
 
 
 def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str, Any]:
-    """What the template fills in."""
     solved, charts = _of_results(files) if files else ({}, [])
     drawn: list[Chart | DrawnDiagram] = [*charts, *(chart for part in studies for chart in part.charts)]
     names = [*(results.name for results in files), *(part.study.scene_name for part in studies)]
@@ -77,7 +76,6 @@ def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str
 
 
 def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
-    """The parts of the page that need solved scenes, and their charts."""
     all_runs = runs(files)
     is_plane = _is_plane(files)
     moving, notes = mechanism(all_runs)
@@ -100,7 +98,6 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
 
 
 def _is_plane(files: Sequence[Results]) -> bool:
-    """Whether the files are of planar scenes; `InputError` where some are and some are not."""
     kinds = {results.space.is_plane: results.path for results in files}
     if len(kinds) == 2:
         raise InputError(

@@ -80,7 +80,6 @@ def _bars(axes: Axes, diagram: Bars, series: Series, at: Array, height: float, c
 
 
 def _label(axes: Axes, bars: BarContainer, series: Series, sign: str) -> None:
-    """The number of each bar at its end."""
     numbers = [_number(value, sign) for value in series.values[:MOST]]
     axes.bar_label(bars, numbers, padding=2, fontsize=7)
 
@@ -208,5 +207,4 @@ def _axis(axes: Axes, k: int, axis: Axis) -> None:
 
 
 def _beyond(sense: int) -> dict[str, Any]:
-    """The mark of a limit, which points to the side that is forbidden."""
     return {"marker": "^" if sense > 0 else "v", "color": "black", "markersize": 4}

@@ -99,7 +99,6 @@ def _workspace(axes: Axes, found: PoseMap, quantity: Quantity, *, has_bar: bool)
 
 
 def _marks(quantity: Quantity) -> Iterator[tuple[int, str, str]]:
-    """Number, color and marker of the worst and the best pose."""
     yield quantity.worst, WORST, "v"
     yield quantity.best, BEST, "^"
 

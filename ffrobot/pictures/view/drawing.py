@@ -101,7 +101,6 @@ def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
 
 
 def _draw_modes(job: dict[str, Any]) -> None:
-    """The lowest modes, each as large as the others, over the undeformed link."""
     import pyvista
 
     grid = _read(job["grid"], 0)
@@ -161,7 +160,6 @@ def _add(plotter: Any, grid: Any, scalars: str, limit: float, rod: float, bar: d
 
 
 def _add_ghost(plotter: Any, grid: Any) -> None:  # noqa: ANN401
-    """The undeformed shape, to be seen through, with its edges; all of what is a line."""
     edges = grid.extract_feature_edges(FOLD)
     plotter.add_mesh(grid, color=GHOST, opacity=0.25, line_width=2)
     plotter.add_mesh(edges if edges.n_points else grid, style="wireframe", color=GHOST, line_width=2)

@@ -195,7 +195,6 @@ def view_movie(results_path: Path, path: Path, options: MovieOptions | None = No
 def _rendered(
     results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
 ) -> Iterator[Frame]:
-    """The frames of a movie, which are drawn all at once."""
     from PIL import Image
 
     grid, steps = results_grid(results, analysis, outputs, notes), tuple(range(len(outputs)))
