@@ -174,7 +174,10 @@ def _named(value: object, info: ValidationInfo) -> StateFunction:
         return value
     objects = (info.context or {}).get("objects", {})
     if not isinstance(value, str) or value not in objects:
-        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
+        raise ValueError(
+            "expected a function of t, position and velocity, in scenes made in Python (expressions in t are the keys"
+            f" x, y and their like), found {value!r}"
+        )
     return state_function(objects[value], is_planar=space_of(info) != SPATIAL)
 
 
