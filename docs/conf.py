@@ -14,6 +14,7 @@ from benchmark_tables import write_benchmark_tables
 from gallery import read_on_site, write_case_pages
 from interfaces import write_interface_pages
 from key_tables import write_key_tables
+from notebook import write_notebook_page
 
 project = "ffrobot"
 author = "the ffrobot developers"
@@ -39,6 +40,7 @@ def _write_pages(folder: Path) -> None:
     write_key_tables(folder / "reference")
     write_interface_pages(folder / "reference")
     write_case_pages(folder / "cases")
+    write_notebook_page(folder)
     write_benchmark_tables(folder / "benchmarks", folder / "developer" / "benchmark_records.md")
 
 

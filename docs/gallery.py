@@ -97,7 +97,7 @@ def on_site(text: str, folder: str = "cases/") -> str:
 def read_on_site(name: str, text: str) -> str:
     """The source of a page as the site takes it: the first page shows the gallery, its own page lists the cases."""
     if name == "index":
-        return text.replace(HERE, on_site(cards()))
+        return text.replace(HERE, on_site(cards())).replace("first_hour.ipynb", "first_hour.md")
     if name == "cases":
         pages = "\n".join(f"cases/{case.name}" for case in cases())
         return f"{on_site(text)}\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{pages}\n```\n"

@@ -111,7 +111,7 @@ def test_modules_that_refuse_what_is_not_supported_exist(monkeypatch):
 def test_first_page_lists_all_pages_for_readers_of_the_repository():
     """There the lists of the site are not links."""
     text = (DOCS / "index.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^\* \[.*\]\((.*)\.md\)$", text, flags=re.MULTILINE)
+    listed = re.findall(r"^\* \[.*\]\((.*)\.(?:md|ipynb)\)$", text, flags=re.MULTILINE)
     assert listed == re.findall(r"^[a-z_/]+$", text, flags=re.MULTILINE)
 
 
