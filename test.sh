@@ -8,7 +8,7 @@ WITH_TEST_PACKAGES=yes source scripts/setup.sh
 rm -rf build/types
 mkdir -p build/types/ffrobot/mbs
 ln -s "$PWD"/ffrobot/* "$PWD"/{common,mesh,fe_models,actuation} build/types/ffrobot/
-ln -s "$PWD"/mbs/{*.py,fields,joints,scene,model,solve,analysis,quantities} "$PWD"/.venv/lib/python3*/site-packages/ffrobot/mbs/_core.pyi build/types/ffrobot/mbs/
+ln -s "$PWD"/mbs/{*.py,fields,joints,scene,model,posture,linear,run,quantities,inversion,analysis,tracking} "$PWD"/.venv/lib/python3*/site-packages/ffrobot/mbs/_core.pyi build/types/ffrobot/mbs/
 mapfile -t cpp < <(find mbs -name '*.h' -o -name '*.cpp')
 
 failed=()

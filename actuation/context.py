@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.context import Context
 from ..mbs.model.body import Body
+from ..mbs.run.context import Context
 
 if TYPE_CHECKING:
     from .patches.link_patches import LinkPatches

@@ -19,11 +19,11 @@ from ..common.errors import InputError, did_you_mean, quoted
 from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.field_types import Name, Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.body import Body, BodyPoint
 from ..mbs.model.motors import path_forces, path_forces_on_bodies
+from ..mbs.run.outcome import Outcome
 from ..mbs.scene.space import SPACES, Space
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same

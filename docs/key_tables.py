@@ -38,7 +38,7 @@ UNSUPPORTED = (
         'compliant gears (`stiffness` of joints) with `motors = "frame"` in joints whose axis modes tilt, where they'
         " are driven, controlled or linear: no angle goes with a moment between frames there",
         '`motors = "section"`',
-        "ffrobot.mbs.analysis.gears",
+        "ffrobot.mbs.run.gears",
     ),
     (
         "kinematic loops with a motor without `rotor_inertia`, or a compliant gear, in each joint (rotors,"

@@ -18,7 +18,20 @@ PACKAGES = ("common", "mesh", "fe_models", "mbs", "actuation", "ffrobot")
 # files of the package itself.
 FLOORS = {
     "fe_models": ("link_records", "modal_body", "beam", "solid", "."),
-    "mbs": ("fields", "joints", "scene", "model", "solve", "analysis", "quantities", "."),
+    "mbs": (
+        "fields",
+        "joints",
+        "scene",
+        "model",
+        "posture",
+        "linear",
+        "run",
+        "quantities",
+        "inversion",
+        "analysis",
+        "tracking",
+        ".",
+    ),
     "actuation": ("patches", ".", "control"),
     "ffrobot": (
         "scene",

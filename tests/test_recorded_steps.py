@@ -6,7 +6,7 @@ from beam_links import beam_link, tube
 from scipy.interpolate import CubicSpline
 
 from ffrobot import make_scene
-from ffrobot.mbs.analysis.replay import supplied
+from ffrobot.mbs.run.replay import supplied
 from ffrobot.run.solve import solve_scene
 
 TUBES = {"upper": (0.5, 0.06, 0.052), "fore": (0.4, 0.05, 0.044), "hand": (0.2, 0.03, 0.026)}

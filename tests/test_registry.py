@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ffrobot.mbs.analysis.outcome import Motion, Outcome
+from ffrobot.mbs.run.outcome import Motion, Outcome
 from ffrobot.mbs.fields.field_types import Positive, Reference
 from ffrobot.mbs.scene.analysis import TimedAnalysis
 

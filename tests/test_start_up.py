@@ -85,7 +85,7 @@ def test_a_solve_loads_what_its_scene_needs(ffrobot, tmp_path):
     assert kinds & found == {"ffrobot.mbs.analysis.forward"}
     assert not {"rich", "scipy", "matplotlib", "ffrobot.present.details"} & found
     of_others = ("actuation.patches.link_patches", "actuation.feasibility", "actuation.control.linear_model",
-                 "mbs.solve.stable_inversion", "mesh.part_mesh")  # fmt: skip
+                 "mbs.inversion.stable_inversion", "mesh.part_mesh")  # fmt: skip
     assert not {f"ffrobot.{module}" for module in of_others} & found
     results = scene.with_suffix(".results.h5")
     shown = loaded(f"sys.argv = ['ffrobot', 'info', {str(results)!r}]\nfrom ffrobot.cli import main\nmain()")

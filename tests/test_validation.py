@@ -135,7 +135,7 @@ def test_kinds_of_analysis_by_the_names_of_other_programs(word, meant):
 
 
 def test_least_torque_is_spelled_as_redundancy_has_it():
-    from ffrobot.mbs.analysis.tracking import Tracking
+    from ffrobot.mbs.tracking.tracking import Tracking
 
     keys = {"name": "a", "kind": "tracking", "end": 1.0, "output_step": 0.1}
     for objective in ("least-torque", "least-moment"):

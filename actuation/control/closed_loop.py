@@ -13,19 +13,19 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
 from ...mbs._core import TimeFunction
-from ...mbs.analysis.context import place_of
-from ...mbs.analysis.drive import Control, drive_robot
 from ...mbs.analysis.forward import actuator_commands, largest_moments
-from ...mbs.analysis.gears import MotorCoordinates, with_motor_coordinates
-from ...mbs.analysis.outcome import Outcome
-from ...mbs.analysis.replay import replay_times, supplied
+from ...mbs.linear.linearisation import LinearEquations
+from ...mbs.linear.statics import initial_state
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model, without_paths
 from ...mbs.quantities.settling import commanded_rest
-from ...mbs.solve.linearisation import LinearEquations
-from ...mbs.solve.statics import initial_state
+from ...mbs.run.context import place_of
+from ...mbs.run.drive import Control, drive_robot
+from ...mbs.run.gears import MotorCoordinates, with_motor_coordinates
+from ...mbs.run.outcome import Outcome
+from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from .controllers import (

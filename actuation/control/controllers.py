@@ -30,8 +30,8 @@ from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, SolveError, quoted
 from ...common.python_files import count_failed, count_imports, imported_files
 from ...common.structs import struct
-from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import Model
+from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
 from .records import ComputedTorque, JointPid, ModalVelocity
 from .robot import RigidArm, Robot, estimate

@@ -10,11 +10,11 @@ from typing import Literal
 from ...common.arrays import Array
 from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, find_operating_points, places_of
-from ...mbs.analysis.outcome import Details, Outcome
 from ...mbs.fields.field_types import PointReference
+from ...mbs.linear.joint_conditions import JointCondition, RobotModes, joint_conditions
+from ...mbs.linear.linearisation import LinearEquations, LinearMechanism
 from ...mbs.model.model import Model, modal_directions
-from ...mbs.solve.joint_conditions import JointCondition, RobotModes, joint_conditions
-from ...mbs.solve.linearisation import LinearEquations, LinearMechanism
+from ...mbs.run.outcome import Details, Outcome
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from .linear_model import LinearModel, Reach, Zeros, controllability, observability, robot_modes, state_space, zeros

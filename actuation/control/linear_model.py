@@ -14,9 +14,9 @@ from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.structs import struct
-from ...mbs.solve.joint_conditions import RIGID, RobotModes, free_directions
-from ...mbs.solve.joint_conditions import robot_modes as modes_of
-from ...mbs.solve.linearisation import LinearMechanism
+from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions
+from ...mbs.linear.joint_conditions import robot_modes as modes_of
+from ...mbs.linear.linearisation import LinearMechanism
 
 if TYPE_CHECKING:
     import control

@@ -9,8 +9,8 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.peaks import largest
 from ...common.structs import struct
-from ...mbs.analysis.outcome import Details
-from ...mbs.analysis.samples import in_order
+from ...mbs.run.outcome import Details
+from ...mbs.run.samples import in_order
 from .controllers import Controller, Loop, Setup
 from .margins import Loops, Margins, advice, margins
 from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...mbs.solve.linearisation import LinearMechanism
+from ...mbs.linear.linearisation import LinearMechanism
 from .controllers import Setup, modal_columns
 from .linear_model import LinearModel, SampledModel, controllability, observability, sampled, state_space
 from .records import JointPid, Lqr

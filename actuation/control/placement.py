@@ -20,11 +20,11 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
-from ...mbs.analysis.outcome import Details, Outcome
-from ...mbs.analysis.replay import motor_forces_of
 from ...mbs.fields.field_types import Reference
+from ...mbs.linear.linearisation import LinearEquations
+from ...mbs.run.outcome import Details, Outcome
+from ...mbs.run.replay import motor_forces_of
 from ...mbs.scene.analysis import Surroundings
-from ...mbs.solve.linearisation import LinearEquations
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray

@@ -13,17 +13,17 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.structs import struct
-from ...mbs.analysis.gears import with_motor_coordinates
-from ...mbs.analysis.outcome import Outcome
+from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
 from ...mbs.model.body import Body
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
 from ...mbs.model.model import Model, build_model, constraint_values
 from ...mbs.model.parts import ZERO
 from ...mbs.model.rows import rows_of_joint
 from ...mbs.model.system import MultibodySystem
-from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
-from ...mbs.solve.posture import MET, posture_search
-from ...mbs.solve.start import undeformed_posture
+from ...mbs.posture.posture import MET, posture_search
+from ...mbs.posture.start import undeformed_posture
+from ...mbs.run.gears import with_motor_coordinates
+from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at

@@ -10,15 +10,15 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.structs import struct
-from ...mbs.analysis.context import WholeLinks, place_of
+from ...mbs.linear.linearisation import labelled
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.known_motion import KnownStates, motion_forces
 from ...mbs.model.model import Model, modal_directions
 from ...mbs.model.nodes import Section
 from ...mbs.model.system import MultibodySystem
 from ...mbs.model.tree import KinematicTree
+from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.scene.space import SPACES
-from ...mbs.solve.linearisation import labelled
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import PatchArray
 from .records import PERMITTIVITY, Sensor

@@ -17,9 +17,9 @@ from ..common.outputs import protected
 from ..common.parallel import processes as of_mpi
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import DEEPEST
-from ..mbs.analysis.tracking import Tracking
 from ..mbs.fields.steps import DATASET
 from ..mbs.scene.analysis import IntegratedAnalysis, TimedAnalysis
+from ..mbs.tracking.tracking import Tracking
 from ..results.file import Results
 from ..run.inputs import changed, digest_of_file, files_of
 from ..run.watcher import Watcher

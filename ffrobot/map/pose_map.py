@@ -26,10 +26,10 @@ from ..common.interrupts import SIGNALS, end_with_parent
 from ..common.keys import MOST_RUNS
 from ..common.tables import shown
 from ..mbs.fields.field_types import Quantity
+from ..mbs.linear.linearisation import labelled
+from ..mbs.linear.poses import PoseEvaluator
+from ..mbs.posture.workspace import GridAxis, Postures, grid_postures
 from ..mbs.scene.space import SPACES
-from ..mbs.solve.linearisation import labelled
-from ..mbs.solve.poses import PoseEvaluator
-from ..mbs.solve.workspace import GridAxis, Postures, grid_postures
 from ..run.inputs import changed, fingerprints, read_tables
 from ..run.solution import Solution
 from ..run.solve import prepare_scene

@@ -14,8 +14,8 @@ from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placement import Placed
 from ..common.arrays import Array
 from ..mbs.analysis.operating_points import RobotAtRest
-from ..mbs.analysis.outcome import Details
-from ..mbs.solve.joint_conditions import translational_stiffness
+from ..mbs.linear.joint_conditions import translational_stiffness
+from ..mbs.run.outcome import Details
 from ..results.tables import Cells, loop_cells, volts
 from .lines import named_tables
 

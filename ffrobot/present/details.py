@@ -8,12 +8,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase
-from ..mbs.analysis.outcome import Details, Outcome
+from ..mbs.inversion.motors_only import AroundPath, describe_zeros, is_minimum_phase
+from ..mbs.inversion.zero_dynamics import is_unstable
 from ..mbs.model.body import Body
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
-from ..mbs.solve.zero_dynamics import is_unstable
+from ..mbs.run.outcome import Details, Outcome
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, settling_cells, voltage_cells
 from ..run.mode_search import ModeChoice

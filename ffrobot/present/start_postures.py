@@ -11,9 +11,9 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.rotations import rpy_of
 from ..mbs.model.model import Model
+from ..mbs.posture.branches import branch_names, in_words, start_postures
+from ..mbs.posture.start import undeformed_posture
 from ..mbs.scene.space import SPACES
-from ..mbs.solve.branches import branch_names, in_words, start_postures
-from ..mbs.solve.start import undeformed_posture
 from ..results.file import Results
 from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
@@ -35,7 +35,7 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     if first.branch:
         console.print(in_words(first.branch), soft_wrap=True)
     if others:
-        from ..mbs.solve.workspace import within_limits
+        from ..mbs.posture.workspace import within_limits
 
         console.print(f"other starts: {len(others)} found; a line of [initial] chooses one")
     for other in others:

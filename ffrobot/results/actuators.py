@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.patches.patches import PatchArray, Voltages
     from ..actuation.patches.records import PztLayout
     from ..actuation.points import PointForces, PointSet
-    from ..mbs.analysis.tracking import TrackedPath
+    from ..mbs.tracking.tracking import TrackedPath
 
 
 def write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:

@@ -56,7 +56,7 @@ def held_in_words(group: h5py.Group) -> str:
     """Natural frequencies with motors at rest, and the least stiffness of a point, at the first time of an analysis."""
     if not any(key.startswith("joints_") for key in group):
         return ""
-    from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
+    from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
 
     texts = []
     for condition, name in ((LOCKED, "joints locked"), (COMPLIANT, "compliant gears")):

@@ -19,7 +19,7 @@ from ..mbs.scene.trajectories import Trajectory
 from ..run.solution import AnalysisResult, Solution
 
 if TYPE_CHECKING:
-    from ..mbs.solve.stable_inversion import Inversion
+    from ..mbs.inversion.stable_inversion import Inversion
 
 SAME = 1e-9  # of a time: what differs by less is rounding
 
@@ -141,7 +141,7 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
 
 def _write_zero_dynamics(group: h5py.Group, inversion: Inversion) -> None:
     """Of motors-only inverse dynamics: zero_dynamics/."""
-    from ..mbs.analysis.motors_only import is_minimum_phase
+    from ..mbs.inversion.motors_only import is_minimum_phase
 
     entry = group.create_group("zero_dynamics")
     entry["time"] = inversion.linearisation.times

@@ -24,9 +24,9 @@ from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
 from ..common.version import VERSION
 from ..mbs import _core
-from ..mbs.analysis.outcome import Continuation, EarlierRun, Motion, Outcome, Statistics
+from ..mbs.run.integrators import Choice
+from ..mbs.run.outcome import Continuation, EarlierRun, Motion, Outcome, Statistics
 from ..mbs.scene.analysis import Analysis
-from ..mbs.solve.integrators import Choice
 from ..run.bodies import LoadedBody
 from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.prepare import with_stiffening

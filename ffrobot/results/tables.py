@@ -19,7 +19,7 @@ Cells = dict[str, str]
 
 def analysis_cells(results: Results, verdict: AnalysisVerdict) -> Cells:
     """How an analysis went, and what it took."""
-    from ..mbs.solve.integrators import Choice  # loads the core
+    from ..mbs.run.integrators import Choice  # loads the core
 
     about, time = results.attributes(verdict.name), results.time(verdict.name)
     integrated, violation = about["integrator"] != "none", results[f"{verdict.name}/constraint_violation"]

@@ -14,10 +14,10 @@ from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.version import VERSION
-from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.steps import DATASET, METHOD
+from ..mbs.posture.redundancy import resolving_joints
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.solve.redundancy import resolving_joints
+from ..mbs.run.outcome import Outcome
 from ..run.solution import AnalysisResult, Solution
 from .actuators import write_feasibility, write_placement, write_point_forces, write_tracking, write_voltages
 from .file import FORMAT

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 from ..common.errors import InputError, quoted
 from ..mbs.joints.joint import MotorLimits
+from ..mbs.linear.vibration import PathFrequencies, frequencies_along
 from ..mbs.model.model import Model
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.motion_keys import Shaper
-from ..mbs.solve.vibration import PathFrequencies, frequencies_along
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -13,21 +13,21 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.drive import drive_robot
 from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
 from ..mbs.analysis.operating_points import locked_motors
-from ..mbs.analysis.outcome import Outcome
-from ..mbs.analysis.replay import replay_times, supplied
-from ..mbs.analysis.tracking import Tracking, least_voltage
+from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.drives import Drives, Replayed
 from ..mbs.model.known_motion import State
 from ..mbs.model.model import Model, without_paths
+from ..mbs.posture.redundancy import resolved
+from ..mbs.posture.start import undeformed_posture
 from ..mbs.quantities.motion import RobotMotion
+from ..mbs.run.drive import drive_robot
+from ..mbs.run.outcome import Outcome
+from ..mbs.run.replay import replay_times, supplied
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.bodies import BodyKeys
-from ..mbs.solve.redundancy import resolved
-from ..mbs.solve.start import undeformed_posture
-from ..mbs.solve.statics import static_equilibrium
+from ..mbs.tracking.tracking import Tracking, least_voltage
 from ..scene.scene import Scene
 from .solution import FinerCheck, Solution
 from .watcher import Watcher

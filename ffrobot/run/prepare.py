@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..actuation.points import PointSet, with_points
+from ..mbs.linear.vibration import with_robot_damping
 from ..mbs.model.body import Body
 from ..mbs.model.model import Model, build_model
-from ..mbs.solve.branches import chosen_start
-from ..mbs.solve.vibration import with_robot_damping
+from ..mbs.posture.branches import chosen_start
 from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .actuation import given_voltages, make_patches, points_3d

@@ -14,13 +14,12 @@ import numpy as np
 from ..common.arrays import Array, Indices
 from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.gears import unresolved_gears
-from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.body import Body
 from ..mbs.model.known_motion import Wrench
 from ..mbs.model.model import Model
 from ..mbs.model.projection import vanishing_in_plane
 from ..mbs.model.truncation import modes_kept
+from ..mbs.posture.limits import left_ranges
 from ..mbs.quantities.attachment_error import (
     Start,
     mode_error,
@@ -35,8 +34,9 @@ from ..mbs.quantities.reactions import Sharing
 from ..mbs.quantities.settling import Settling
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
+from ..mbs.run.gears import unresolved_gears
+from ..mbs.run.outcome import EarlierRun, Outcome
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
-from ..mbs.solve.limits import left_ranges
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody

@@ -16,14 +16,14 @@ from ..actuation.context import ActuatedContext
 from ..actuation.points import PointForces, forces_at_points, solve_points
 from ..common.arrays import Array, Indices
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.posture.reach import turned_guesses
+from ..mbs.posture.start import check_turning
 from ..mbs.quantities.motion import RobotMotion, totals
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
+from ..mbs.run.outcome import Outcome
 from ..mbs.scene.analysis import Analysis, TimedAnalysis
-from ..mbs.solve.reach import turned_guesses
-from ..mbs.solve.start import check_turning
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .actuation import Actuation, find_actuation, missing_forces

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..mbs.analysis.context import WholeLinks
-from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.divided_link import DividedLink, PieceOfLink, divided_link_of
 from ..mbs.model.model import Model
 from ..mbs.model.nodes import Node
+from ..mbs.run.context import WholeLinks
+from ..mbs.run.outcome import Outcome
 from ..scene.pieces import places_on_pieces
 from .pieces import MotionOfLinks, divided_links
 from .solution import Solution

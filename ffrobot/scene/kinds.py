@@ -16,8 +16,8 @@ KINDS = Deferred(
         "static": "ffrobot.mbs.analysis.operating_points:Static",
         "linear": "ffrobot.actuation.control.linear:Linear",
         "placement": "ffrobot.actuation.control.placement:PatchPlacement",
-        "motors-only": "ffrobot.mbs.analysis.motors_only:MotorsOnly",
-        "tracking": "ffrobot.mbs.analysis.tracking:Tracking",
+        "motors-only": "ffrobot.mbs.inversion.motors_only:MotorsOnly",
+        "tracking": "ffrobot.mbs.tracking.tracking:Tracking",
         "closed-loop": "ffrobot.actuation.control.closed_loop:ClosedLoop",
     },
 )

@@ -291,7 +291,7 @@ def _tracked(scene: Scene) -> Iterator[str]:
     """Paths of tracking with rough ends: known before the search, which takes minutes."""
     for analysis in scene.analysis:
         if analysis.kind == "tracking":
-            from ..mbs.analysis.tracking_advice import rough_ends
+            from ..mbs.tracking.advice import rough_ends
 
             functions = [function for one in scene.trajectory for _, function in one.targets]
             yield from (f'analysis "{analysis.name}": {text}' for text in rough_ends(functions, analysis.last_time))

@@ -17,22 +17,22 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.waypoints import spline
+from ..inversion.servo import slopes_by_differences
+from ..linear.statics import static_shapes
 from ..model.body import Body
 from ..model.divided_link import DividedLink
 from ..model.frame_motors import turning_motors
 from ..model.gears import refuse_prescribed_motors
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.system import MultibodySystem
+from ..posture.posture import check_path, mobility
+from ..posture.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
+from ..posture.reach import check_reach
+from ..posture.redundancy import resolved
+from ..posture.start import shape_in_redundant_loops, undeformed_posture
+from ..run.context import Context
+from ..run.outcome import Forces, Motion, Outcome, Prescription, Statistics
 from ..scene.analysis import Check, TimedAnalysis
-from ..solve.posture import check_path, mobility
-from ..solve.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
-from ..solve.reach import check_reach
-from ..solve.redundancy import resolved
-from ..solve.servo import slopes_by_differences
-from ..solve.start import shape_in_redundant_loops, undeformed_posture
-from ..solve.statics import static_shapes
-from .context import Context
-from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 
 ZERO = TimeFunction.constant(0.0)
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more

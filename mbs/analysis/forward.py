@@ -14,20 +14,20 @@ from ...common.arrays import Array
 from ...common.errors import InputError, either
 from .. import _core
 from ..fields.waypoints import spline
+from ..linear.statics import hanging_joints, initial_state
 from ..model.drives import Command, Drives, Replayed
 from ..model.frame_motors import motor_commands
 from ..model.gears import with_compliance
 from ..model.known_motion import State
 from ..model.model import Model, modal_directions, without_paths
+from ..posture.posture import mobility
+from ..posture.start import displaced_joints
+from ..run.context import Context, PatchedLink
+from ..run.drive import drive_robot
+from ..run.gears import DEGREE, with_motor_coordinates
+from ..run.outcome import Outcome
+from ..run.replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
-from ..solve.posture import mobility
-from ..solve.start import displaced_joints
-from ..solve.statics import hanging_joints, initial_state
-from .context import Context, PatchedLink
-from .drive import drive_robot
-from .gears import DEGREE, with_motor_coordinates
-from .outcome import Outcome
-from .replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 
 
 class Forward(ActuatedAnalysis):

@@ -16,18 +16,18 @@ from ...common.errors import InputError, SolveError, did_you_mean, quoted
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative, PointReference
+from ..linear.joint_conditions import JointCondition, joint_conditions, robot_modes
+from ..linear.linearisation import LinearEquations, LinearMechanism
+from ..linear.statics import Statics
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
 from ..model.rows import ConstraintRow, rows_of_joint
+from ..posture.redundancy import resolved
+from ..posture.start import undeformed_posture
+from ..run.context import Context, place_of
+from ..run.gears import with_motor_coordinates
+from ..run.outcome import Details, Motion, Outcome, Statistics
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
-from ..solve.joint_conditions import JointCondition, joint_conditions, robot_modes
-from ..solve.linearisation import LinearEquations, LinearMechanism
-from ..solve.redundancy import resolved
-from ..solve.start import undeformed_posture
-from ..solve.statics import Statics
-from .context import Context, place_of
-from .gears import with_motor_coordinates
-from .outcome import Details, Motion, Outcome, Statistics
 
 
 def run_static(context: Context, analysis: Analysis) -> Outcome:

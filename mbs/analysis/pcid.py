@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Literal
 
+from ..linear.statics import hanging_joints, initial_state
 from ..model.gears import with_prescribed_motors
+from ..posture.posture import check_path, mobility
+from ..posture.reach import check_reach
+from ..posture.redundancy import resolved
+from ..posture.start import undeformed_posture
+from ..run.context import Context
+from ..run.drive import drive_robot
+from ..run.outcome import Outcome
 from ..scene.analysis import Check, IntegratedAnalysis
-from ..solve.posture import check_path, mobility
-from ..solve.reach import check_reach
-from ..solve.redundancy import resolved
-from ..solve.start import undeformed_posture
-from ..solve.statics import hanging_joints, initial_state
-from .context import Context
-from .drive import drive_robot
-from .outcome import Outcome
 
 
 class Pcid(IntegratedAnalysis):

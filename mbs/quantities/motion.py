@@ -15,8 +15,6 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ...common.structs import struct
-from ..analysis.gears import Supplied, supplied_through_gears, with_motors
-from ..analysis.outcome import GearMotion
 from ..model.body import bent_section
 from ..model.cut import CutCoordinate, CutMotion
 from ..model.drives import Drives, PointDrive
@@ -28,9 +26,11 @@ from ..model.model import Model, constraint_rates, constraint_values
 from ..model.motors import MotorForces, path_forces
 from ..model.nodes import Node, Section
 from ..model.system import MultibodySystem
+from ..posture.posture import mobility
+from ..run.gears import Supplied, supplied_through_gears, with_motors
+from ..run.outcome import GearMotion
 from ..scene.space import SPACES, Space
 from ..scene.trajectories import Trajectory
-from ..solve.posture import mobility
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -16,11 +16,11 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
+from ..linear.statics import natural_sizes
 from ..model.known_motion import MotionForces, Wrench, multiplier_forces
 from ..model.nodes import Node
+from ..posture.posture import SINGULAR, robot_size, row_sizes
 from ..scene.loads import OF_POINT
-from ..solve.posture import SINGULAR, robot_size, row_sizes
-from ..solve.statics import natural_sizes
 from .motion import RobotMotion
 
 

@@ -17,13 +17,13 @@ from ...common.arrays import Array, null_space
 from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from .._core import TimeFunction
-from ..analysis.outcome import Outcome
+from ..linear.statics import Statics
+from ..linear.vibration import without_rows
 from ..model.model import Model
+from ..run.outcome import Outcome
 from ..scene.analysis import TimedAnalysis
 from ..scene.mechanism import MechanismScene
 from ..scene.trajectories import Trajectory
-from ..solve.statics import Statics
-from ..solve.vibration import without_rows
 from .motion import RobotMotion
 
 if TYPE_CHECKING:

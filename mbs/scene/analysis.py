@@ -159,7 +159,7 @@ class TimedAnalysis(Analysis):
 
 
 class IntegratedAnalysis(TimedAnalysis):
-    """`integrator`: see `mbs.solve.integrators` for "auto".
+    """`integrator`: see `mbs.run.integrators` for "auto".
 
     `spectral_radius` is what a step of generalized-alpha leaves of vibrations far above one over its size.
     """

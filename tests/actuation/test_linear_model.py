@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from ffrobot.actuation.control.linear_model import controllability, observability, robot_modes, state_space, zeros
 from ffrobot.common.errors import InputError
+from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.model import without_paths
-from ffrobot.mbs.solve.linearisation import LinearEquations
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.posture.start import undeformed_posture
 
 EI, MASS, LENGTH = 30.0, 1.5, 0.8
 RATE = np.sqrt(EI / (MASS * LENGTH**3))  # ω = λ² times this

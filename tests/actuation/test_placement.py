@@ -8,8 +8,8 @@ from scipy.linalg import solve_continuous_lyapunov
 from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.placement import PatchableLink, locked_modes, place
 from ffrobot.actuation.control.records import Placement
+from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.solve.linearisation import LinearEquations
 from ffrobot.scene.load import make_scene
 
 

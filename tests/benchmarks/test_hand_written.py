@@ -16,8 +16,8 @@ import pytest
 
 from bench.hand_written import STEPS, TIME, HandWritten, evaluation_seconds, general_state, targets
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.pcid import Pcid
+from ffrobot.mbs.run.context import Context
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

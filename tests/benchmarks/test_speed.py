@@ -28,8 +28,8 @@ from scipy.optimize import lsq_linear
 
 from bench.hand_written import TIME, evaluation_seconds, general_state
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.fcid import Fcid
+from ffrobot.mbs.run.context import Context
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

@@ -21,7 +21,7 @@ from mechanisms import forward, make_model, pcid, revolute
 from oracle_runs import run
 from record import options, record
 
-from ffrobot.mbs.analysis.motors_only import MotorsOnly
+from ffrobot.mbs.inversion.motors_only import MotorsOnly
 
 SINGLE = ("dop853", "radau", "dopri5")
 EVALUATIONS = 7  # of a step, of an integrator that takes few

@@ -13,7 +13,7 @@ from itertools import product
 from pathlib import Path
 
 import ffrobot
-from ffrobot.mbs.analysis.tracking import least_voltage
+from ffrobot.mbs.tracking.tracking import least_voltage
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

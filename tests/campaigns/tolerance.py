@@ -22,8 +22,8 @@ from robots_3d import random_scene_in_3d
 
 import ffrobot
 from ffrobot.common.errors import FfrobotError
-from ffrobot.mbs.solve.start import undeformed_posture
-from ffrobot.mbs.solve.vibration import vibrations_of, without_rows
+from ffrobot.mbs.linear.vibration import vibrations_of, without_rows
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

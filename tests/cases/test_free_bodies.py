@@ -9,11 +9,11 @@ from tables_3d import ORIGIN, joint, rigid, scene
 
 import ffrobot
 from ffrobot.common.rotations import of_quaternion
-from ffrobot.mbs.analysis.drive import drive_robot
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.model.known_motion import State
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.quantities.motion import RobotMotion, totals
+from ffrobot.mbs.run.drive import drive_robot
 from ffrobot.run.bodies import load_bodies
 from ffrobot.scene.load import validated_scene
 

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 import ffrobot
 from ffrobot.actuation.control.robot import RigidArm
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
 
 ROUGH = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.05}

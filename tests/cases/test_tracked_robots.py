@@ -7,12 +7,12 @@ import pytest
 from beam_links import link_keys, rectangle
 
 import ffrobot
-from ffrobot.mbs.analysis.motors_only import decay_times
+from ffrobot.mbs.inversion.motors_only import decay_times
+from ffrobot.mbs.inversion.servo import make_servo
+from ffrobot.mbs.inversion.stable_inversion import invert
+from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.model import modal_directions
-from ffrobot.mbs.solve.servo import make_servo
-from ffrobot.mbs.solve.stable_inversion import invert
-from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, track
-from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
+from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

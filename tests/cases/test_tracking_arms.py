@@ -239,7 +239,7 @@ def test_a_mesh_that_is_too_coarse(scene, monkeypatch):
     """The forces that are left over are said, and the replay is off its path for it."""
     left, off = [], []
     for most in (24, 1500):
-        monkeypatch.setattr("ffrobot.mbs.solve.tracking_intervals.MOST_INTERVALS", most)
+        monkeypatch.setattr("ffrobot.mbs.tracking.intervals.MOST_INTERVALS", most)
         with ffrobot.solve(scene(("tolerance = 1e-4", "tolerance = 1e-4\nintervals = 16"))) as results:
             left.append(float(results.attributes("carried/tracking")["unmet"]))
             off.append(off_path(results, "replay"))

@@ -9,14 +9,14 @@ from scipy.integrate import simpson
 from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.operating_points import Static
-from ffrobot.mbs.analysis.outcome import Motion, Outcome
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.mbs.quantities.motion import RobotMotion, totals
 from ffrobot.mbs.quantities.reactions import reactions
+from ffrobot.mbs.run.context import Context
+from ffrobot.mbs.run.outcome import Motion, Outcome
 from ffrobot.mbs.scene.analysis import IntegratedAnalysis
-from ffrobot.mbs.solve.start import undeformed_posture
 
 
 class JointForces(NamedTuple):

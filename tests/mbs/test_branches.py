@@ -10,8 +10,8 @@ from rods import arm_of_rods
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.solve.branches import in_words, start_postures
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.posture.branches import in_words, start_postures
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -9,8 +9,8 @@ from rods import rigid_body, rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
-from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.operating_points import Static
+from ffrobot.mbs.inversion.motors_only import MotorsOnly
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}

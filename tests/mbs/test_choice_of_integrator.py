@@ -9,8 +9,8 @@ from mechanisms import forward, pcid, relative
 from oracle_runs import evaluated, run
 from scipy.linalg import eigh, null_space
 
-from ffrobot.mbs.solve.start import undeformed_posture
-from ffrobot.mbs.solve.vibration import vibrations_of, without_rows
+from ffrobot.mbs.linear.vibration import vibrations_of, without_rows
+from ffrobot.mbs.posture.start import undeformed_posture
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ffrobot.mbs.solve.collocation import Boundary, Problem, collocate
+from ffrobot.mbs.inversion.collocation import Boundary, Problem, collocate
 
 SIGMA = np.array([30.0, 2e4])  # 1/s: p̈ = σ² p + f has the motions e^(σt) and e^(−σt)
 

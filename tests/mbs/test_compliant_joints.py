@@ -10,14 +10,14 @@ from rods import rod
 
 from ffrobot.actuation.control.linear_model import robot_modes, state_space
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.gears import unresolved_gears, with_motor_coordinates
-from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.operating_points import Static
+from ffrobot.mbs.inversion.motors_only import MotorsOnly
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
+from ffrobot.mbs.linear.joint_conditions import joint_conditions
+from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths
-from ffrobot.mbs.solve.joint_conditions import joint_conditions
-from ffrobot.mbs.solve.linearisation import LinearEquations
+from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
 MOTOR, LINK = J * N**2, M * L**2 / 3

@@ -10,8 +10,8 @@ from patch_sets import Patches
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.fcid import Fcid
-from ffrobot.mbs.analysis.replay import supplied
 from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.run.replay import supplied
 
 TIMES = np.linspace(0.0, 0.2, 5)
 

@@ -12,9 +12,9 @@ from random_mechanisms import random_tree
 
 import ffrobot
 from ffrobot.mbs import _core
+from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.known_motion import required_forces
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.solve.linearisation import LinearEquations
 
 MOMENT = 0.7  # N·m
 

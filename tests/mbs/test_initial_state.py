@@ -8,8 +8,8 @@ from oracle_runs import evaluated, run
 from rods import rod, slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs.solve.start import undeformed_posture
-from ffrobot.mbs.solve.statics import initial_state
+from ffrobot.mbs.linear.statics import initial_state
+from ffrobot.mbs.posture.start import undeformed_posture
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
 

@@ -9,10 +9,10 @@ from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
+from ffrobot.mbs.linear.statics import static_equilibrium
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.mbs.scene.analysis import TIGHTEST_TOLERANCE
-from ffrobot.mbs.solve.start import undeformed_posture
-from ffrobot.mbs.solve.statics import static_equilibrium
 
 REPORTED = ("q", "v", "lambda_", "tau", "F_p")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.mbs.solve.interior_point import Program, minimize
+from ffrobot.mbs.tracking.interior_point import Program, minimize
 
 N = 100
 

@@ -9,8 +9,8 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from ffrobot import make_scene, solve
-from ffrobot.mbs.solve.poses import PoseEvaluator
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.linear.poses import PoseEvaluator
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
 E, NU, RHO, HEIGHT, WIDTH = 70e9, 0.3, 2700.0, 0.02, 0.03

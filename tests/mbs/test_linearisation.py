@@ -8,9 +8,9 @@ from mechanisms import make_model, pcid, revolute
 from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
+from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.model import without_paths
-from ffrobot.mbs.solve.linearisation import LinearEquations
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.posture.start import undeformed_posture
 
 
 @pytest.mark.parametrize("stiffened", [False, True])

@@ -12,9 +12,9 @@ from tree_oracle import row_values
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import StateFunction
 from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.loads import Load
-from ffrobot.mbs.solve.linearisation import LinearEquations
 
 KINDS = ("rigid", "solid", "beam", "supported beam")
 

@@ -18,12 +18,12 @@ from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
+from ffrobot.mbs.inversion.servo import Servo
 from ffrobot.mbs.model.drives import Command, Drive
 from ffrobot.mbs.model.nodes import Section
 from ffrobot.mbs.model.rows import ConstraintRow
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.loads import Load
-from ffrobot.mbs.solve.servo import Servo
 
 TIMES = np.array([0.0, 0.01, 0.01, 0.05])
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))

@@ -10,10 +10,10 @@ from oracle_runs import evaluated, point_motion, run
 from tree_oracle import row_values
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase
-from ffrobot.mbs.solve import stable_inversion
-from ffrobot.mbs.solve.servo import make_servo
-from ffrobot.mbs.solve.zero_dynamics import (
+from ffrobot.mbs.inversion import stable_inversion
+from ffrobot.mbs.inversion.motors_only import MotorsOnly, is_minimum_phase
+from ffrobot.mbs.inversion.servo import make_servo
+from ffrobot.mbs.inversion.zero_dynamics import (
     LinearDynamics,
     Linearisation,
     equilibrium,

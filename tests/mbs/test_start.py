@@ -11,8 +11,8 @@ from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs.model.body import rigid_body
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.solve.posture import check_path, mobility, solve_posture
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.posture.posture import check_path, mobility, solve_posture
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
 
 

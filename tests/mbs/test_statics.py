@@ -9,7 +9,7 @@ from beam_links import beam_link, rectangle
 from scipy.optimize import brentq
 
 from ffrobot import make_scene, solve
-from ffrobot.mbs.solve.statics import Statics
+from ffrobot.mbs.linear.statics import Statics
 
 REST = {"name": "rest", "kind": "static"}
 

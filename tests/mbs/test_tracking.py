@@ -16,13 +16,13 @@ import ffrobot
 from ffrobot.common.arrays import as_list
 from ffrobot.fe_models.link_source import link_keys
 from ffrobot.mbs.analysis.fcid import sampled
-from ffrobot.mbs.analysis.tracking_advice import bounds_of_zeros
+from ffrobot.mbs.inversion.servo import make_servo
+from ffrobot.mbs.inversion.stable_inversion import invert
+from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.model import modal_directions
-from ffrobot.mbs.solve.servo import make_servo
-from ffrobot.mbs.solve.stable_inversion import invert
-from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, track
-from ffrobot.mbs.solve.tracking_intervals import SETTLED, graded, settled
-from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
+from ffrobot.mbs.tracking.advice import bounds_of_zeros
+from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
+from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
 

@@ -18,7 +18,7 @@ from ffrobot.mbs.model.model import constraint_rates, constraint_values
 from ffrobot.mbs.model.nodes import Section
 from ffrobot.mbs.model.rows import ConstraintRow, coordinate_row
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.solve.posture import solve_postures
+from ffrobot.mbs.posture.posture import solve_postures
 
 CLOSE = 1e-12
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))

@@ -13,10 +13,10 @@ from types import MappingProxyType
 import numpy as np
 
 from ffrobot.bench.precision import Row
-from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.model.body import Body, BodyPoint
 from ffrobot.mbs.model.model import Model, build_model
 from ffrobot.mbs.model.projection import projected
+from ffrobot.mbs.run.context import Context
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene

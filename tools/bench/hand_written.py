@@ -15,8 +15,8 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.model.body import Body
 from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.solve.posture import solve_posture, with_rates
-from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.posture.posture import solve_posture, with_rates
+from ffrobot.mbs.posture.start import undeformed_posture
 
 State = tuple[MultibodySystem, Array, Array]
 """Equations, q (n_q,) and v (n_v,)."""

@@ -12,10 +12,10 @@ from ...common.errors import InputError, quoted
 from ...common.version import VERSION
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
+from ...mbs.linear.statics import hanging_joints
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model, without_paths
-from ...mbs.solve.statics import hanging_joints
 from ...run.mode_choice import mode_levels
 from ...run.prepare import with_bodies
 from ...run.solve import prepare_scene

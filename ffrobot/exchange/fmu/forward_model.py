@@ -16,12 +16,12 @@ from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.joints.free import FreeJoint
 from ...mbs.joints.joints import JOINT_TYPES
+from ...mbs.linear.statics import initial_state
 from ...mbs.model.model import Model, modal_directions
 from ...mbs.model.nodes import Node
 from ...mbs.model.system import MultibodySystem
-from ...mbs.solve.integrator_choice import integrator_of
-from ...mbs.solve.integrators import METHODS
-from ...mbs.solve.statics import initial_state
+from ...mbs.run.integrator_choice import integrator_of
+from ...mbs.run.integrators import METHODS
 
 UNITS: Mapping[str, Mapping[str, int]] = {
     "1": {},

@@ -20,7 +20,7 @@ from ...mbs.joints.screw import ScrewJoint
 from ...mbs.model.model import build_model
 from ...mbs.model.nodes import Node
 from ...mbs.model.tree import KinematicTree
-from ...mbs.solve.posture import robot_size
+from ...mbs.posture.posture import robot_size
 from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_robot
 from ...scene.scene import Scene

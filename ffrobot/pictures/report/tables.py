@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...common.peaks import largest
-from ...mbs.solve.zero_dynamics import is_unstable
+from ...mbs.inversion.zero_dynamics import is_unstable
 from ...results.file import Results
 from ...results.joints import joint_coordinates
 from ...results.linear import read_metrics

@@ -15,7 +15,7 @@ from ...common.files import write_atomically
 from ...common.rotations import in_3d
 from ...map.map_file import Quantity, quantities
 from ...map.pose_map import PoseMap
-from ...mbs.solve.workspace import GridAxis
+from ...mbs.posture.workspace import GridAxis
 from ..figures.style import ORDERED, SIZE, SceneAxes, legend, projected, style
 from ..projection import FRONT, PLANE, SIDE, SPACE
 

@@ -7,10 +7,10 @@ from scipy.special import ellipk, ellipkinc
 
 import ffrobot
 from ffrobot.mbs import _core
+from ffrobot.mbs.linear.statics import initial_state
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.solve.limits import watch_limits, watched
-from ffrobot.mbs.solve.statics import initial_state
+from ffrobot.mbs.posture.limits import watch_limits, watched
 from ffrobot.run.bodies import load_bodies
 
 METHODS = {"dop853": 1e-11, "dopri5": 1e-11, "radau": 1e-11, "generalized_alpha": 1e-7}  # with tolerances

@@ -18,10 +18,10 @@ import numpy as np
 from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
 from ...common.errors import SolveError
 from ...common.structs import struct
+from ..linear.statics import static_shapes
 from ..model.system import MultibodySystem
+from ..posture.start import shape_in_redundant_loops
 from .servo import Servo
-from .start import shape_in_redundant_loops
-from .statics import static_shapes
 
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
 

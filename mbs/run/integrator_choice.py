@@ -10,13 +10,13 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
+from ..linear.vibration import Vibrations, vibrations_of, without_rows
 from ..model.gears import tree_resistance_slope
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import ASKED_FOR, EXPLICIT, Choice, faster_of
-from .vibration import Vibrations, vibrations_of, without_rows
 
 # Steps of DOP853 in the time of one of Radau IIA: 0.7 to 1.5 in cases/arm_3r, cases/slider_crank_3d and a stiff arm of
 # three links. Twice as much here: once at work, Radau is given time to damp vibrations away

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from .stable_inversion import PROBES, cut, halved
-from .tracking import TOLERANCE, Tracked, Transition, track
+from ..inversion.stable_inversion import PROBES, cut, halved
+from .problem import TOLERANCE, Tracked, Transition, track
 
 GRADING = 2.5  # of breaks to both ends: tanh
 MOST_INTERVALS = 1500

@@ -19,12 +19,8 @@ from ..model.known_motion import State
 from ..model.model import Model
 from ..model.motors import integrated_mechanism
 from ..model.system import MultibodySystem
-from ..scene.analysis import IntegratedAnalysis
-from ..solve.diagnosis import find_cause
-from ..solve.integrator_choice import choose_integrator
-from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
-from ..solve.limits import left_ranges, watch_limits
-from ..solve.posture import (
+from ..posture.limits import left_ranges, watch_limits
+from ..posture.posture import (
     NEARLY_SINGULAR,
     SINGULAR,
     describe_branches,
@@ -32,8 +28,12 @@ from ..solve.posture import (
     robot_size,
     worst_posture,
 )
-from ..solve.reach import out_of_reach
-from ..solve.start import rank_of_redundant_loops
+from ..posture.reach import out_of_reach
+from ..posture.start import rank_of_redundant_loops
+from ..scene.analysis import IntegratedAnalysis
+from .diagnosis import find_cause
+from .integrator_choice import choose_integrator
+from .integrators import beyond_rounding, integration_controls, with_steps_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .samples import LOOKED_AT, about_highest, in_order, new_samples, reached_samples, some_of, stops
 

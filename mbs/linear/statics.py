@@ -22,8 +22,8 @@ from .. import _core
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from .posture import joint_scales, robot_size, row_sizes, with_rates
-from .start import AWAY, undeformed_posture
+from ..posture.posture import joint_scales, robot_size, row_sizes, with_rates
+from ..posture.start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
 TOLERANCE = 1e-12  # residual forces relative to the largest that meet, positions to the size of the robot

@@ -13,9 +13,9 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Indices, as_floats
 from .. import _core
 from .._core import TimeFunction
+from ..posture.posture import misfits
 from ..scene.analysis import IntegratedAnalysis
 from ..scene.trajectories import Trajectory
-from ..solve.posture import misfits
 
 FEWEST = 2000  # intervals of a run
 KEPT = 16_384  # states of an integration at most

@@ -10,6 +10,7 @@ from ..model.gears import with_compliance
 from ..model.known_motion import State
 from ..model.model import Model, without_paths
 from ..model.nodes import Section
+from ..posture.start import relaxed_gears
 from ..scene.space import SPACES
 from .joint_conditions import (
     COMPLIANT,
@@ -21,7 +22,6 @@ from .joint_conditions import (
     translational_stiffness,
 )  # fmt: skip
 from .linearisation import LinearEquations, LinearMechanism, labelled
-from .start import relaxed_gears
 from .statics import Statics
 
 FREE = 1e-12  # of the largest stiffness: less lets the robot move

@@ -27,9 +27,9 @@ from ..model.motors import (
 )
 from ..model.rows import ConstraintRow
 from ..model.system import MultibodySystem
+from ..posture.posture import row_sizes
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
-from ..solve.posture import row_sizes
 from .context import ActuationPoints, PatchedLink
 from .outcome import Outcome
 

@@ -19,7 +19,7 @@ from .._core import TimeFunction
 from ..model.drives import PointDrive
 from ..model.model import Model
 from ..scene.analysis import Analysis
-from ..solve.integrators import NOT_INTEGRATED, Choice
+from .integrators import NOT_INTEGRATED, Choice
 from .samples import in_order, path_times
 
 if TYPE_CHECKING:

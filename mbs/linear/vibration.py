@@ -18,9 +18,9 @@ from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
 from ..model.model import Model, constraint_values, without_paths
 from ..model.system import MultibodySystem
-from .posture import solve_posture
-from .redundancy import resolved
-from .start import relaxed_gears, undeformed_posture
+from ..posture.posture import solve_posture
+from ..posture.redundancy import resolved
+from ..posture.start import relaxed_gears, undeformed_posture
 
 DEPENDENT = 1e-9  # of the largest singular value: below it a row repeats others
 RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spring: below it there is none

@@ -1,6 +1,6 @@
 """Motors and patches carry the robot along its path together, within their limits: `kind = "tracking"`.
 
-The problem, its discretization and its solver are in `mbs.solve.tracking`. First comes the least voltage with which
+The problem, its discretization and its solver are in `mbs.tracking.problem`. First comes the least voltage with which
 patches can do it; where that is within their limits, the motion of least effort follows. What each zero asks for, and
 what would do beyond limits, is in `tracking_advice`; a simulation under torques alone shows whether patches are needed.
 """
@@ -19,21 +19,19 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from ...common.validation import Record
+from ..analysis.forward import Forward, largest_moments
 from ..fields.field_types import NotNegative, Positive
+from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along, where
+from ..inversion.servo import Servo, Stopped, make_servo
+from ..inversion.stable_inversion import with_corners
+from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
 from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors
+from ..run.context import Context, PatchedLink
+from ..run.integrators import Choice
+from ..run.outcome import Outcome, Statistics
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
-from ..solve.integrators import Choice
-from ..solve.servo import Servo, Stopped, make_servo
-from ..solve.stable_inversion import with_corners
-from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, track
-from ..solve.tracking_intervals import SETTLED, refined, settled, start_breaks
-from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
-from .context import Context, PatchedLink
-from .forward import Forward, largest_moments
-from .motors_only import AroundPath, check_rest, durations, outcome_along, where
-from .outcome import Outcome, Statistics
-from .tracking_advice import (
+from .advice import (
     Bounds,
     bounds_of_zeros,
     enough_path_time,
@@ -42,6 +40,8 @@ from .tracking_advice import (
     rough_ends,
     singular_times,
 )
+from .intervals import SETTLED, refined, settled, start_breaks
+from .problem import Limits, Objective, Tracked, Transition, Weights, track
 
 RATE = 0.005  # s, T_r where the scene does not say
 VOLT = 200.0  # V_ref where patches have no limits

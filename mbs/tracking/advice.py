@@ -11,13 +11,13 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
 from ...common.structs import struct
 from .._core import TimeFunction
-from ..solve.servo import Servo
-from ..solve.stable_inversion import invert
-from ..solve.tracking import Transition
-from ..solve.tracking_intervals import settled, start_breaks
-from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
-from .context import Context
-from .motors_only import decay_times
+from ..inversion.motors_only import decay_times
+from ..inversion.servo import Servo
+from ..inversion.stable_inversion import invert
+from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
+from ..run.context import Context
+from .intervals import settled, start_breaks
+from .problem import Transition
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6

@@ -18,10 +18,10 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.structs import struct
-from .collocation import GAUSS, Elimination, piecewise, stage_states
+from ..inversion.collocation import GAUSS, Elimination, piecewise, stage_states
+from ..inversion.servo import Servo
+from ..inversion.zero_dynamics import shape_along
 from .interior_point import GAP, Minimum, Program, minimize
-from .servo import Servo
-from .zero_dynamics import shape_along
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

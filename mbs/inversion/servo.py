@@ -18,10 +18,10 @@ from ..model.frame_motors import turning_motors
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.rows import ConstraintRow
-from .posture import check_smooth, describe_posture, mobility, solve_posture
-from .prescribed import PrescribedMotion, following_motors
-from .reach import out_of_reach
-from .start import undeformed_posture
+from ..posture.posture import check_smooth, describe_posture, mobility, solve_posture
+from ..posture.prescribed import PrescribedMotion, following_motors
+from ..posture.reach import out_of_reach
+from ..posture.start import undeformed_posture
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones

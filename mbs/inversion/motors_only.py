@@ -26,13 +26,13 @@ from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, path_errors, without_paths
+from ..run.context import Context
+from ..run.integrators import Choice
+from ..run.outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
 from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
-from ..solve.integrators import Choice
-from ..solve.servo import Servo, Stopped, make_servo
-from ..solve.stable_inversion import Inversion, invert, shape_of
-from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along
-from .context import Context
-from .outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
+from .servo import Servo, Stopped, make_servo
+from .stable_inversion import Inversion, invert, shape_of
+from .zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

@@ -11,10 +11,10 @@ from .. import _core
 from .._core import TimeFunction
 from ..model.known_motion import State
 from ..model.system import MultibodySystem
+from ..posture.posture import JUMP, describe_loops
 from ..scene.analysis import IntegratedAnalysis
 from .integrator_choice import TOO_STIFF, fastest_friction
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
-from .posture import JUMP, describe_loops
 
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 

@@ -1,0 +1,1 @@
+"""Torque-only inputs: servo constraint, internal dynamics, stable inversion, the kind `motors-only`."""

@@ -1,0 +1,1 @@
+"""A robot at rest: static equilibria, linear equations, vibration, poses."""

@@ -1,0 +1,1 @@
+"""Where a run can start and go: postures, branches, redundancy, reach and limits."""

@@ -1,1 +1,0 @@
-"""Numerical work on a system: positions, statics, vibration, linearization, integrators, stable inversion."""

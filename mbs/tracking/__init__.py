@@ -1,0 +1,1 @@
+"""Optimal control along a path: the problem, its solver, the kind `tracking`."""
