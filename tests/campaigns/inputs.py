@@ -2,7 +2,7 @@
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are urdf, skin, motion, bag, csv, modal, results, sid, fem and study.
+Kinds are urdf, skin, motion, bag, csv, modal, results, bytes, sid, fem, study, catalog and controller.
 
 Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
 names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
@@ -53,6 +53,30 @@ ROBOT = """<robot name="r"><link name="base"/><link name="arm">
 <visual><geometry><mesh filename="{}"/></geometry></visual></link>
 <joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+CATALOG = """name, rated_torque, peak_torque, max_speed, rotor_inertia, gear_ratio, efficiency, mass
+M30, 0.10, 0.30, 630, 0.3e-5, 50 80 100, 0.8, 0.5
+M60, 2.0, 6.0, 630, 1e-5, , , 0.8
+"""
+CONTROLLER = """import numpy as np
+
+
+def law(setup):
+    def at(k, y):
+        return [0.0]
+
+    return at
+"""
+LOOP = (
+    ', { name = "loop", kind = "closed-loop", actuation = "inverse", tip = "arm.tip", end = 0.05, output_step = 0.005,'
+    ' sample_time = 0.005, controller = [{ kind = "python", python = "law.py:law" }] }]'
+)
+RETURNED = (
+    "nan", "float('nan')", "float('inf')", "1e300", "None", "'a'", "1j", "[[1.0]]", "True", "1 / 0", "y['x']", "y",
+    "exit()", "quit(3)", "setup", "[0.0] * 3", "(_ for _ in ())", "-1e9", "10**400", "open('nowhere')",
+    "__import__('nowhere')", "at(k, y)", "__import__('os').abort", "setup.columns('x')",
+    "setup.places('joint/x/moment')", "y.clear()", "y.fill(np.nan)", "np.zeros(0)", "__import__('sys').exit('bye')",
+    "np.ones(10**6)", "[y] * 2", "print('hello')", "input()", "raise_()", "(yield)", "lambda: 0",
+)  # fmt: skip
 SKINS = ("3mf", "dae", "glb", "obj", "off", "ply", "stl")
 TABLE = "t,value\n0,0\n0.02,0.1\n0.04,0.15\n0.06,0.2\n"
 
@@ -84,7 +108,8 @@ class Campaign:
         for command in commands:
             code, told = run(command, self.place)
             found = outcome(code, told, [name, "scene.toml", *(["expected"] if kind == "study" else [])])
-            if (self.place / "CANARY").exists() or os.listdir(self.place.parent) != ["try"]:
+            canary = kind != "controller" and (self.place / "CANARY").exists()
+            if canary or os.listdir(self.place.parent) != ["try"]:
                 found = "crash"
             self.counts[f"{kind}: {found}"] += 1
             if found in BAD:
@@ -202,6 +227,32 @@ class Campaign:
         seal(path)
         return f"{name} = {value!r}"
 
+    def bytes(self):
+        """Of HDF5 files: what its library does with them."""
+        name = self.draw.choice(("arm.h5", "scene.results.h5"))
+        label = self.of_bytes(self.place / name)
+        if self.draw.random() < 0.7:
+            seal(self.place / name)
+        os.utime(self.place / "arm.toml", (0, 0))
+        return f"{name} {label}", name, [["info", name], ["solve", "scene.toml"]]
+
+    def catalog(self):
+        (self.place / "motors.csv").write_text(CATALOG, encoding="utf-8")
+        how = self.of_bytes(self.place / "motors.csv")
+        return how, "motors.csv", [["feasibility", "scene.results.h5", "--catalog", "motors.csv"]]
+
+    def controller(self):
+        """A line of Python that is damaged, or that returns, raises or waits for something else."""
+        text = CONTROLLER
+        if self.draw.random() < 0.7:
+            text = text.replace("[0.0]", self.draw.choice(RETURNED), 1)
+            how = text.splitlines()[5]
+        (self.place / "law.py").write_text(text, encoding="utf-8")
+        if text == CONTROLLER:
+            how = self.of_bytes(self.place / "law.py")
+        (self.place / "scene.toml").write_text(SCENE.strip().removesuffix("]") + LOOP, encoding="utf-8")
+        return how, "law.py", [["solve", "scene.toml"]]
+
     def study(self):
         arm = "links.arm.geometry.section.outer"
         keys = ("payload.0.mass", arm, "links.arm.x", "gravity.1", "body.arm.link", "..", "links..", "x")
@@ -218,7 +269,9 @@ class Campaign:
         return " ".join(command), "scene.toml", [command]
 
 
-KINDS = ("urdf", "skin", "motion", "bag", "csv", "modal", "results", "sid", "fem", "study")
+KINDS = (
+    "urdf", "skin", "motion", "bag", "csv", "modal", "results", "bytes", "sid", "fem", "study", "catalog", "controller",
+)  # fmt: skip
 
 
 def main() -> None:

@@ -67,6 +67,8 @@ def shortened(scene: dict[str, Any]) -> dict[str, Any]:
             analysis["output_step"] = analysis["end"] / 50
         if analysis["kind"] in ("pcid", "forward", "closed-loop"):
             analysis.setdefault("max_steps", 50_000)
+        if analysis["kind"] == "closed-loop" and analysis.get("actuation") in ends:
+            analysis["end"] = ends[analysis["actuation"]]
         if "times" in analysis and analysis.get("about") in ends:
             analysis["times"] = [0.0, ends[analysis["about"]]]
     return scene
