@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
-from traceback import extract_tb
+from traceback import walk_tb
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -72,12 +72,29 @@ def imported_files(*folders: Path) -> dict[Path, str]:
     return {file: digest for file, digest in _digests.items() if any(file.is_relative_to(p) for p in places)}
 
 
-def count_failed(error: BaseException) -> None:
-    """Have the files count in which `error` was raised, too: Python forgets a module whose import fails."""
-    frames = [frame.filename for frame in extract_tb(error.__traceback__)]
-    for file in map(Path, [*frames, *([error.filename or ""] if isinstance(error, SyntaxError) else [])]):
-        if file.is_file() and not _is_installed(file.resolve()):
-            _count(file.resolve())
+def count_failed(error: BaseException) -> str:
+    """Have the user's files count in which `error` was raised, too: Python forgets a module whose import fails.
+
+    Returns "line L of FILE, in FUNCTION" of the last of them, "" where there is none.
+    """
+    last, program = "", __name__.partition(".")[0]
+    for frame, line in walk_tb(error.__traceback__):
+        if frame.f_globals["__name__"].partition(".")[0] != program and (
+            file := _failed_file(frame.f_code.co_filename)
+        ):
+            last = f"line {line} of {file.name}, in {frame.f_code.co_name}"
+    if isinstance(error, SyntaxError):  # which names its line itself
+        _failed_file(error.filename or "")
+    return last
+
+
+def _failed_file(name: str) -> Path | None:
+    """The file of that name, which counts, where it is one of the user's."""
+    file = Path(name)
+    if not file.is_file() or _is_installed(file.resolve()):
+        return None
+    _count(file.resolve())
+    return file
 
 
 def _count(file: Path) -> None:

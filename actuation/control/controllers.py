@@ -19,7 +19,6 @@ It reads the sensors that the scene gives.
 from __future__ import annotations
 
 import runpy
-import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -73,18 +72,17 @@ class Setup:
             yield from ((joint, name) for name in self.robot.coordinates(joint))
 
     def columns(self, *names: str) -> Indices:
-        """Where these readings are in y."""
-        return np.array([self.outputs.index(name) for name in names], dtype=int)
+        """Where these readings are in y. Raises `InputError` for a sensor that is not there."""
+        return self._indices(names, self.outputs, "readings")
 
     def places(self, *names: str) -> Indices:
         """Where these commands are in u. Raises `InputError` for a joint without a motor."""
-        missing = [name for name in names if name not in self.inputs]
-        if missing:
-            raise InputError(
-                f"{self.robot.path}: controller: expected joints with motors, {quoted(self.robot.motors)}, found"
-                f" {quoted(name.partition('/')[2] for name in missing)}"
-            )
-        return np.array([self.inputs.index(name) for name in names], dtype=int)
+        return self._indices(names, self.inputs, "commands")
+
+    def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
+        if missing := [name for name in names if name not in among]:
+            raise InputError(f"{self.robot.path}: controller: expected {of}, {quoted(among)}, found {quoted(missing)}")
+        return np.array([among.index(name) for name in names], dtype=int)
 
     def patch_places(self, body: str) -> Indices:
         """Where the voltages of a body's patches are in u."""
@@ -212,7 +210,9 @@ class PythonControl:
         except (Exception, SystemExit) as error:  # the user's code may raise anything
             raise SolveError(f"{self._at(k)}: {_in_words(error)}") from error
         if u.shape != (self.size,) or not np.isfinite(u).all():
-            raise SolveError(f"{self._at(k)}: expected {self.size} finite commands, found shape {u.shape}: {u}")
+            raise SolveError(
+                f"{self._at(k)}: expected {self.size} finite commands, shape ({self.size},), found shape {u.shape}: {u}"
+            )
         return u
 
     def __copy__(self) -> PythonControl:
@@ -224,9 +224,8 @@ class PythonControl:
 
 
 def _in_words(error: BaseException) -> str:
-    count_failed(error)
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {error} (line {last.lineno} of {Path(last.filename).name}, in {last.name})"
+    line = count_failed(error)
+    return f"{type(error).__name__}: {error}{line and f' ({line})'}"
 
 
 def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[int, Array], Array]]:

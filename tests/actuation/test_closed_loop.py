@@ -314,7 +314,12 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
 
 @pytest.mark.parametrize(
     ("body", "expected"),
-    [("return np.full(3, np.nan)", "expected 1 finite commands"), ("return y[99]", "IndexError")],
+    [
+        ("return np.full(3, np.nan)", r"expected 1 finite commands, shape \(1,\)"),
+        ("return y[99]", r"IndexError: .* \(line \d+ of \w+\.py, in \w+\)"),
+        ("return 10**400", r"OverflowError: int too large to convert to float"),
+        ("return setup.columns('none')", r'readings, ".*", found "none" \(line \d+ of \w+\.py, in \w+\)'),
+    ],
 )
 def test_what_a_users_function_does_wrong_is_said(tmp_path, body, expected):
     file = tmp_path / "mine.py"
