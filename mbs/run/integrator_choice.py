@@ -55,8 +55,6 @@ def choose_integrator(
         return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
     if not any(node.body.n_modes for node in model.tree.nodes):
         return Choice("dop853", "nothing vibrates")
-    if model.tree.gears:
-        return Choice("dop853", "the estimate does not include vibrations of compliant gears")
     if is_sampled:
         return Choice("dop853", "every sample of the controller begins anew")
     replayed = system.replayed
@@ -110,12 +108,13 @@ def _excitation(system: MultibodySystem, start: State, found: Vibrations) -> Arr
     project = (K @ found.shape).T / omega[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     forces = K @ found.shape * amplitude
-    bodies = [node for node in model.tree.nodes if node.body.n_modes]
-    of_each = np.array([np.linalg.norm(forces[node.p_v], axis=0) for node in bodies])
-    carried = [node.body.stiffness * q[node.p_q] for node in bodies]
+    springs = [(node.p_v, node.body.stiffness * q[node.p_q]) for node in model.tree.nodes if node.body.n_modes]
+    springs += [(gear.joint.v, gear.spring.moment(gear.twist(q, v)[0])) for gear in model.tree.gears]
+    of_each = np.array([np.linalg.norm(forces[columns], axis=0) for columns, _ in springs])
+    carried = [of for _, of in springs]
     if system.replay is not None:  # which may carry what would bend links
         alone = _acceleration(system, 0.0, start, None)
-        carried = [np.append(of, alone[node.p_v]) for of, node in zip(carried, bodies, strict=True)]
+        carried = [np.append(of, alone[columns]) for columns, of in springs]
     sizes = np.array([np.linalg.norm(of) for of in carried]) + of_each.sum(axis=1)
     sizes = np.maximum(sizes, max(1e-3 * float(sizes.max()), 1e-300))
     return (of_each / sizes[:, None]).max(axis=0)

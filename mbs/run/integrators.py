@@ -105,7 +105,8 @@ def faster_of(
     which each rings from the start on. No step goes beyond one of the `outputs`; `cost` of a step of Radau, in
     DOP853's.
     """
-    top, scale = frequency[-1], analysis.tolerance / 1e-4
+    # damped more than critically a vibration falls faster than it would swing
+    top, scale = (frequency * np.maximum(1.0, 2 * damping_ratio)).max(), analysis.tolerance / 1e-4
     phase = partial(_ringing_phase, frequency, damping_ratio, excited, analysis.end)
     explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
     implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))

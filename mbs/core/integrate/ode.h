@@ -79,9 +79,9 @@ private:
 // What implicit methods need besides: M v_dot + C_q^T lambda = Q under constraints, and its stiff terms.
 //
 // The stiff terms of Q are -B^T (K B q + D B v) with diagonals K and D, zero on rotations, and B the identity over the
-// rows of coupling()^T: along coordinates that v does not have. D is as at the last linearise(), where friction is
-// among them. Newton's method on the equations of a step meets N = M + B^T (damping_factor D + stiffness_factor K) B,
-// real or complex, under C_q: block-arrow without coupling.
+// rows of coupling()^T: along coordinates that v does not have. K and D are slopes at the last linearise(), those
+// of friction among them. Newton's method on the equations of a step meets N = M + B^T (damping_factor D +
+// stiffness_factor K) B, real or complex, under C_q: block-arrow without coupling.
 class ImplicitSystem : public OdeSystem {
 public:
   explicit ImplicitSystem(const ConfigurationSpace &space) : OdeSystem(space), uncoupled_(n_v(), 0) {}

@@ -32,13 +32,18 @@ NewtonSystem<Space>::NewtonSystem(const Mechanism<Space> &mechanism, const Scene
   find_stiff_terms();
 }
 
-// Of elastic and damping forces of modes, of springs in joints
+// Of elastic and damping forces of modes, of springs in joints and gears
 template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
-  const auto cuts = static_cast<Index>(scene_.cut_joints.size());
-  stiffness_ = damping_ = VectorXd::Zero(rest_.size() + cuts);
-  coupling_.setZero(rest_.size(), cuts);
-  std::vector<char> is_stiff(static_cast<std::size_t>(rest_.size() + cuts));
-  std::fill(is_stiff.end() - cuts, is_stiff.end(), 1);
+  auto coupled = static_cast<Index>(scene_.cut_joints.size());
+  const Index all = coupled + static_cast<Index>(scene_.gears.size());
+  stiffness_ = damping_ = VectorXd::Zero(rest_.size() + all);
+  coupling_.setZero(rest_.size(), all);
+  std::vector<char> is_stiff(static_cast<std::size_t>(rest_.size() + all));
+  std::fill(is_stiff.end() - all, is_stiff.end(), 1);
+  for (const GearSpring &gear : scene_.gears) {
+    damping_[rest_.size() + coupled] = gear.damping;
+    coupling_(gear.a.v, coupled) = 1, coupling_(gear.b.v, coupled++) = -gear.ratio;
+  }
   for (const Node<Space> &node : mechanism_.nodes)
     for (int i = 0; i < node.n(); ++i) {
       stiffness_[node.p_v() + i] = node.body.K[i];
@@ -51,25 +56,26 @@ template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
     (is_stiff[i] ? stiff_ : free_).push_back(static_cast<Index>(i));
 }
 
-// Of friction in joints, at rates (n_v, then cut joints). Near rest dry friction is a stiff damper: a light link's end
-// that sticks to what it carries comes to rest within nanoseconds.
-template <class Space> void NewtonSystem<Space>::take_friction(const VectorXd &rates) {
+// Of gears, and of friction in joints, at rates as the diagonals. Near rest dry friction is a stiff damper: a light
+// link's end that sticks to what it carries comes to rest within nanoseconds.
+template <class Space> void NewtonSystem<Space>::take_slopes(const VectorXd &rates) {
   for (const JointForce &joint : scene_.joint_forces)
     damping_[joint.v] = 0;
   for (const JointForce &joint : scene_.joint_forces)
     damping_[joint.v] += joint.friction.slope(rates[joint.v]);
-  for (std::size_t k = 0; k < scene_.cut_joints.size(); ++k) {
-    const Index i = rest_.size() + static_cast<Index>(k);
-    damping_[i] = scene_.cut_joints[k].friction.slope(rates[i]);
-  }
+  Index i = rest_.size();
+  for (const CutJoint &joint : scene_.cut_joints)
+    damping_[i] = joint.friction.slope(rates[i]), ++i;
+  for (const GearSpring &gear : scene_.gears)
+    stiffness_[i++] = gear.spring.slope(q_[gear.a.q] - gear.ratio * q_[gear.b.q]);
 }
 
 template <class Space> void NewtonSystem<Space>::find_coupling() {
-  VectorXd unit = rest_, rates(coupling_.cols());
+  VectorXd unit = rest_, rates(static_cast<Index>(scene_.cut_joints.size()));
   for (Index i = 0; i < unit.size(); ++i) {
     unit[i] = 1;
     cut_rates(place_all(mechanism_, q_.data(), unit.data(), nullptr, w_), scene_.cut_joints, rates.data());
-    coupling_.row(i) = rates.transpose();
+    coupling_.row(i).head(rates.size()) = rates.transpose();
     unit[i] = 0;
   }
 }
@@ -117,11 +123,11 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
 template <class Space> void NewtonSystem<Space>::linearise(const double *q, const double *v) {
   q_ = Eigen::Map<const VectorXd>(q, q_.size());
   const Eigen::Map<const VectorXd> v_(v, rest_.size());
-  if (coupling_.size() > 0)
+  if (!scene_.cut_joints.empty())
     find_coupling();
   VectorXd rates(stiffness_.size());
   rates << v_, coupling_.transpose() * v_;
-  take_friction(rates);
+  take_slopes(rates);
   find_responses();
 }
 

@@ -1,6 +1,6 @@
 // The matrix of Newton's method in implicit integrators, N = M + B^T E B under C_q: E is a diagonal, zero but at a few
-// stiff coordinates B x: modes, joints with springs or friction, and joints at which loops are cut. N is never made;
-// what evaluations at rest say suffices, with G = B P and forces f = r - E B x:
+// stiff coordinates B x: modes, joints with springs or friction, joints at which loops are cut, and twists of gears. N
+// is never made; what evaluations at rest say suffices, with G = B P and forces f = r - E B x:
 //     N x + C_q^T nu = B^T r, C_q x = c:     x = P f + R c,     (1 + G E) B x = G r + B R c
 // P (n_v, stiff) are accelerations by unit forces along these coordinates while the constraint equations hold, R (n_v,
 // equations) those by which an equation alone accelerates. With y = S B x, S S = E, the matrix is symmetric: 1 + S G S.
@@ -21,10 +21,10 @@ public:
 
   void keep(const std::vector<int> &equations) { w_.keep(equations); } // these alone
 
-  // Diagonals (n_v, then cut joints); damping of friction as at the last linearise()
+  // Diagonals (n_v, cut joints, gears); slopes of friction and of gears as at the last linearise()
   const Eigen::VectorXd &stiffness() const { return stiffness_; }
   const Eigen::VectorXd &damping() const { return damping_; }
-  const Eigen::MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints) their rates are coupling^T v
+  const Eigen::MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints and gears), rates: coupling^T v
 
   // As ImplicitSystem has these
   void linearise(const double *q, const double *v);
@@ -46,7 +46,7 @@ private:
   };
 
   void find_stiff_terms();
-  void take_friction(const Eigen::VectorXd &rates);
+  void take_slopes(const Eigen::VectorXd &rates);
   void find_coupling();
   void find_responses();
   template <class Matrix> Matrix along_stiff(const Matrix &x) const; // B x
