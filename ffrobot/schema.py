@@ -73,7 +73,7 @@ def _file(kind: str) -> dict[str, Any]:
         described = TypeAdapter(Link).json_schema(schema_generator=_Described)
         described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
     else:
-        from .pictures.figures.figure_file import FigureFile
+        from .pictures.figures.shared import FigureFile
 
         described = TypeAdapter(FigureFile).json_schema(schema_generator=_Described)
     return _for_toml(described)

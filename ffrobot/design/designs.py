@@ -26,10 +26,9 @@ from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from ..sweep import Sweep, forget_failures, run_sweep
-from ..sweep.files import run_files
+from ..sweep.files import Variation, run_files
 from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, check_point, claim_folder
-from ..sweep.variation import Variation
 from ..sweep.workers import Workers
 from .readings import Followed, Goal, Reading
 

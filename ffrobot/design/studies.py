@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .front import Front
     from .optimum_record import Optimum
     from .sensitivity import Sensitivity
-    from .uncertainty_record import Uncertainty
+    from .uncertainty import Uncertainty
 
 P = ParamSpec("P")
 R = TypeVar("R")

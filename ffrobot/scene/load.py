@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..common.arrays import Array
 from ..common.deferred import loaded
-from ..common.errors import InputError
+from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import AnyPath
 from ..common.python_files import python_allowed
 from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
 from ..fe_models.link_source import LinkTable
+from ..mbs._core import TimeFunction
+from ..mbs.fields.field_types import GROUND
+from ..mbs.fields.functions import check_derivatives, check_domain
+from ..mbs.fields.orientations import OrientationLaw
 from ..mbs.fields.spelling import PLANAR, SPATIAL
+from ..mbs.joints.joint import JointRecord
+from ..mbs.scene.analysis import Analysis, Surroundings
+from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.planar_spelling import in_3d
-from .checks import check_functions, problems
+from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS
 from .scene import Scene, SceneKeys
 
@@ -141,3 +152,189 @@ def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
     except (KeyError, TypeError, AttributeError):
         return data  # malformed: validation says how
     return data | {"analysis": analyses}
+
+
+def problems(scene: SceneKeys) -> Iterator[str]:
+    """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
+    yield from _all_duplicates(scene)
+    yield from _reference_problems(scene)
+    yield from _guess_problems(scene)
+    yield from _load_problems(scene)
+    yield from _stiffening_problems(scene)
+    for k, analysis in enumerate(scene.analysis):
+        among = Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS.records)
+        for problem in (*_unmet_needs(scene, analysis), *analysis.problems(among)):
+            yield f'analysis "{analysis.name}": {problem}'
+
+
+def check_functions(scene: SceneKeys, path: Path) -> None:
+    """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
+    following = [analysis for analysis in scene.analysis if analysis.follows_trajectories]
+    for trajectory in scene.trajectory:
+        for analysis in following:
+            times = np.clip(analysis.times, 0.0, analysis.last_time)
+            _check_trajectory(trajectory, times, f'{path}: trajectory "{trajectory.name}"')
+    for k, load in enumerate(scene.load, 1):
+        for component, function in load.components.items():
+            for analysis in scene.analysis:
+                times = np.clip(analysis.times, 0.0, analysis.last_time)
+                check_domain(function, times, f"{path}: load no. {k}: {component}", 0)
+    for analysis in scene.analysis:
+        for key, function, derivatives in analysis.prescribed():
+            label = f'{path}: analysis "{analysis.name}": {key}'
+            if derivatives == 2:
+                _check_path(function, analysis.times, label)
+            else:
+                check_domain(function, analysis.times, label, derivatives)
+
+
+def _check_trajectory(trajectory: Trajectory, times: Array, label: str) -> None:
+    places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
+    for component, function in trajectory.components.items():
+        _check_path(function, times, f"{label}: {places or component}")
+    if (law := trajectory.orientation) is not None:
+        _check_orientation(law, times, f"{label}: {law.kind}")
+
+
+def _check_orientation(law: OrientationLaw, times: Array, label: str) -> None:
+    for function in law.functions:
+        _check_path(function, times, label)
+    if law.kind == "direction":
+        sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
+        if sizes.min() <= 1e-9 * sizes.max():
+            at = times[sizes.argmin()]
+            raise InputError(f"{label}: expected a direction at all times, found none at t = {at:.9g} s")
+
+
+def _check_path(function: TimeFunction, times: Array, label: str) -> None:
+    """Raise `InputError` for a function of time that no motion can follow, or whose derivatives are others."""
+    check_domain(function, times, label, 2)
+    if len(times) > 1:
+        check_derivatives(function, float(times[-1]), label)
+
+
+def _all_duplicates(scene: SceneKeys) -> Iterator[str]:
+    for kind in ("body", "joint", "trajectory", "analysis"):
+        for name, count in Counter(record.name for record in getattr(scene, kind)).items():
+            if count > 1:
+                yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
+    for label, count in Counter(layout.label for layout in scene.pzt).items():
+        if count > 1:
+            yield f'pzt "{label}": name: expected a separate name for each layout on a body, found {count}'
+    for name, count in Counter(points.body for points in scene.actuation_points).items():
+        if count > 1:
+            yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
+
+
+def _reference_problems(scene: SceneKeys) -> Iterator[str]:
+    bodies = {body.name: body for body in scene.body}
+    if GROUND in bodies:
+        yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
+    joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
+    elastic = [name for name, joint in joints.items() if getattr(joint, "stiffness", None) is not None]
+    moving = [name for name, joint in joints.items() if _moves(joint)]
+    patched = list(dict.fromkeys(layout.body for layout in scene.pzt))
+    layouts = [layout.label for layout in scene.pzt]
+    for reference in scene.references():
+        key, name = reference.key, reference.name
+        match reference.kind:
+            case "body":
+                yield from _body_problems(scene, bodies, key, name)
+            case "elastic joint" if name not in elastic:
+                yield f'{key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
+            case "joint" if name not in joints:
+                yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
+            case "joint" if name not in moving:
+                yield f'{key}: expected a joint that moves ({quoted(moving)}), found "{name}", a {joints[name].type}'
+            case "flexible body" if name in bodies and bodies[name].rigid is not None:
+                yield f'{key}: expected a flexible body, found "{name}", which is rigid'
+            case "patched body" if name not in patched:
+                hint = did_you_mean(name, patched)
+                yield f'{key}: expected a body with patches, {quoted(patched)}, found "{name}"{hint}'
+            case "patches" if name not in layouts:
+                wanted = f"one of the layouts {quoted(layouts)}" if layouts else "a layout of patches ([[pzt]])"
+                yield f'{key}: expected {wanted}, found "{name}"{did_you_mean(name, layouts)}'
+
+
+def _body_problems(scene: SceneKeys, bodies: Mapping[str, BodyKeys], key: str, reference: str) -> Iterator[str]:
+    """Of "BODY" or "BODY.POINT"; points of links are known with their files."""
+    name, _, point = reference.partition(".")
+    if name not in bodies:
+        yield f'{key}: expected one of the bodies {quoted(bodies)}, found "{reference}"{did_you_mean(name, bodies)}'
+    elif point and (rigid := bodies[name].rigid) is not None:
+        tools = (tool.reference.partition(".") for tool in scene.tool)
+        known = [*rigid.points, *(tool for body, _, tool in tools if body == name)]
+        if point not in known:
+            hint = did_you_mean(point, known)
+            yield f'{key}: expected one of the points {quoted(known)} of "{name}", found "{reference}"{hint}'
+
+
+def _moves(joint: JointRecord) -> bool:
+    """Whether it has coordinates, or a place that [initial] can guess."""
+    return bool(joint.units or joint.guess_units)
+
+
+def _guess_problems(scene: SceneKeys) -> Iterator[str]:
+    """Guesses of joints between bodies whose own guesses say the same."""
+    initial = scene.initial
+    for key, of_joints, bodies, of_bodies in (
+        ("joints", initial.joints, "angles", initial.angles),
+        ("joint_rates", initial.joint_rates, "rates", initial.rates),
+    ):
+        for joint in scene.joint:
+            turns = joint.name in of_joints and joint.type == "revolute"
+            known = [body for body in joint.bodies if body in of_bodies]
+            if turns and known and all(body in (GROUND, *known) for body in joint.bodies):
+                yield (
+                    f"initial.{key}.{joint.name}: expected no guess where initial.{bodies} has {quoted(known)},"
+                    " found one"
+                )
+
+
+def _load_problems(scene: SceneKeys) -> Iterator[str]:
+    """Numbers of voltages, and of moments of joints with several coordinates."""
+    counts = {layout.label: layout.patch_count for layout in scene.pzt}
+    joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
+    for k, load in enumerate(scene.load, 1):
+        count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
+        if count and found != count:
+            of = f'one for each patch of "{load.pzt}"'
+            yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
+        joint = joints.get(load.joint or "")
+        if joint is None or not _moves(joint):
+            continue
+        if not joint.units:
+            yield (
+                f'load no. {k}: joint: expected one with coordinates, found "{joint.name}", a {joint.type} joint:'
+                " forces and moments on what it joins are loads on points (x, y, z, mx, my, mz)"
+            )
+        elif (found := len(load.moments)) != len(joint.units):
+            of = f'one for each coordinate of "{joint.name}" ({", ".join(joint.units)})'
+            yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {found}"
+
+
+def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
+    """What acts between the interfaces of a link: modal body files hold no geometric stiffness of such loads."""
+    if not scene.geometric_stiffening:
+        return
+    for points in scene.actuation_points if scene.is_planar else ():
+        yield f'geometric_stiffening: expected false with [[actuation_points]], found those of "{points.body}"'
+    for layout in scene.pzt:
+        if layout.adds_mass:
+            yield (
+                'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
+                f' between its interfaces, found those of "{layout.label}"'
+            )
+
+
+def _unmet_needs(scene: SceneKeys, analysis: Analysis) -> Iterator[str]:
+    for need in analysis.needs():
+        if need.table == "trajectory" and analysis.allocates_patches and not scene.motor_joints:
+            continue  # patches alone act, as on a beam that is welded to the ground
+        if not getattr(scene, need.table):
+            yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
+    # Linear models of 3D scenes may have no inputs.
+    if scene.is_planar and analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
+        yield (
+            f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: nothing to control the robot with'
+        )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from .runs import missing_columns
-from .sweep import Sweep, drop_results, forget_failures, plan_sweep, run_sweep, stale_rows
-from .table import print_table
+from .sweep import Sweep, drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
 __all__ = [
     "Sweep", "drop_results", "forget_failures", "missing_columns", "plan_sweep", "print_table", "run_sweep",

@@ -1,18 +1,135 @@
-"""Paths through given places at rest in each, or past some of them: legs, holds between, input shapers."""
+"""Laws of motion from rest to rest, and paths of them: legs through given places, holds between, input shapers.
+
+Two families of laws s(t) from 0 to 1. A polynomial whose first m derivatives vanish at both ends; and a step that is
+averaged over times T₁ ≥ T₂ ≥ … one after the other, which makes a trapezoid of speeds of two of them, an S-curve with
+limited jerk of three (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, sec. 4.4:
+speed is at most h/T₁, acceleration h/(T₁T₂), jerk h/(T₁T₂T₃)).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import exp, pi, sqrt
+from math import exp, factorial, inf, pi, sqrt
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.structs import struct
-from .motion_laws import Limits, Profile, check_durations, law_in, law_within
-from .piecewise import Piecewise, superposed
+from .piecewise import SAME_TIME, Piecewise, merged, shifted, superposed
+
+Profile = Literal["rest-to-rest", "s-curve", "trapezoid"]
+
+SMOOTHNESS: dict[Profile, int] = {"rest-to-rest": 4, "s-curve": 2, "trapezoid": 1}
+"""Number of continuous derivatives where the scene gives none."""
+SHORTEST = 1e-9  # of a motion's duration: what is shorter would be lost by rounding
+HALF = 0.5  # of each time of averaging to the one before, where no limit says otherwise
+
+
+@struct
+class Limits:
+    """Of the speed, acceleration and jerk along the way: m/s or rad/s, and so on; infinite where there is none."""
+
+    speed: float = inf
+    acceleration: float = inf
+    jerk: float = inf
+
+    @property
+    def by_order(self) -> tuple[float, float, float]:
+        """Of the first, second and third derivative."""
+        return self.speed, self.acceleration, self.jerk
+
+
+def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
+    """The law that takes `duration` (s), of one component."""
+    if profile == "rest-to-rest":
+        return polynomial_law(smoothness).moved(duration)
+    times = HALF ** np.arange(smoothness + 1)
+    return averaged_step(as_floats(duration * times / times.sum()))
+
+
+def law_within(distance: float, limits: Limits, profile: Profile, smoothness: int) -> Piecewise:
+    """The fastest law over `distance` (m or rad) that keeps the `limits`, of one component.
+
+    Raises `ValueError` where parts of it are too short beside others.
+    """
+    if profile == "rest-to-rest":
+        peaks = [distance * law_peak(smoothness, order) for order in (1, 2, 3)]
+        times = [
+            (peak / limit) ** (1 / k) for k, (peak, limit) in enumerate(zip(peaks, limits.by_order, strict=True), 1)
+        ]
+        return law_in(max(times), profile, smoothness)
+    averaged = [T for T in averaging_times(distance, limits) if T > 0.0]
+    while len(averaged) < smoothness + 1:
+        averaged.append(HALF * averaged[-1])
+    check_durations(averaged, sum(averaged))
+    return averaged_step(np.array(averaged))
+
+
+def check_durations(durations: Sequence[float], total: float) -> None:
+    """Raise `ValueError` for parts of a motion (s) some of which vanish beside its `total`, s."""
+    if not SHORTEST * total < min(durations) <= max(durations) < inf:
+        raise ValueError(
+            f"expected limits and times that fit each other in size, found a motion of {total:.3g} s with parts of"
+            f" {min(durations):.3g} s"
+        )
+
+
+def averaging_times(distance: float, limits: Limits) -> tuple[float, float, float]:
+    """T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` within the limits; T₃ = 0 without one of jerk."""
+    h, (v, a, j) = distance, limits.by_order
+    T_3 = min(a / j, sqrt(v / j), (h / (2 * j)) ** (1 / 3)) if j < inf else 0.0
+    if T_3:
+        a = j * T_3  # what is reached
+    T_2 = max(T_3, min(v / a, (sqrt(T_3**2 + 4 * h / a) - T_3) / 2))
+    return max(T_2 + T_3, h / (a * T_2)), T_2, T_3
+
+
+def averaged_step(times: Array) -> Piecewise:
+    """The unit step at 0, averaged over each of the `times` (m + 1,), s: m continuous derivatives.
+
+    The highest derivative is constant between the sums of some of the times; the others follow by integration.
+    """
+    n = len(times)
+    instants: Array = np.zeros(1)
+    signs: Array = np.ones(1)
+    for T in times:
+        instants, signs = np.concatenate([instants, instants + T]), np.concatenate([signs, -signs])
+    breaks = merged(instants)
+    jumps = [signs[np.abs(instants - t) <= 2 * SAME_TIME * times.sum()].sum() for t in breaks]
+    highest = np.cumsum(jumps) / np.prod(times)
+    coefficients = np.zeros((len(breaks) - 1, n + 1, 1))
+    state: Array = np.zeros(n)
+    for k, step in enumerate(np.diff(breaks)):
+        derivatives = np.append(state, highest[k])  # s, ṡ, …
+        coefficients[k, :, 0] = [derivatives[m] / factorial(m) for m in range(n, -1, -1)]
+        state = as_floats(shifted(coefficients[k], step)[::-1, 0][:n] * [factorial(m) for m in range(n)])
+    return Piecewise(breaks, coefficients)
+
+
+def polynomial_law(smoothness: int) -> Piecewise:
+    """∝ ∫ t^m (1 − t)^m dt on [0, 1] with m = `smoothness`: as many derivatives vanish at both ends.
+
+    In two pieces: at the end of one, rounding would be that of its large coefficients.
+    """
+    whole = _polynomial(smoothness)[:, None]
+    return Piecewise(np.array([0.0, 0.5, 1.0]), np.array([whole, shifted(whole, 0.5)]))
+
+
+def law_peak(smoothness: int, order: int) -> float:
+    """Largest size of a derivative of `polynomial_law` on [0, 1]."""
+    derivative = np.polyder(_polynomial(smoothness), order)
+    turns = np.roots(np.polyder(derivative))
+    inside = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0.0) & (turns.real < 1.0)]
+    return float(np.abs(np.polyval(derivative, np.concatenate([[0.0, 1.0], inside]))).max())
+
+
+def _polynomial(m: int) -> Array:
+    """(2m + 2,) coefficients, highest power first."""
+    bell = (-1.0) ** m * np.poly([0.0] * m + [1.0] * m)
+    return as_floats(np.asarray(np.polyint(bell)) * (factorial(2 * m + 1) / factorial(m) ** 2))
+
 
 SAMPLES = 64  # of each polynomial, to find where a rounded path is fastest
 

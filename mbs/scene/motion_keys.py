@@ -12,8 +12,7 @@ from ...common.arrays import Array
 from ...common.errors import quoted
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive, Quantity, Referring
-from ..fields.motion_laws import SMOOTHNESS, Limits
-from ..fields.paths import Legs, impulses, path_of, shaped
+from ..fields.paths import SMOOTHNESS, Legs, Limits, impulses, path_of, shaped
 from ..fields.piecewise import Piecewise
 from ..fields.waypoints import Waypoints
 

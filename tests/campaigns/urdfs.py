@@ -27,7 +27,7 @@ from rigid_robots import moments, with_motion
 from ffrobot import FfrobotError
 from ffrobot.common.toml_files import toml_text
 from ffrobot.exchange.urdf.import_urdf import import_urdf
-from ffrobot.exchange.urdf.names import FORBIDDEN
+from ffrobot.exchange.urdf.robot import FORBIDDEN
 from ffrobot.present.progress import Display
 from ffrobot.results.write import write_results
 from ffrobot.run.solve import solve_scene

@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, logarithm, of_quaternion, of_rpy
-from ffrobot.mbs.fields.motion_laws import law_in, law_peak
-from ffrobot.mbs.fields.paths import Impulse, impulses
+from ffrobot.mbs.fields.paths import Impulse, impulses, law_in, law_peak
 
 RUN = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-10}
 

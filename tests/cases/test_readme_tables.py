@@ -13,7 +13,7 @@ from checkpoints import check_table, column, peak, readme_table, tip_error
 from reference_scenes import NIGHTLY
 
 from ffrobot import Results
-from ffrobot.pictures.report.runs import runs
+from ffrobot.pictures.report.charts import runs
 from ffrobot.pictures.report.tables import placements_table
 
 

@@ -9,11 +9,9 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.joint import MotorLimits
-from ffrobot.pictures.figures.figure_file import Curve, FigureRecord
-from ffrobot.pictures.figures.plot import plot_results
-from ffrobot.pictures.figures.shared import curve_points, limit_curves
+from ffrobot.pictures.figures.plot import draw_time_history, plot_results
+from ffrobot.pictures.figures.shared import Curve, FigureRecord, curve_points, limit_curves
 from ffrobot.pictures.figures.style import new_axes
-from ffrobot.pictures.figures.time_history import draw_time_history
 from ffrobot.pictures.motion import visible_exaggeration
 from ffrobot.results.file import Results
 

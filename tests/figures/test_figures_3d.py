@@ -8,8 +8,8 @@ from PIL import Image
 
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.configurations import draw_configurations
-from ffrobot.pictures.figures.figure_file import FigureRecord
 from ffrobot.pictures.figures.plot import draw, plot_results
+from ffrobot.pictures.figures.shared import FigureRecord
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.figures.style import SceneAxes
 from ffrobot.pictures.motion import moving_bodies, section_axes

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import computed_modal_body
-from ffrobot.fit.robot_target import RobotTarget, with_values
+from ffrobot.fit.fitting import RobotTarget, with_values
 
 LINK = """
 name = "arm"

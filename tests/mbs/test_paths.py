@@ -6,8 +6,17 @@ from math import inf
 import numpy as np
 import pytest
 
-from ffrobot.mbs.fields.motion_laws import Limits, law_in, law_within, polynomial_law
-from ffrobot.mbs.fields.paths import RESIDUAL, Legs, impulses, path_of, shaped
+from ffrobot.mbs.fields.paths import (
+    RESIDUAL,
+    Legs,
+    Limits,
+    impulses,
+    law_in,
+    law_within,
+    path_of,
+    polynomial_law,
+    shaped,
+)
 from ffrobot.mbs.fields.piecewise import Piecewise
 
 LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]

@@ -18,9 +18,8 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
 from ffrobot.pictures.motion import targets
 from ffrobot.pictures.report import write_report
-from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
+from ffrobot.pictures.report.charts import MAX_POINTS, distinct_parts, kept_outputs, runs
 from ffrobot.pictures.report.mechanism import mechanism
-from ffrobot.pictures.report.runs import distinct_parts, runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.pictures.view.view import chosen_frames
 from ffrobot.results.file import Results

@@ -19,17 +19,18 @@ from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mesh.included import number_of
 from .integrals import (
+    NOT_IN_THE_FILE,
     Node,
     ShapeIntegrals,
     about_center,
     integrals_of,
+    modal_body,
     nodes_of,
     note,
     noted,
     slopes,
     with_agreed_masses,
 )  # fmt: skip
-from .make import NOT_IN_THE_FILE, modal_body
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
 TITLES = {

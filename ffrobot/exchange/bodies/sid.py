@@ -18,8 +18,17 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...mesh.included import number_of
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, note, noted, with_agreed_masses
-from .make import NOT_IN_THE_FILE, modal_body
+from .integrals import (
+    NOT_IN_THE_FILE,
+    Node,
+    ShapeIntegrals,
+    integrals_of,
+    modal_body,
+    nodes_of,
+    note,
+    noted,
+    with_agreed_masses,
+)
 
 ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a symmetric matrix in the six rows of J."""

@@ -24,8 +24,7 @@ from ...mbs.posture.posture import robot_size
 from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_robot
 from ...scene.scene import Scene
-from .names import Names
-from .robot import Mimic, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
+from .robot import Mimic, Names, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
 from .scene import GRAVITY
 from .shape_masses import SLENDER, bars, beam_visuals
 

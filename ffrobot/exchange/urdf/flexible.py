@@ -22,8 +22,7 @@ from ...fe_models.link_file import read_link
 from ...fe_models.link_source import LinkTable
 from ...mesh.checks import METRES
 from ...mesh.inspection import PartFace, inspect_part
-from .names import Names
-from .robot import Place, Robot, UrdfJoint
+from .robot import Names, Place, Robot, UrdfJoint
 
 ON_AXIS = 1e-6  # of the length: how far a joint may be off the axis of a beam
 SAME_LENGTH = 1e-6  # relative

@@ -19,9 +19,8 @@ from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import Body, from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
-from .names import Names
 from .read import read_urdf
-from .robot import Inertial, MeshFile, Robot, inertial_of
+from .robot import Inertial, MeshFile, Names, Robot, inertial_of
 from .scene import SceneOfRobot
 from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
 

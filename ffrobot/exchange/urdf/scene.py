@@ -14,8 +14,7 @@ from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
 from .bodies import Body, Mechanism
 from .flexible import FlexibleLink
-from .names import Names
-from .robot import HERE, MeshFile, Origin, Primitive, Robot, UrdfJoint, three
+from .robot import HERE, MeshFile, Names, Origin, Primitive, Robot, UrdfJoint, three
 
 GRAVITY = [0.0, 0.0, -9.81]
 SCENE_TYPE = {

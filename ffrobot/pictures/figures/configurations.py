@@ -14,7 +14,7 @@ from ...results.file import Results
 from ..motion import ground_places, moving_bodies, size_of, visible_exaggeration
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
-from .figure_file import Curve, FigureRecord
+from .shared import Curve, FigureRecord
 from .style import SIZE, SceneAxes, legend, line_style, new_axes, shades
 
 SIZE_3D = (2 * SIZE[0], 1.6 * SIZE[1])  # inches

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...results.file import Results
 from ...results.joints import Coordinate, joint_coordinates
-from .figure_file import Curve, FigureRecord
-from .shared import bending_points, both_ways, curves_of, file_name, members
+from .shared import Curve, FigureRecord, bending_points, both_ways, curves_of, file_name, members
 
 SNAPSHOTS = 5
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn; of the largest modal coordinates and forces

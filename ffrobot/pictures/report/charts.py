@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from itertools import pairwise
+from os.path import abspath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,12 +17,61 @@ import numpy as np
 from ...common.arrays import Array, NDArray
 from ...results.file import Results
 from ...results.verdict import ROUND_OFF
-from ..figures.figure_file import Curve, FigureRecord
-from ..figures.shared import curve_points, file_name, motor_limits
+from ..figures.shared import Curve, FigureRecord, curve_points, file_name, motor_limits
 from ..figures.standard import standard_figures
 from ..motion import Target, targets
 from ..projection import COLORS, LIMIT
-from .runs import Run, runs, sources
+
+
+@dataclass(frozen=True)
+class Run:
+    """One analysis of one results file.
+
+    Attributes:
+        label: of the run; `source` tells the file, and is empty where there is only one.
+    """
+
+    results: Results
+    analysis: str
+    source: str
+
+    @property
+    def label(self) -> str:
+        """Its name on the page, unique."""
+        return f"{self.source}: {self.analysis}" if self.source else self.analysis
+
+
+def sources(files: Sequence[Results]) -> list[str]:
+    """What tells the files apart: nothing for one, the names of their scenes, or where their paths differ."""
+    if len(files) == 1:
+        return [""]
+    names = [results.name for results in files]
+    return names if len(set(names)) == len(names) else distinct_parts([results.path for results in files])
+
+
+def distinct_parts(paths: Sequence[Path]) -> list[str]:
+    """Each path without what all have at start and end: `beam` and `solid` of `c/beam/r.h5` and `c/solid/r.h5`.
+
+    The same file twice gets numbers.
+    """
+    parts = [Path(abspath(path)).parts for path in paths]  # without ".."
+    shortest = min(len(p) for p in parts)
+    start = next((k for k in range(shortest) if len({p[k] for p in parts}) > 1), shortest - 1)
+    end = next((k for k in range(shortest - start) if len({p[-1 - k] for p in parts}) > 1), 0)
+    labels = ["/".join(p[start : len(p) - end]) for p in parts]
+    if len(set(labels)) == len(labels):
+        return labels
+    return [f"{label} ({k + 1})" for k, label in enumerate(labels)]
+
+
+def runs(files: Sequence[Results]) -> list[Run]:
+    """Every analysis of every file, in order."""
+    return [
+        Run(results, analysis, source)
+        for results, source in zip(files, sources(files), strict=True)
+        for analysis in results.analyses
+    ]
+
 
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 

@@ -25,8 +25,7 @@ from ..motion import (
 )
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH, UP, VIEWER
 from ..shapes import AMPLITUDE, body_surface, coarsened, drawn_mode, surface_shape, thickened, triangles_of
-from .charts import Chart, encoded, plain, shades
-from .runs import Run
+from .charts import Chart, Run, encoded, plain, shades
 
 MAX_FRAMES = 2000
 ABOVE = 0.1  # of the mechanism's size: how far before the bodies of a planar scene its joints and paths are drawn

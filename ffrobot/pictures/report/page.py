@@ -14,10 +14,9 @@ from ...common.outputs import check_not_an_input
 from ...common.version import VERSION
 from ...results.file import Results
 from ..studies.study import Study, read_study, study_files
-from .charts import Chart, folded, history_charts
+from .charts import Chart, folded, history_charts, runs, sources
 from .diagrams import DrawnDiagram, StudyPart
 from .mechanism import link_modes, mechanism, surface_modes
-from .runs import runs, sources
 from .tables import TABLES, analyses_table, origins_table, verdicts
 
 HERE = Path(__file__).parent

@@ -15,9 +15,8 @@ from ...results.tables import Cells, analysis_cells, loop_cells, settling_cells,
 from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
-from .charts import path_error
+from .charts import Run, path_error, sources
 from .diagrams import StudyPart
-from .runs import Run, sources
 
 
 @dataclass(frozen=True)
