@@ -109,7 +109,7 @@ def _of_line(line: dict[str, str]) -> dict[str, Any]:
     return {key: text if key == "name" else _numbers(text) for key, text in given.items()}
 
 
-def _numbers(text: Any) -> Any:  # noqa: ANN401 (a wrong one is for the record to refuse)
+def _numbers(text: Any) -> Any:
     try:
         return tuple(map(float, text)) if isinstance(text, tuple) else float(text)
     except ValueError:

@@ -29,7 +29,7 @@ class Deferred:
     tag: str = ""
     modules: Mapping[str, str] = field(default_factory=dict, hash=False)
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         if not self.tag:
             return _deferred(source)
         of_union = {get_args(one.model_fields[self.tag].annotation)[0]: one for one in get_args(source)}
@@ -53,7 +53,7 @@ class ReadBy:
     function: Callable[[Any, ValidationInfo], Any]
     written: Any = field(hash=False)
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(self.function, metadata={RECORD: self.written})
 
 
@@ -66,7 +66,7 @@ def loaded(record: type[BaseModel] | str) -> type[BaseModel]:
 
 
 def _deferred(record: type[BaseModel] | str) -> CoreSchema:
-    def read(value: Any, info: ValidationInfo) -> BaseModel:  # noqa: ANN401
+    def read(value: Any, info: ValidationInfo) -> BaseModel:
         taken = loaded(record)
         USED.add(taken)
         if info.mode == "python" or isinstance(value, BaseModel):

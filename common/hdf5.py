@@ -69,7 +69,7 @@ def image_of(file: h5py.File) -> bytes:
     return image
 
 
-def read(dataset: h5py.Dataset) -> Any:  # noqa: ANN401 (as h5py)
+def read(dataset: h5py.Dataset) -> Any:
     """All of a dataset.
 
     Raises `InputError` where its data are elsewhere (virtual and external datasets), fewer than its shape says, or

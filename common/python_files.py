@@ -149,7 +149,7 @@ def digest_of_function(function: object) -> str:
     return digest.hexdigest()[:12]
 
 
-def _parts(value: Any, depth: int) -> Iterator[bytes]:  # noqa: ANN401 (whatever a function may use)
+def _parts(value: Any, depth: int) -> Iterator[bytes]:
     if depth == 0:
         return
     code = getattr(value, "__code__", None)
@@ -180,7 +180,7 @@ def _parts(value: Any, depth: int) -> Iterator[bytes]:  # noqa: ANN401 (whatever
             yield from _parts(getattr(value, "__dict__", None), depth - 1)
 
 
-def _function(function: Any, code: CodeType, depth: int) -> Iterator[bytes]:  # noqa: ANN401
+def _function(function: Any, code: CodeType, depth: int) -> Iterator[bytes]:
     yield from _code(code)
     for cell in getattr(function, "__closure__", None) or ():
         yield from _parts(_content(cell), depth - 1)
@@ -212,7 +212,7 @@ def _names(code: CodeType) -> set[str]:
     return set(code.co_names).union(*map(_names, inner))
 
 
-def _content(cell: Any) -> object:  # noqa: ANN401
+def _content(cell: Any) -> object:
     try:
         return cell.cell_contents
     except ValueError:  # empty yet

@@ -105,7 +105,7 @@ def beyond_limits(data: dict[str, Any]) -> Iterator[str]:
     yield from (f"{key_path(loc, data)}: {problem}" for loc, problem in _beyond(data, ()))
 
 
-def _beyond(value: Any, loc: tuple[int | str, ...]) -> Iterator[tuple[tuple[int | str, ...], str]]:  # noqa: ANN401
+def _beyond(value: Any, loc: tuple[int | str, ...]) -> Iterator[tuple[tuple[int | str, ...], str]]:
     if isinstance(value, dict | list):
         if len(loc) >= DEEPEST:
             yield loc[:2], f"expected at most {DEEPEST} tables and lists within each other, found more"

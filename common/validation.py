@@ -52,7 +52,7 @@ def space_of(info: ValidationInfo) -> str | None:
     return (info.context or {}).get("space")
 
 
-def as_tuples(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)
+def as_tuples(value: Any) -> Any:
     """`value` with tuples for lists: what pydantic takes from validators that stand before those of a type."""
     if isinstance(value, dict):
         return {key: as_tuples(item) for key, item in value.items()}
@@ -65,7 +65,7 @@ class OnlyIn:
 
     space: str
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_before_validator_function(self._check, handler(source))
 
     def _check(self, value: object, info: ValidationInfo) -> object:
@@ -132,7 +132,7 @@ def _follows(item: ErrorDetails, within: Collection[tuple[int | str, ...]]) -> b
     return item["type"] == "missing" and isinstance(loc[-1], int) and (*loc[:-1], loc[-1] + 1) in within
 
 
-def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noqa: ANN401 (whatever TOML may hold)
+def plain(value: Any, functions: dict[str, object] | None = None) -> Any:
     """`value` in the types of TOML: NumPy numbers and arrays, tuples and paths replaced, keys that are None left out.
 
     Functions go to `functions` under the text that stands for them.

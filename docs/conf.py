@@ -30,7 +30,7 @@ html_title = f"ffrobot {version}"
 exclude_patterns = ["_build"]
 
 
-def setup(app: Any) -> None:  # noqa: ANN401 (Sphinx)
+def setup(app: Any) -> None:
     """Write the pages that are generated, before Sphinx looks for pages."""
     app.connect("builder-inited", lambda app: _write_pages(Path(app.srcdir)))
     app.connect("source-read", _read)
@@ -44,5 +44,5 @@ def _write_pages(folder: Path) -> None:
     write_benchmark_tables(folder / "benchmarks", folder / "developer" / "benchmark_records.md")
 
 
-def _read(app: Any, name: str, source: list[str]) -> None:  # noqa: ANN401 (Sphinx)
+def _read(app: Any, name: str, source: list[str]) -> None:
     source[0] = read_on_site(name, source[0])

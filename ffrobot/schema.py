@@ -129,13 +129,13 @@ class _Planar(_Described):
         return described
 
 
-def _spelled(schema: Any) -> Spelled | None:  # noqa: ANN401 (any core schema)
+def _spelled(schema: Any) -> Spelled | None:
     """The mark of a field that planar scenes write otherwise."""
     mark = getattr(schema.get("function", {}).get("function"), "__self__", None)
     return mark if isinstance(mark, Spelled) else None
 
 
-def _for_toml(node: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)
+def _for_toml(node: Any) -> Any:
     """`node` without what TOML has not (null), and without titles that only repeat the key."""
     if isinstance(node, list):
         return [_for_toml(item) for item in node]

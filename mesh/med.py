@@ -87,7 +87,7 @@ def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:
     return next(iter(parent.items()))
 
 
-def _columns(data: h5py.Dataset, width: int) -> Any:  # noqa: ANN401 (of the type in the file)
+def _columns(data: h5py.Dataset, width: int) -> Any:
     """(n, width) of a dataset that has all first entries, then all second ones."""
     return np.asarray(data[()]).reshape((width, -1)).T
 

@@ -65,7 +65,7 @@ class Frozen:
         Frozen.__post_init__(self)
 
 
-def _fields_of(record: Any) -> set[str]:  # noqa: ANN401 (any dataclass)
+def _fields_of(record: Any) -> set[str]:
     return {field.name for field in fields(record)}
 
 

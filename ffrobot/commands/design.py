@@ -3,8 +3,6 @@
 Options are parameters of the functions of `design.studies` that do the work.
 """
 
-# ruff: noqa: ANN401 (what those functions take, they check)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -40,7 +40,7 @@ def plot(
     formats: str,
     only: tuple[str, ...],
     movie: Path | None,
-    **options: Any,  # noqa: ANN401 (the fields of MovieOptions)
+    **options: Any,
 ) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
@@ -77,7 +77,7 @@ def view(
     output: Path | None,
     movie: Path | None,
     seconds: float,
-    **options: Any,  # noqa: ANN401 (the fields of Options)
+    **options: Any,
 ) -> None:
     """Write links and motions as solids: VTKHDF files for ParaView, pictures by PyVista.
 

@@ -30,7 +30,7 @@ Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all
 class FiniteRange(FloatRange):
     """Numbers from one bound to another, or beyond one; no NaN, no infinity."""
 
-    def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> Any:  # noqa: ANN401 (as of click)
+    def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> Any:
         """The number."""
         found = super().convert(value, param, ctx)
         if not isfinite(found):

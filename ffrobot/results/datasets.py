@@ -31,7 +31,7 @@ class _Attributes(dict[str, Any]):
         super().__init__(values)
         self._where = where
 
-    def __missing__(self, name: str) -> Any:  # noqa: ANN401
+    def __missing__(self, name: str) -> Any:
         raise InputError(f'{self._where}: expected the attribute "{name}", found none')
 
 

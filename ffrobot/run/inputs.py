@@ -23,7 +23,7 @@ PROGRAM = "ffrobot"
 """Stands for the program's version among fingerprints."""
 
 
-def named_files(data: Any, folder: Path) -> Iterator[Path]:  # noqa: ANN401 (whatever TOML may hold)
+def named_files(data: Any, folder: Path) -> Iterator[Path]:
     """The files that tables read from a file in `folder` name, and those that link files among them name in turn."""
     for key, file in _named(data, folder):
         yield from files_with_included(file)
@@ -32,7 +32,7 @@ def named_files(data: Any, folder: Path) -> Iterator[Path]:  # noqa: ANN401 (wha
                 yield from files_with_included(part)
 
 
-def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:  # noqa: ANN401
+def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:
     """The keys that name a file, with the file."""
     for key, value in data.items() if isinstance(data, dict) else enumerate(data):
         if isinstance(value, dict | list):

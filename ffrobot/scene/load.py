@@ -74,7 +74,7 @@ def load_robot(path: Path) -> Scene:
     return scene if "analysis" in data else scene.model_copy(update={"analysis": ()})
 
 
-def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
+def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:
     """Make a scene in Python, with the keys of a scene file.
 
     Args:

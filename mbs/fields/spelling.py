@@ -35,7 +35,7 @@ def keys_here(record: Record, keys: Iterable[str], info: ValidationInfo) -> tupl
 
 
 @cache
-def _reader(spelling: Any) -> TypeAdapter[Any]:  # noqa: ANN401 (any type of a key)
+def _reader(spelling: Any) -> TypeAdapter[Any]:
     return TypeAdapter(spelling, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
@@ -46,10 +46,10 @@ class Spelled:
     spelling: Any
     in_3d: Callable[[Any], Any]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_wrap_validator_function(self._read, handler(source))
 
-    def _read(self, value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
+    def _read(self, value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if not is_planar(info):
             return handler(as_tuples(value))
         return self.in_3d(_reader(self.spelling).validate_json(json.dumps(value), context=info.context))
@@ -58,11 +58,11 @@ class Spelled:
 class NormalInPlane(OnlyIn):
     """Marks an axis that planar scenes do not have: it is `NORMAL` there, and required in 3D. Its default is None."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_wrap_validator_function(self._read, handler(source))
 
     @staticmethod
-    def _read(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
+    def _read(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if (value is None) is not is_planar(info):
             raise PydanticKnownError("missing" if value is None else "extra_forbidden")
         return NORMAL if value is None else handler(as_tuples(value))
@@ -72,11 +72,11 @@ class NormalInPlane(OnlyIn):
 class TaggedInPlane:
     """Marks a union of records with the discriminator `type`, of which planar scenes have those without `only_in`."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         records: Sequence[type[Record]] = get_args(source)
         tags = [get_args(record.model_fields["type"].annotation)[0] for record in records if record.only_in is None]
 
-        def read(value: Any, inner: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
+        def read(value: Any, inner: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
             tag = value.get("type") if isinstance(value, dict) else None
             if is_planar(info) and isinstance(tag, str) and tag not in tags:
                 known = ", ".join(f"'{one}'" for one in tags)
@@ -89,7 +89,7 @@ class TaggedInPlane:
         return core_schema.with_info_wrap_validator_function(read, handler(source), metadata=marks)
 
 
-def as_written(value: Any) -> Any:  # noqa: ANN401
+def as_written(value: Any) -> Any:
     """A value that 3D scenes may write in the same way."""
     return value
 

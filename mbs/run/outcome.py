@@ -55,7 +55,7 @@ class _Rows:
         return self._each(lambda x, y: np.concatenate([x, y[len(x) :]]), later)
 
     def _each(self, f: Callable[..., Array], *others: Self) -> Self:
-        def found(values: Sequence[Any]) -> Any:  # noqa: ANN401
+        def found(values: Sequence[Any]) -> Any:
             if isinstance(values[0], Mapping):
                 return {name: f(*(value[name] for value in values)) for name in values[0]}
             return f(*values) if isinstance(values[0], np.ndarray) else values[0]

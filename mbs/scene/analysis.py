@@ -109,7 +109,7 @@ class Analysis(Referring):
         """Whether what it finds is to be replayed on links with more modes."""
         return getattr(self, "check", None) is not None
 
-    def run(self, context: Any) -> Any:  # noqa: ANN401 (of the folders above: a kind says what it takes and finds)
+    def run(self, context: Any) -> Any:
         """What is found."""
         raise NotImplementedError
 

@@ -51,9 +51,8 @@ def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
 def reduced_order(found: ShapeIntegrals) -> dict[str, Any]:
     """The constant matrices of ObjectFFRFreducedOrder."""
     n, S, one = found.n_modes, found.S_bar_kl, np.eye(3)
-    total = S[0, 0] + S[1, 1] + S[2, 2]
     center = as_floats(found.first_moment / found.mass)
-    tilde_tilde = np.einsum("ab,lm->lamb", one, total) - np.einsum("balm->lamb", S)
+    tilde_tilde = np.einsum("ab,lm->lamb", one, np.trace(S)) - np.einsum("balm->lamb", S)
     return {
         "massMatrixReduced": found.modal_mass,
         "stiffnessMatrixReduced": found.stiffness,

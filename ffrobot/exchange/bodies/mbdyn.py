@@ -67,8 +67,7 @@ def fem_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
 
 def _integral_lines(found: ShapeIntegrals) -> Iterator[str]:
     n, S = found.n_modes, found.S_bar_kl
-    total = S[0, 0] + S[1, 1] + S[2, 2]
-    inv9 = np.einsum("abkj->abjk", S) - np.einsum("ab,jk->abjk", np.eye(3), total)
+    inv9 = np.einsum("abkj->abjk", S) - np.einsum("ab,jk->abjk", np.eye(3), np.trace(S))
     yield from _record(9, found.modal_mass)
     yield from _record(10, found.stiffness)
     yield from _record(12, [[found.mass], found.first_moment / found.mass, *about_center(found)])
@@ -161,8 +160,7 @@ def _of_invariants(records: dict[int, list[str]], n: int, M: Array, K: Array, D:
     inv8 = _numbers(records, 16, 9 * n).reshape(3, n, 3).transpose(0, 2, 1)
     inv5 = _numbers(records, 17, 3 * n * n).reshape(3, n, n)
     inv9 = _numbers(records, 18, 9 * n * n).reshape(3, n, n, 3).transpose(0, 3, 1, 2)
-    total = -np.einsum("aajk->jk", inv9) / 2
-    S = (inv9 + np.einsum("ab,jk->abjk", np.eye(3), total)).transpose(0, 1, 3, 2)
+    S = (inv9 - np.einsum("ab,jk->abjk", np.eye(3), np.trace(inv9) / 2)).transpose(0, 1, 3, 2)
     _, centrifugal = slopes(S)
     return ShapeIntegrals(
         mass, mass * center, inv3, J, inv8 + inv8.transpose(1, 0, 2), inv4, inv5.transpose(0, 2, 1), M, centrifugal,

@@ -77,7 +77,7 @@ def _from_json(path: Path) -> Waypoints:
     return _motion(joints, rows, *joined, *_moving_at_ends(joints, rates))
 
 
-def _segments(message: Any) -> Iterator[Mapping[str, Any]]:  # noqa: ANN401 (any JSON)
+def _segments(message: Any) -> Iterator[Mapping[str, Any]]:
     """The JointTrajectories in a message, those of a list one after the other."""
     if isinstance(message, list):
         for part in message:
@@ -89,7 +89,7 @@ def _segments(message: Any) -> Iterator[Mapping[str, Any]]:  # noqa: ANN401 (any
             yield from _segments(message[inner])
 
 
-def _names(names: Any) -> list[str]:  # noqa: ANN401 (any JSON)
+def _names(names: Any) -> list[str]:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise InputError("expected joint_names, a list of texts, found others")
     return names
@@ -99,7 +99,7 @@ Row = tuple[float, list[float]]
 """Time (s) and positions of a point."""
 
 
-def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:  # noqa: ANN401 (any JSON)
+def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:
     if not isinstance(point, Mapping):
         raise InputError(f"point {k}: expected positions and time_from_start, found {type(point).__name__}")
     positions = point.get("positions")
@@ -112,7 +112,7 @@ def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:  # noq
     return begin + _seconds(point.get("time_from_start"), k), [_number(value, f"point {k}") for value in positions]
 
 
-def _number(value: Any, where: str) -> float:  # noqa: ANN401 (any JSON)
+def _number(value: Any, where: str) -> float:
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -122,7 +122,7 @@ def _number(value: Any, where: str) -> float:  # noqa: ANN401 (any JSON)
     return number
 
 
-def _seconds(duration: Any, k: int) -> float:  # noqa: ANN401 (any JSON)
+def _seconds(duration: Any, k: int) -> float:
     """Of a Duration of ROS 2 (sec, nanosec), ROS 1 (secs, nsecs) or protobuf (seconds, nanos; "0.5s"), or a number."""
     where = f"point {k}: time_from_start"
     if duration is None:
@@ -176,7 +176,7 @@ def _from_bag(path: Path) -> Waypoints:
         raise InputError(f"expected a bag of ROS, found {reason}") from None
 
 
-def _of_bag(bag: Any) -> Waypoints:  # noqa: ANN401 (of a library without types)
+def _of_bag(bag: Any) -> Waypoints:
     """The first JointTrajectory of the topic that has most; without one, the JointStates of all topics."""
     topics = {
         kind: sorted((one for one in bag.connections if one.msgtype == kind), key=lambda one: -int(one.msgcount))
@@ -185,7 +185,7 @@ def _of_bag(bag: Any) -> Waypoints:  # noqa: ANN401 (of a library without types)
     if not any(topics.values()):
         raise InputError(f"expected messages {TRAJECTORY} or {STATES}, found none of them")
 
-    def messages(topic: Any) -> Iterator[tuple[int, Any]]:  # noqa: ANN401
+    def messages(topic: Any) -> Iterator[tuple[int, Any]]:
         return ((at, bag.deserialize(raw, topic.msgtype)) for _, at, raw in bag.messages(connections=[topic]))
 
     first, *others = topics[TRAJECTORY] or [None]
@@ -456,14 +456,14 @@ def joint_trajectory_bag(motion: RobotMotion) -> tuple[Mapping[str, bytes], tupl
         return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}, remarks
 
 
-def _ros(message: Mapping[str, Any], types: Mapping[str, Any]) -> Any:  # noqa: ANN401 (classes are made at run time)
+def _ros(message: Mapping[str, Any], types: Mapping[str, Any]) -> Any:
     stamp = types["builtin_interfaces/msg/Time"](**message["header"]["stamp"])
     header = types["std_msgs/msg/Header"](stamp=stamp, frame_id=message["header"]["frame_id"])
     points = [_point(point, types) for point in message["points"]]
     return types[TYPE](header=header, joint_names=message["joint_names"], points=points)
 
 
-def _point(point: Mapping[str, Any], types: Mapping[str, Any]) -> Any:  # noqa: ANN401
+def _point(point: Mapping[str, Any], types: Mapping[str, Any]) -> Any:
     values = {key: np.array(point[key], dtype=float) for key in ("positions", "velocities", "accelerations", "effort")}
     since = types["builtin_interfaces/msg/Duration"](**point["time_from_start"])
     return types["trajectory_msgs/msg/JointTrajectoryPoint"](**values, time_from_start=since)

@@ -72,7 +72,7 @@ def _histories(
     title: str,
     curves: Iterable[Curve],
     y_label: str,
-    **more: Any,  # noqa: ANN401
+    **more: Any,
 ) -> Iterator[FigureRecord]:
     if drawn := tuple(curves):
         yield FigureRecord(name=file_name(*name), title=title, curves=drawn, y_label=y_label, **more)

@@ -194,12 +194,12 @@ class SceneAxes:
         self.axes, self.view = axes, view
         self.drawn: list[Array] = []
 
-    def plot(self, points: Array, *style: str, **options: Any) -> None:  # noqa: ANN401 (those of matplotlib's lines)
+    def plot(self, points: Array, *style: str, **options: Any) -> None:
         """A line through points (n, 3), or markers."""
         self.drawn.append(seen := projected(points, self.view))
         self.axes.plot(*seen.T, *style, **options)
 
-    def body(self, points: Array, cells: Integers, color: Any, width: float = 1.5) -> None:  # noqa: ANN401
+    def body(self, points: Array, cells: Integers, color: Any, width: float = 1.5) -> None:
         """Points (p, 3) and cells on them: lines, or a surface, which shows what it covers."""
         self.drawn.append(seen := projected(points, self.view))
         if cells.shape[1] == 2:
@@ -209,7 +209,7 @@ class SceneAxes:
             self.axes.add_artist(PathPatch(_covered(seen[front]), color=color, alpha=FILL, linewidth=0))
             self._lines(seen[_ends(front)], color, 0.5 * width)
 
-    def _lines(self, ends: Array, color: Any, width: float) -> None:  # noqa: ANN401
+    def _lines(self, ends: Array, color: Any, width: float) -> None:
         lines = LineCollection(list(ends), colors=[color], linewidths=width, capstyle="round")
         self.axes.add_collection(lines)
 

@@ -104,7 +104,7 @@ class Chart:
     equal_axes: bool = False
     top: float = field(default=0.0, init=False)
 
-    def add(self, label: str, x: Array, y: Array, **style: Any) -> None:  # noqa: ANN401 (a trace's own keys)
+    def add(self, label: str, x: Array, y: Array, **style: Any) -> None:
         """Add a curve y(x)."""
         if "visible" not in style:
             self.top = max(self.top, float(np.nanmax(np.abs(y), initial=0.0)))

@@ -128,7 +128,7 @@ def round_above(value: float) -> float:
     return float(power * ROUND[np.searchsorted(ROUND, value / power * (1.0 - 1e-9))])
 
 
-def _read(path: str, step: int) -> Any:  # noqa: ANN401 (PyVista's objects, here and below)
+def _read(path: str, step: int) -> Any:
     import pyvista
     from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -140,7 +140,7 @@ def _read(path: str, step: int) -> Any:  # noqa: ANN401 (PyVista's objects, here
     return pyvista.wrap(reader.GetOutputDataObject(0))
 
 
-def _add(plotter: Any, grid: Any, scalars: str, limit: float, rod: float, bar: dict[str, Any] | None) -> None:  # noqa: ANN401
+def _add(plotter: Any, grid: Any, scalars: str, limit: float, rod: float, bar: dict[str, Any] | None) -> None:
     """Surfaces, smooth but at their folds; lines as rods, single points as balls."""
     kinds = grid.celltypes
     look = {
@@ -159,13 +159,13 @@ def _add(plotter: Any, grid: Any, scalars: str, limit: float, rod: float, bar: d
             plotter.add_mesh(part, smooth_shading=True, split_sharp_edges=True, feature_angle=FOLD, **look)
 
 
-def _add_ghost(plotter: Any, grid: Any) -> None:  # noqa: ANN401
+def _add_ghost(plotter: Any, grid: Any) -> None:
     edges = grid.extract_feature_edges(FOLD)
     plotter.add_mesh(grid, color=GHOST, opacity=0.25, line_width=2)
     plotter.add_mesh(edges if edges.n_points else grid, style="wireframe", color=GHOST, line_width=2)
 
 
-def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: float) -> None:  # noqa: ANN401
+def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: float) -> None:
     """Joints with their axes, the axes x, y, z of what follows paths, what stands on the ground.
 
     Joints are balls, or in planar scenes, with a `depth`, pins through the robot.
@@ -187,14 +187,14 @@ def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: fl
         _add_stand(plotter, at, (0.0, 0.0, 1.0) if job["in_space"] else (0.0, 1.0, 0.0), size)
 
 
-def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:  # noqa: ANN401
+def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:
     import pyvista
 
     bar = pyvista.Cylinder(at, along, radius=radius, height=length)
     plotter.add_mesh(bar, color=color, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
 
 
-def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) -> None:  # noqa: ANN401
+def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) -> None:
     import pyvista
 
     foot = (np.array(at) - 0.5 * STAND * size * np.array(up)).tolist()
@@ -202,7 +202,7 @@ def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) 
     plotter.add_mesh(stand, color=METAL, ambient=0.3)
 
 
-def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:  # noqa: ANN401
+def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:
     """Title, directions, and the view of the other pictures.
 
     `room` is the part of the height at the bottom that is for a color bar.
