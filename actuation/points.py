@@ -38,8 +38,7 @@ Place = float | Name
 class ActuationPoints(Record):
     """Components of force on one body, equivalent to its generalized driving forces (Shabana 2022, sec. 4).
 
-    `x`, `y` and `z` list the points of components along that axis of the body's frame; in planar scenes `axial` and
-    `transverse` those along x and y. Without them, ffrobot chooses as many independent components as possible.
+    Without points, ffrobot chooses as many independent components as possible.
     """
 
     body: str

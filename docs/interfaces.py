@@ -13,7 +13,7 @@ import click
 import ffrobot
 from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.cli import cli
-from ffrobot.design.front import Front
+from ffrobot.design.optimise import Front
 from ffrobot.design.optimum_record import Optimum
 from ffrobot.design.sensitivity import Sensitivity
 from ffrobot.design.uncertainty import Uncertainty

@@ -36,11 +36,7 @@ PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 class Sensor(Record):
     """A sensor of a joint coordinate, of the position x, y (z) of a point, or of patch voltages.
 
-    `motor` names a joint with stiffness; the sensor measures the motor angle after its gear. `measure` is the value,
-    its rate, or (points) its acceleration. Readings are multiples of `resolution` after Gaussian noise with standard
-    deviation `noise`, both in the unit of the reading. `modal` names a body whose modal coordinates are read directly,
-    which no real sensor can. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance` (F; default: that of the
-    patch itself).
+    Noise comes before rounding to the `resolution`. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
     """
 
     joint: str | None = None
@@ -94,10 +90,7 @@ class ControllerRecord(Referring):
 
 
 class JointPid(ControllerRecord):
-    """u = P e + D ė + I ∫e of each joint named, e from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s) or their like.
-
-    Rates are measured, or `rate = "difference"` of the last two readings.
-    """
+    """u = P e + D ė + I ∫e of each joint named, e from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s) or their like."""
 
     kind: Literal["joint-pid"]
     proportional: dict[Name, NotNegative] = Field(default_factory=dict)
@@ -157,9 +150,8 @@ class ModalVelocity(ControllerRecord):
 class Lqr(ControllerRecord):
     """u = −K x for the sampled linear model about the reference at `time`, links with their lowest `modes`.
 
-    Weights are inverse squares of acceptable errors: angles (rad), rates (rad/s), deflections of the links relative to
-    their length, moments (N·m), voltages (V). `inputs`: all, motors only, or patches only; a "joint-pid" then controls
-    the joints. States as in `ModalVelocity`.
+    Weights are inverse squares of acceptable errors. With patches alone as `inputs`, a "joint-pid" controls the joints.
+    States as in `ModalVelocity`.
     """
 
     kind: Literal["lqr"]
@@ -211,11 +203,8 @@ Controller = Annotated[JointPid | ComputedTorque | ModalVelocity | Lqr | PythonC
 class Placement(Record):
     """Optimal positions of the `count` patches of a [[pzt]] on its link.
 
-    `criterion` "controllability" maximizes the controllability of the `modes` lowest modes of the robot with locked
-    motors. "voltage" minimizes the largest voltage, relative to its limit, that produces the forces of the `modes`
-    lowest modes of the link in the inverse analysis `about`. `measure` selects the controllability of the worst mode,
-    the mean or the product. Centers are tried every `spacing`: all sets if these are at most `most_sets`, otherwise by
-    evolution.
+    Modes are the lowest of the robot with locked motors; with criterion "voltage", those of the link, whose forces in
+    the inverse analysis `about` count.
     """
 
     body: str

@@ -27,9 +27,8 @@ from ..scene.load import load_scene
 from ..scene.scene import Scene
 from ..sweep import Sweep, forget_failures, run_sweep
 from ..sweep.files import Variation, run_files
-from ..sweep.runs import RESULTS, Row
+from ..sweep.runs import RESULTS, Row, Workers
 from ..sweep.sweep import Key, check_point, claim_folder
-from ..sweep.workers import Workers
 from .readings import Followed, Goal, Reading
 
 OUTPUTS = 1000  # at least, where goals are peaks or means over time: they do not depend on those of the scene

@@ -1,18 +1,39 @@
-"""Designs at places of the unit cube, each run once, with their goals; and all of them in one table."""
+"""Designs at places of the unit cube, each run once: goals, gradients, how near to an optimum, all in one table.
+
+With the objective F to be least, excesses g ≤ 0 and bounds b of u: ∇F + Σ λ_i ∇g_i + Σ μ_j ∇b_j = 0 with λ, μ ≥ 0, and
+0 where a limit or bound is not reached (Karush, Kuhn and Tucker). Of the gradients there are, the multipliers that come
+nearest to it are taken (Lawson & Hanson's least squares without negative values: Solving Least Squares Problems, 1974,
+chapter 23). One unit more room in g_i lowers F by λ_i.
+
+Gradients are from few runs: one design beside for each variable, or a central pair. The step follows from the noise ε
+of the runs: with h = 2 √ε of a number, noise and curvature of a one-sided difference are alike (Gill, Murray & Wright,
+Practical Optimization, 1981, section 8.6). Where designs beside take the steps of the base again
+(`mbs/fields/steps.py`), ε is rounding, and one-sided differences are all that is wanted. One more run has all numbers
+changed at once, to the other sides: what it leaves of the sum of the differences tells their error.
+
+Runs that choose their own steps differ by their tolerance. There the first gradient of a search takes pairs; their
+second differences take the curvature out of later one-sided ones. Peaks are followed at their own time (envelope
+theorem).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.optimize import nnls
+
+from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..sweep.sweep import Key
+from .derivatives import weights
 from .designs import Design, Designs, Point, in_words, repeated_steps
-from .goals import Problem
+from .goals import KEPT, Problem
 from .readings import Followed, Reading
 from .variables import Place, Space
 
@@ -138,3 +159,225 @@ def write_designs(found: Evaluations, path: Path) -> None:
         status = row.status if one.completed or row.status != "completed" else "failed"
         rows.append([k, *row.values, status, *values, violation, one.design.folder.name, one.failure])
     write_atomically(path, as_csv([columns, *rows]).encode(), "table of designs", ours=True)
+
+
+Beside = dict[float, Sequence[Followed]]
+"""Goals beside a design by the offset of one coordinate."""
+
+ROUNDING = 1e-11  # of goals: differs between runs with the same steps
+DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """At one design: `gradient` (r, n) of goals by coordinates of the unit cube; its `error`, estimated.
+
+    Coordinates of catalogs have NaN, and those without a design beside that completes. `kinks`: peaks that others
+    overtake beside the design, in words.
+    """
+
+    gradient: Array
+    error: Array
+    kinks: tuple[str, ...] = ()
+
+
+@dataclass
+class Differentiation:
+    """Gradients in one search; `tolerance` of its runs.
+
+    `repeats`: whether designs beside take the steps of the base again, where they can: until differences so made turn
+    out to be none. `curvature` (r, n) holds the second derivatives that the last central pairs gave, NaN before.
+    """
+
+    evaluations: Evaluations
+    tolerance: float
+    repeats: bool = True
+    curvature: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = len(self.evaluations.problem.goals), len(self.evaluations.space.variables)
+        self.curvature = np.full(shape, np.nan)
+        self._tried = False
+
+    def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
+        """At a design that completed; `judged`: with an estimate of the error by further runs."""
+        wanted = [j for j, variable in enumerate(self.evaluations.space.variables) if not variable.is_catalogue]
+        if self.repeats and base.again is not None and wanted:
+            found = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
+            self._tried = True
+            if self.repeats:
+                return found
+        return self._by_own_steps(base, wanted, pairs=judged or bool(np.isnan(self.curvature[:, wanted]).any()))
+
+    def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], *, judged: bool) -> Slopes:
+        """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
+        step = {j: self._step(base, j, ROUNDING) for j in wanted}
+        samples = self._samples(base, {j: [_side(base, j, h) * h] for j, h in step.items()}, base.again)
+        own = np.array(base.values)
+        gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
+        for j, beside in samples.items():
+            _differentiate(own, j, beside, gradient, error, ROUNDING)
+        if judged and all(samples.values()):
+            left = self._left_of_sum(base, samples)
+            moved = sum(np.abs(gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
+            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(own)))
+            for j, beside in samples.items():
+                error[:, j] += left / abs(next(iter(beside)))
+        return Slopes(gradient, error, self._kinks(samples))
+
+    def _left_of_sum(self, base: Evaluated, samples: Mapping[int, Beside]) -> Array:
+        """(r) |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h; 0 if there is no run."""
+        back = {j: -x for j, beside in samples.items() for x in beside if 0.0 <= base.place[j] - x <= 1.0}
+        place = tuple(u + back.get(j, 0.0) for j, u in enumerate(base.place))
+        (whole,) = self.evaluations.beside(base, [place], base.again)
+        own = np.array(base.values)
+        if not whole:
+            return np.zeros_like(own)
+        left = np.array([one.value for one in whole]) - own
+        for j in back:
+            (values,) = samples[j].values()
+            left += np.array([one.value for one in values]) - own
+        return as_floats(np.abs(np.nan_to_num(left)))
+
+    def _by_own_steps(self, base: Evaluated, wanted: Sequence[int], *, pairs: bool) -> Slopes:
+        """With central `pairs`, or one design beside where curvatures are known."""
+        offsets = {j: self._offsets(base, j, pairs=pairs) for j in wanted}
+        samples = self._samples(base, offsets, None)
+        own = np.array(base.values)
+        gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
+        for j, beside in samples.items():
+            bent = np.nan_to_num(self.curvature[:, j])
+            curvature = _differentiate(own, j, beside, gradient, error, self.tolerance, bent)
+            self.curvature[:, j] = self.curvature[:, j] if curvature is None else curvature
+        return Slopes(gradient, error, self._kinks(samples))
+
+    def _samples(
+        self, base: Evaluated, offsets: Mapping[int, list[float]], again: Mapping[Key, Any] | None
+    ) -> dict[int, Beside]:
+        """By variable: the goals beside the base by offset; other offsets where a design there has failed."""
+        found: dict[int, Beside] = {j: {} for j in offsets}
+        for _ in range(2):
+            moved = [(j, offset) for j in offsets for offset in offsets[j]]
+            goals = self.evaluations.beside(base, [_moved(base.place, j, offset) for j, offset in moved], again)
+            for (j, offset), values in zip(moved, goals, strict=True):
+                if values and all(np.isfinite(one.value) for one in values):
+                    found[j][offset] = values
+            offsets = {j: [] if found[j] else _other_side(base, j, tried) for j, tried in offsets.items()}
+        return found
+
+    def _offsets(self, base: Evaluated, j: int, *, pairs: bool) -> list[float]:
+        """Within the bounds: forward where there is room, with the other of a pair on the far side or twice as far."""
+        u, h = base.place[j], self._step(base, j, self.tolerance)
+        x = _side(base, j, h) * h
+        if not pairs:
+            return [x]
+        return [h, -h] if u - h >= 0.0 and u + h <= 1.0 else [x, 2.0 * x]
+
+    def _step(self, base: Evaluated, j: int, noise: float) -> float:
+        return self.evaluations.space.variables[j].step(base.place[j], 2.0 * float(np.sqrt(noise)))
+
+    def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:
+        goals = self.evaluations.problem.goals
+        found = [
+            f"{goal.text}: close to this design another peak is the largest, {one.elsewhere}"
+            for beside in samples.values()
+            for values in beside.values()
+            for goal, one in zip(goals, values, strict=True)
+            if one.elsewhere
+        ]
+        return tuple(dict.fromkeys(found))
+
+
+def _differentiate(
+    own: Array, j: int, beside: Beside, gradient: Array, error: Array, noise: float, bent: Array | float = 0.0
+) -> Array | None:
+    """Fill column j; NaN stays where no design beside completed. The curvature (r), by pairs.
+
+    `own` (r): values at the design itself.
+    `bent`: the curvature that is known before, of which one-sided differences are freed.
+    """
+    if not beside:
+        return None
+    x = np.array([0.0, *beside])
+    f = np.array([own, *([one.value for one in values] for values in beside.values())])  # (x, goals)
+    h = float(np.abs(x).min(where=x != 0.0, initial=np.inf))
+    slope, uncertain = weights(x) @ (f - f[0]), noise * np.abs(f).max(axis=0) / h
+    curvature = None
+    if x.size == 3:
+        curvature = 2.0 * ((f[1] - f[0]) / x[1] - (f[2] - f[0]) / x[2]) / (x[1] - x[2])
+    else:
+        slope, uncertain = slope - 0.5 * bent * x[1], uncertain + np.abs(0.5 * bent * x[1])
+    gradient[:, j], error[:, j] = slope, uncertain
+    return curvature
+
+
+def _side(base: Evaluated, j: int, h: float) -> float:
+    return 1.0 if base.place[j] + h <= 1.0 else -1.0
+
+
+def _other_side(base: Evaluated, j: int, tried: Sequence[float]) -> list[float]:
+    u = base.place[j]
+    return [-offset for offset in tried if 0.0 <= u - offset <= 1.0 and -offset not in tried]
+
+
+def _moved(place: Place, j: int, offset: float) -> Place:
+    return (*place[:j], place[j] + offset, *place[j + 1 :])
+
+
+ACTIVE = 1e-4  # of a limit, or of a number's range: what is nearer counts as reached
+CLOSED = 1e-2  # of the gradient that an optimum may have: room that limits may have there, in the objective
+
+
+@dataclass(frozen=True)
+class Optimality:
+    """At one design, in the scaled problem.
+
+    Attributes:
+        limits: (m) multipliers λ of limits; NaN of those that are not reached.
+        bounds: (n) multipliers μ of bounds, of lower ones negative; NaN where a number is between its bounds.
+        residual: the largest entry of the gradient of the Lagrangian: the part of the objective that the range of one
+            number would change if all were linear.
+        gradient_error: the largest estimate of an error in the gradient of F, in the same measure.
+        gap: how much lower the objective would be, if all were linear, with no room left in limits that are reached.
+        violation: the largest excess, of its limit.
+        kinks: of peaks, in words.
+    """
+
+    limits: Array
+    bounds: Array
+    residual: float
+    gap: float
+    gradient_error: float
+    violation: float
+    kinks: tuple[str, ...]
+
+    def reached(self, aim: float) -> bool:
+        """Whether this is an optimum, with no larger gradient than `aim`."""
+        return self.residual <= aim and self.gap <= CLOSED * aim and self.violation <= KEPT
+
+
+def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> Optimality:
+    """Of a completed design, by the gradients there."""
+    problem, variables = evaluations.problem, evaluations.space.variables
+    factors = problem.factors(design.values)[:, None]
+    scaled, excess = slopes.gradient * factors, problem.scaled(design.values)[1:]
+    is_number = np.array([not variable.is_catalogue for variable in variables])
+    free = np.flatnonzero(~np.isnan(scaled).any(axis=0) & is_number)
+    place, unit = np.array(design.place), np.eye(len(variables))
+    reached = np.flatnonzero(excess > -ACTIVE)
+    low, high = (np.intersect1d(free, np.flatnonzero(near)) for near in (place < ACTIVE, place > 1.0 - ACTIVE))
+    gradients = np.vstack([scaled[1 + reached], -unit[low], unit[high]])[:, free]
+    found = nnls(gradients.T, -scaled[0, free])[0] if len(gradients) and free.size else np.zeros(len(gradients))
+    of_limits, of_low, of_high = np.split(found, np.cumsum([reached.size, low.size]))
+    limits, bounds = np.full(len(problem.limits), np.nan), np.full(place.size, np.nan)
+    limits[reached], bounds[low], bounds[high] = of_limits, -of_low, of_high
+    return Optimality(
+        limits, bounds, _largest(scaled[0, free] + found @ gradients),
+        gap=float(of_limits @ np.maximum(-excess[reached], 0.0)),
+        gradient_error=_largest((slopes.error * np.abs(factors))[0, free]),
+        violation=problem.violation(design.readings), kinks=slopes.kinks,
+    )  # fmt: skip
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(as_floats(values)).max(initial=0.0))

@@ -17,9 +17,8 @@ import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
 from ..common.arrays import Array, as_floats
-from .evaluations import Evaluated, Evaluations, SpentError
+from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, SpentError, optimality
 from .goals import KEPT
-from .optimality import Differentiation, Optimality, optimality
 from .variables import Place, Space
 
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum

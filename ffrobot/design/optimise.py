@@ -3,27 +3,36 @@
 Numbers are sought by SLSQP or trust-constr with gradients, from the scene's own values and further starts of a Latin
 hypercube; catalogs, and goals that are rough, by differential evolution or by trying every row. What is found last
 is judged by central differences: multipliers of limits and bounds, and how far the gradient is from theirs.
+
+Two goals against each other, the least of one for each value that the other may have (Pareto front), are found by the
+ε-constraint method (Haimes, Lasdon & Wismer 1971): the ends are the best designs for each goal alone; between them the
+second goal is limited, in equal ratios where both ends have one sign. Each search begins at its neighbor's design.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 from scipy.stats.qmc import LatinHypercube
 
+from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
+from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs, Runs, changes_for, may_repeat
-from .evaluations import Evaluations, SpentError, write_designs
-from .goals import read_problem, with_motors
-from .local_search import Local, best_of, combinations, evolve, rank, search_from
-from .optimality import Differentiation
-from .optimum_record import Optimum
+from .designs import Designs, Runs, changes_for, may_repeat, number
+from .evaluations import Differentiation, Evaluated, Evaluations, SpentError, write_designs
+from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
+from .goals import KEPT, Limit, Problem, parse_goal, read_problem, with_motors
+from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
+from .optimum_record import Optimum, parallel, states_of
+from .readings import Goal, Reading
 from .variables import Place, Space, read_space
 
 BEST = "best"  # folder of the best design's scene
@@ -156,3 +165,215 @@ def _optimum(
         scene if runs.kept else None, designs=runs.folder / "designs.csv" if runs.kept else None,
         tried=tuple(evaluations.searched),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """The best design with one limit of the second response.
+
+    Attributes:
+        point: values of the keys.
+        goal, against: of both responses there, in the `units` of the front.
+        price: ∂response/∂against along the front; NaN at its ends.
+        converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
+        message: why the search ended where it is not.
+        design: itself.
+    """
+
+    point: tuple[object, ...]
+    goal: float
+    against: float
+    price: float
+    converged: bool
+    feasible: bool
+    message: str
+    design: Evaluated
+
+
+@dataclass(frozen=True)
+class Front(Finding):
+    """A Pareto front: `points` from the least `goals[0]` to the least `goals[1]`, found with `runs` runs.
+
+    `tried` are the designs of all searches, each once. They have the responses of `problem`, its limits along the whole
+    curve included, and then the second response.
+    """
+
+    name = "front"
+    title = "Pareto front"
+
+    scene: Path
+    goals: tuple[str, str]
+    units: tuple[str, str]
+    keys: tuple[str, ...]
+    points: tuple[FrontPoint, ...]
+    runs: int
+    tolerance: float
+    space: Space
+    problem: Problem
+    tried: tuple[Evaluated, ...]
+
+    @property
+    def values(self) -> Array:
+        """(N, 2) of both responses."""
+        return np.array([(one.goal, one.against) for one in self.points])
+
+    @property
+    def shortfall(self) -> str:
+        """That some designs do not keep the limits."""
+        good = all(one.feasible for one in self.points)
+        return "" if good else "not all designs of the curve keep the limits: see the table"
+
+    def headline(self) -> str:
+        """How many designs, of which responses."""
+        return f"{self.goals[0]} against {self.goals[1]}: {len(self.points)} designs"
+
+    def sections(self) -> Iterator[Section]:
+        """A line for each design: both responses, what the second one costs, the keys."""
+        price = " per ".join(unit or "1" for unit in self.units)
+        heading = (*map(with_unit, self.goals, self.units), f"price ({price})", *self.keys, "")
+        yield Section(heading, self._rows())
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        for one in self.points:
+            cost = f"{-one.price:.4g}" if np.isfinite(one.price) else ""
+            yield (f"{one.goal:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
+
+    def remarks(self) -> Iterator[str]:
+        """How it was found, and what to mind."""
+        how = f"{len(self.points)} designs by slsqp, {self.runs} runs with a tolerance of at most {self.tolerance:g}"
+        yield f"how        {how}"
+        for one in self.points:
+            if one.message and not one.converged:
+                yield f"note       {self.goals[1]} {one.against:.6g}: {one.message}"
+
+    def csv_files(self) -> Iterator[CsvFile]:
+        """One line for each design; `price` is ∂response/∂against along the front."""
+        columns = [*self.goals, "price", *self.keys, "converged", "feasible", "message"]
+        yield CsvFile("front.csv", "table of the front", columns, self._numbers())
+
+    def _numbers(self) -> Iterator[list[object]]:
+        for one in self.points:
+            price = one.price if np.isfinite(one.price) else ""
+            states = ("yes" if state else "no" for state in (one.converged, one.feasible))
+            yield [one.goal, one.against, price, *one.point, *states, one.message]
+
+    def diagrams(self) -> list[Diagram]:
+        """The front and all tried designs."""
+        states = states_of(self.problem, self.tried, [one.design for one in self.points])
+        limits = [(limit.goal.text, limit) for limit in self.problem.limits]
+        goals = [(self.goals[0], None), *limits, (self.goals[1], None)]
+        return [self._curve(), parallel(self.space, goals, self.tried, states, "on the curve")]
+
+    def _curve(self) -> Points:
+        goal, against = self.values.T
+        price = [f"price {-p:.4g}" if p is not None else "" for p in numbers(one.price for one in self.points)]
+        return Points(
+            name="front", title=f"{self.goals[0]} against {self.goals[1]}",
+            x_label=with_unit(self.goals[1], self.units[1]), y_label=with_unit(self.goals[0], self.units[0]),
+            labels=tuple(price), x=floats(against), y=floats(goal), joined=True,
+            sure=tuple(bool(one.converged and one.feasible) for one in self.points),
+        )  # fmt: skip
+
+
+def _state(one: FrontPoint) -> str:
+    return "beyond a limit" if not one.feasible else "" if one.converged else "not converged"
+
+
+SAME = 1e-6  # of the second goal: ends of a front that are one design
+
+
+def find_front(
+    runner: Runs, vary: Sequence[str], minimise: str, against: str, points: int, subject_to: Sequence[str], runs: int,
+    tolerance: float,
+) -> Front:  # fmt: skip
+    """See `ffrobot.trade_off`."""
+    path, problem = runner.path, read_problem(minimise, None, subject_to)
+    space, other = read_space(path, vary), parse_goal(against, "--against")
+    if other.text == problem.objective.text:
+        raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
+    if catalogue := next((v for v in space.variables if v.is_catalogue), None):
+        raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
+    check_start(path, space, "slsqp")
+    fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
+    designs = Designs(runner, space.keys, space.own, fixed)
+    check_bounds(designs, space)
+    return _Searches(path, space, designs, problem, other, runs, tolerance, runner.watcher).front(points)
+
+
+@dataclass
+class _Searches:
+    """What the searches of a front share; `ran`: the folders of all their runs."""
+
+    path: Path
+    space: Space
+    designs: Designs
+    problem: Problem
+    against: Goal
+    most: int
+    tolerance: float
+    watcher: Watcher
+    ran: set[Path] = field(default_factory=set)
+    tried: dict[Path, Evaluated] = field(default_factory=dict)
+
+    def front(self, count: int) -> Front:
+        assert self.space.start_place is not None  # which `check_start` has seen to
+        first = self._least(self.problem, self.space.start_place, f"1 of {count}")
+        last = self._least(replace(self.problem, objective=self.against), first.design.place, f"{count} of {count}")
+        high, low = first.against, last.against
+        if high - low <= SAME * abs(high):
+            raise InputError(
+                f'--against: expected responses with different optima: where "{self.problem.objective.text}" is'
+                f' least, "{self.against.text}" is too'
+            )
+        found = [first]
+        for k, bound in enumerate(_between(high, low, count), start=2):
+            limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
+            found.append(self._least(replace(self.problem, limits=limits), found[-1].design.place, f"{k} of {count}"))
+        unit, other = (one.unit for one in self._both(first.design))
+        return Front(
+            self.path, (self.problem.objective.text, self.against.text), (unit, other),
+            tuple(map(".".join, self.space.keys)), (*found, last), len(self.ran), self.tolerance, self.space,
+            self.problem, tuple(map(self._with_both, self.tried.values())),
+        )  # fmt: skip
+
+    def _least(self, problem: Problem, start: Place, title: str) -> FrontPoint:
+        evaluations = Evaluations(self.designs, self.space, problem, self.most - len(self.ran))
+        differentiation = Differentiation(evaluations, self.tolerance)
+        try:
+            found = search_from(start, "slsqp", differentiation, lambda text: self.watcher.stage(f"{title}: {text}"))
+            spent = found.spent
+        except SpentError:
+            spent = True
+        if spent:
+            raise SolveError(f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed")
+        self.ran |= evaluations.folders
+        self.tried |= {one.design.folder: one for one in evaluations.searched}
+        if not found.best.completed:
+            raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
+        goal, against = (one.value for one in self._both(found.best))
+        return FrontPoint(
+            self.space.point(found.best.place), goal, against, self._price(found, evaluations.problem),
+            found.optimality is not None and found.optimality.reached(AIM),
+            evaluations.problem.violation(found.best.readings) <= KEPT, found.message, found.best,
+        )  # fmt: skip
+
+    def _price(self, found: Local, problem: Problem) -> float:
+        """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached, NaN at the ends."""
+        if found.optimality is None or not problem.limits or problem.limits[0].goal is not self.against:
+            return np.nan
+        scale = problem.limits[0].scale * problem.factors(found.best.values)[0]
+        return float(-np.nan_to_num(found.optimality.limits[0]) / scale)
+
+    def _with_both(self, one: Evaluated) -> Evaluated:
+        """With readings of all goals, those of the limits, and the second one."""
+        goals = (*self.problem.goals, self.against)
+        return replace(one, readings=one.design.read(goals)) if one.completed else one
+
+    def _both(self, one: Evaluated) -> tuple[Reading, ...]:
+        return one.design.read((self.problem.objective, self.against))
+
+
+def _between(high: float, low: float, count: int) -> Array:
+    """Limits from `high` down to `low` without these: in equal ratios, or steps where the signs differ."""
+    spaced = np.geomspace if low * high > 0.0 else np.linspace
+    return as_floats(spaced(high, low, count)[1:-1])

@@ -12,11 +12,10 @@ from ..common.arrays import Array, as_floats
 from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_goal
 from ..results.verdict import Verdict
 from .designs import number
-from .evaluations import Evaluated
+from .evaluations import Evaluated, Optimality
 from .finding import CsvFile, Finding, Section, failed_runs, numbers, with_unit
 from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
-from .optimality import Optimality
 from .variables import Space, Variable
 
 

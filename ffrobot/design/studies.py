@@ -16,7 +16,7 @@ from ..common.files import AnyPath
 
 if TYPE_CHECKING:
     from ..run.watcher import Watcher
-    from .front import Front
+    from .optimise import Front
     from .optimum_record import Optimum
     from .sensitivity import Sensitivity
     from .uncertainty import Uncertainty
@@ -213,7 +213,7 @@ def trade_off(
         )
     """
     from .designs import runs_of
-    from .front import find_front
+    from .optimise import find_front
 
     with runs_of("optimise", scene, output, **how) as runner:
         return find_front(runner, vary, minimise, against, points, subject_to, runs, tolerance)

@@ -24,8 +24,7 @@ from ..common.tables import as_csv
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, Value, Variation, grid, latin_hypercube, parse_variation, run_files
-from .runs import RESULTS, ROW, Row, Run, collected, finished_row, perform, perform_under_mpi
-from .workers import Workers
+from .runs import RESULTS, ROW, Row, Run, Workers, collected, finished_row, perform, perform_under_mpi
 
 PLAN = "plan.json"
 

@@ -159,10 +159,7 @@ class TimedAnalysis(Analysis):
 
 
 class IntegratedAnalysis(TimedAnalysis):
-    """`integrator`: see `mbs.run.integrators` for "auto".
-
-    `spectral_radius` is what a step of generalized-alpha leaves of vibrations far above one over its size.
-    """
+    """`integrator`: see `mbs.run.integrators` for "auto"."""
 
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     """Method of integration; "auto" chooses."""
@@ -208,10 +205,7 @@ class IntegratedAnalysis(TimedAnalysis):
 
 
 class ActuatedAnalysis(IntegratedAnalysis):
-    """A run forward in time, under what the earlier analysis `actuation` found.
-
-    Where `end` and `output_step` are not given they are those of that analysis, which `load_scene` fills in.
-    """
+    """A run forward in time, under what the earlier analysis `actuation` found."""
 
     end: Positive = 0.0
     """End time, s; by default that of `actuation`."""

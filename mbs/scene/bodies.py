@@ -129,12 +129,9 @@ class BodyKeys(Record):
     The default `name` in a table of a link's keys is that of the body. A link moves in the families of modes that its
     file has, and is rigid in the others.
 
-    `modes` of a flexible body is the number of its lowest modes, in planar scenes of those in the plane; the others are
-    represented by their static flexibility. Patches that are enough for all modes of the file serve these, others those
-    kept. "auto" takes as many as the tolerances of the analyses need; the default is all.
-
-    `pieces` is the number of segments of a beam link for large deflections, in 3D scenes in both planes, and twist;
-    "auto" chooses it. Results are those of the whole link, and geometric stiffening is on by default.
+    Modes beyond `modes` are represented by their static flexibility. Patches that are enough for all modes of the file
+    serve these, others those kept. Results of a link in `pieces` are those of the whole link; geometric stiffening is
+    then on by default.
     """
 
     name: Name

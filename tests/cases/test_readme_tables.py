@@ -14,7 +14,7 @@ from reference_scenes import NIGHTLY
 
 from ffrobot import Results
 from ffrobot.pictures.report.charts import runs
-from ffrobot.pictures.report.tables import placements_table
+from ffrobot.pictures.report.page import placements_table
 
 
 def peaks(*names):

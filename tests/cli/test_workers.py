@@ -15,8 +15,7 @@ import tomli_w
 from loops import wheel
 
 import ffrobot
-from ffrobot.sweep.runs import Run, perform
-from ffrobot.sweep.workers import Done, Workers
+from ffrobot.sweep.runs import Done, Run, Workers, perform
 
 CONTROLLER = '''
 """A motor's constant command, by functions that do much else to their process."""

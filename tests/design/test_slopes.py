@@ -9,9 +9,8 @@ from small_robots import SWING
 
 import ffrobot
 from ffrobot.design.designs import Designs, Runs, changes_for
-from ffrobot.design.evaluations import Evaluations
+from ffrobot.design.evaluations import Differentiation, Evaluations
 from ffrobot.design.goals import read_problem
-from ffrobot.design.optimality import Differentiation
 from ffrobot.design.variables import read_space
 
 OUTER, LOAD = "links.arm.geometry.section.outer", "payload.0.mass"

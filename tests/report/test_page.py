@@ -13,7 +13,7 @@ from ffrobot.pictures.motion import MovingBody
 from ffrobot.pictures.projection import COLORS
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import Chart, history_charts, runs
-from ffrobot.pictures.report.tables import peaks_table
+from ffrobot.pictures.report.page import peaks_table
 from ffrobot.pictures.shapes import Shape, thickened
 from ffrobot.results.file import Results
 

@@ -20,7 +20,7 @@ from ffrobot.pictures.motion import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, distinct_parts, kept_outputs, runs
 from ffrobot.pictures.report.mechanism import mechanism
-from ffrobot.pictures.report.tables import peaks_table
+from ffrobot.pictures.report.page import peaks_table
 from ffrobot.pictures.view.view import chosen_frames
 from ffrobot.results.file import Results
 

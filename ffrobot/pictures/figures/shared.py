@@ -35,11 +35,7 @@ Range = tuple[float, float]
 
 
 class Curve(Record):
-    """A curve: a dataset of the results file, or one column of it.
-
-    `data` reads, say, `inverse/joints/A/moment` or `forward/points/link2.tip/position[0]`. With `file`, a CSV file
-    whose first column is the time, its column `data` is drawn as separate points.
-    """
+    """A curve: a dataset of the results file, or one column of it."""
 
     data: str
     """Dataset of the results file, "inverse/joints/A/moment", or one column of it, "…/position[0]"; with `file`, the
