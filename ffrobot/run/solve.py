@@ -154,6 +154,7 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
             break
         interruption.watcher.stage(f'analysis "{analysis.name}"')
         began = time.perf_counter()
+        interruption.keeps, interruption.at_once = bool(results), True
         try:
             with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
                 run = analysis.run(_context(solution, analysis, results, interruption))
@@ -165,6 +166,12 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
             if not results:
                 raise
             return replace(solution, analyses=results, seconds=seconds, failure=error)
+        except KeyboardInterrupt:
+            if not results:
+                raise
+            break
+        finally:
+            interruption.at_once = False
         try:
             with of_file(solution.scene.path):
                 result = _result(solution, run, results)
@@ -206,7 +213,7 @@ def _context(
     return ActuatedContext(
         model=solution.model,
         outcomes={name: result.run for name, result in results.items()},
-        progress=lambda t: interruption.watcher.advance(t, analysis.last_time) and not interruption.requested,
+        progress=lambda t: interruption.advance(t, analysis.last_time),
         is_replayed=analysis.is_checked or any(other.source == analysis.name for other in others),
         earlier=solution.earlier.get(analysis.name),
         points=solution.points,

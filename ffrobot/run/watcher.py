@@ -26,11 +26,14 @@ class Watcher:
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
-    `watcher.stopping` is called at once.
+    `watcher.stopping` is called at once. While `at_once` is set, by analyses that have no outputs yet, the first one
+    interrupts as usual, too; `keeps` says whether analyses before them have results.
 
     Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
     Signals reach the main thread only: in any other the context does nothing.
     """
+
+    at_once = keeps = False
 
     def __init__(self, watcher: Watcher) -> None:
         self.watcher, self.requested = watcher, False
@@ -48,10 +51,21 @@ class Interruption:
         if self._is_main:
             self._restore()
 
+    def advance(self, t: float, end: float) -> bool:
+        """The watcher's, of an analysis that has outputs up to time t; False stops it."""
+        self.at_once = False
+        return self.watcher.advance(t, end) and not self.requested
+
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
         self._restore()
-        self.watcher.stopping(number)
+        if self.keeps or not self.at_once:
+            self.watcher.stopping(number)
+        if self.at_once:
+            handler = self._previous[number]
+            if callable(handler):
+                handler(number, frame)
+            raise KeyboardInterrupt
 
     def _restore(self) -> None:
         for number, handler in self._previous.items():

@@ -6,6 +6,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 
@@ -13,6 +14,10 @@ import h5py
 import numpy as np
 import pytest
 from loops import OWN_CONTROLLER
+
+import ffrobot
+from ffrobot.run.solve import solve_scene
+from ffrobot.run.watcher import Watcher
 
 SHORT = {"end = 1.0": "end = 0.02"}
 ENDLESS = {
@@ -260,3 +265,38 @@ controller = [{{ kind = "python", python = "{name}:controller" }}]
         assert not ran.exists()
     ffrobot.ok("solve", "scene.toml", "--allow-python", elsewhere, cwd=folder)
     assert ran.exists()
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_analysis_without_outputs_stops_at_once(kept):
+    """Newton's method on a chain of 150 soft joints: what came before is kept, if anything did."""
+    names = [f"b{k}" for k in range(150)]
+    rigid = {"mass": 1.0, "center": [0.05, 0.0], "inertia": 1e-3, "points": {"root": [0.0, 0.0], "tip": [0.1, 0.0]}}
+    ends = ["ground", *(f"{name}.tip" for name in names)]
+    drive = {"type": "revolute", "motor": True, "stiffness": 1e3, "rotor_inertia": 1e-4}
+    scene = ffrobot.make_scene(
+        name="chain",
+        gravity=[0.0, -9.81],
+        body=[{"name": name, "rigid": rigid} for name in names],
+        joint=[
+            {"name": f"j{name}", "between": [end, f"{name}.root"], **drive}
+            for end, name in zip(ends, names, strict=False)
+        ],
+        analysis=[
+            *([{"name": "fall", "kind": "forward", "end": 1e-9, "output_step": 1e-9}] if kept else []),
+            {"name": "sag", "kind": "static"},
+        ],
+    )
+
+    class Stops(Watcher):
+        def stage(self, title):
+            if "sag" in title:
+                threading.Timer(0.5, os.kill, [os.getpid(), signal.SIGINT]).start()
+
+    began = time.monotonic()
+    if kept:
+        assert list(solve_scene(scene, Stops()).analyses) == ["fall"]
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            solve_scene(scene, Stops())
+    assert time.monotonic() - began < 20.0
