@@ -195,7 +195,8 @@ class Value(Goal):
         parts = tuple(self.key.split("."))
         found = value_of(results.scene, parts, option=f'"{self.text}"')
         if isinstance(found, bool) or not isinstance(found, int | float):
-            raise InputError(f'"{self.text}": expected a number of the scene at {self.key}, found {found!r}')
+            what = "none" if found is None else repr(found)
+            raise InputError(f'"{self.text}": expected a number of the scene file at {self.key}, found {what}')
         return Reading(float(found))
 
 

@@ -211,7 +211,7 @@ OPTIMISERS = {"slsqp": _slsqp, "trust-constr": _trust_constr}
 
 
 KINK = "peaks switch here as the largest: --method differential-evolution does without gradients"
-BEYOND = "no design near this one keeps all limits: --starts searches from others"
+BEYOND = "no smaller excess was found near this one: --starts searches from others"
 
 
 @dataclass(frozen=True)
