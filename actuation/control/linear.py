@@ -55,8 +55,7 @@ class LinearModels(Details):
         return f"joint PID to start with: {gains.in_words()}, sampled every {1e3 * sample_time:g} ms or faster"
 
 
-def analyse(models: tuple[LinearModel, ...]) -> LinearModels:
-    """Modes, reach and zeros of the models."""
+def _analyse(models: tuple[LinearModel, ...]) -> LinearModels:
     first = models[0]
     acting = [name for name in first.input_names if not name.startswith("force/")]
     seen = [name for name in first.output_names if not name.startswith("modal/")]
@@ -124,7 +123,7 @@ def make_linear_models(context: ActuatedContext, analysis: Linear, about: Operat
         linearization.at(float(t), q, v, a) for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True)
     ]
     models = [state_space(one, voltages_at(free, one, context.patches)) for one in mechanisms]
-    return replace(analyse(tuple(models)), conditions=tuple(map(joint_conditions, mechanisms)))
+    return replace(_analyse(tuple(models)), conditions=tuple(map(joint_conditions, mechanisms)))
 
 
 def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:

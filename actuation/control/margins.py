@@ -74,7 +74,7 @@ class Margins:
 
 def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Feedback:
     """Joint PID controllers, which add up: −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋ and Σ T y."""
-    inputs = tuple(model.input_names[k] for k in motor_inputs(model))
+    inputs = tuple(model.input_names[k] for k in _motor_inputs(model))
     P, D, difference, integral = (np.zeros((len(inputs), len(model.output_names))) for _ in range(4))
     for record in records:
         for joint, motor in [(name, motor) for name in record.joints for motor in _motors_of(name, inputs)]:
@@ -100,8 +100,7 @@ def _motors_of(joint: str, motors: Sequence[str]) -> list[str]:
     return [single] if single in motors else [name for name in motors if name.startswith(f"{single} ")]
 
 
-def motor_inputs(model: LinearModel) -> list[int]:
-    """Columns of B that are motors'."""
+def _motor_inputs(model: LinearModel) -> list[int]:
     return [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]
 
 
@@ -228,7 +227,7 @@ def joint_inertia(model: LinearModel) -> Array | None:
     With compliant gears, the motor's angle and the joint's move as one.
     """
     names = model.state_names[: model.freedom]
-    motors = [model.input_names[k] for k in motor_inputs(model)]
+    motors = [model.input_names[k] for k in _motor_inputs(model)]
     T = np.zeros((model.freedom, len(motors)))
     for k, motor in enumerate(motors):
         for name in (motor, motor.replace("joint/", "motor/", 1)):
@@ -253,7 +252,7 @@ def suggested_gains(
     J = np.max(known, axis=0)
     lowest = min((locked_frequencies(model).min(initial=np.inf) for model in models), default=np.inf)
     omega = 2 * np.pi * min(FRACTION * lowest, 1 / (SAMPLES * T))
-    names = [models[0].input_names[k].removeprefix("joint/") for k in motor_inputs(models[0])]
+    names = [models[0].input_names[k].removeprefix("joint/") for k in _motor_inputs(models[0])]
     for _ in range(MOST_TIMES):
         P, D = ({n: _two_digits(v) for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
         record = JointPid(kind="joint-pid", proportional=P, derivative=D, side=side)
@@ -285,7 +284,7 @@ def light_roots(models: Sequence[LinearModel]) -> list[str]:
     found: dict[str, None] = {}
     for model in models:
         rigid = joint_inertia(model)
-        for k, column in enumerate(motor_inputs(model)):
+        for k, column in enumerate(_motor_inputs(model)):
             name = model.input_names[column]
             if rigid is None or name not in model.output_names:
                 continue

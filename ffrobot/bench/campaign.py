@@ -81,8 +81,7 @@ LIBRARIES = ("ffrobot", "numpy", "scipy", "h5py")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
-def about_machine() -> dict[str, object]:
-    """Processor, cores, operating system, compiler and flags of the core, versions, threads."""
+def _about_machine() -> dict[str, object]:
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -101,8 +100,7 @@ def load() -> float:
     return os.getloadavg()[0]
 
 
-def content_hash(text: str) -> str:
-    """SHA-256 of a text."""
+def _content_hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -149,7 +147,7 @@ class Campaign:
     def __init__(self, folder: Path, settings: Settings, display: Watcher, console: Console) -> None:
         check_folder(folder)
         self.folder, self.settings, self.display, self.console = folder, settings, display, console
-        self.machine = about_machine()
+        self.machine = _about_machine()
 
     def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> Swept | None:
         """Run time against error of a scene, and where its error comes from. Returns the sweep where asked for one."""
@@ -160,7 +158,7 @@ class Campaign:
             rows = measure_axes(scene, analysis, self.settings.budget, self.display)
             about = {"inputs": inputs_of(scene, {}), "analysis": analysis.name}
             self.keep("axes", rows, about, folder, f"{scene.name}, {analysis.name}: where errors come from")
-            self.drawn(draw_axes(rows, scene.name, folder))
+            self.drawn(_draw_axes(rows, scene.name, folder))
         return swept
 
     def work_precision(self, scene: Scene, name: str, folder: Path) -> Swept:
@@ -181,7 +179,7 @@ class Campaign:
     def keep(self, part: str, rows: Sequence[Row], about: Mapping[str, object], folder: Path, title: str) -> None:
         """Write and print the rows of a part; `about` goes into its JSON, beside machine and settings."""
         settings = asdict(self.settings)
-        inputs = content_hash(repr((settings, about.get("inputs"))))
+        inputs = _content_hash(repr((settings, about.get("inputs"))))
         record = {"machine": self.machine, "load": load(), "settings": settings, "inputs_hash": inputs, "title": title}
         self.drawn(write_record(folder, part, rows, record | dict(about)))
         columns, lines = as_text(rows, part)
@@ -196,7 +194,7 @@ class Campaign:
 
 def inputs_of(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:
     """Hashes of a scene and its modal bodies, for records."""
-    return {"name": scene.name, "scene": content_hash(scene.text), "bodies": dict(bodies)}
+    return {"name": scene.name, "scene": _content_hash(scene.text), "bodies": dict(bodies)}
 
 
 Rows = Sequence[Mapping[str, Any]]
@@ -221,8 +219,7 @@ def draw_work_precision(rows: Rows, peer: Rows, title: str, folder: Path) -> lis
     return written
 
 
-def draw_axes(rows: Rows, title: str, folder: Path) -> list[Path]:
-    """Error of each kind against run time, along the axes of mesh and modes."""
+def _draw_axes(rows: Rows, title: str, folder: Path) -> list[Path]:
     written: list[Path] = []
     for axis in ("mesh", "modes"):
         along = [row for row in rows if row["axis"] == axis]

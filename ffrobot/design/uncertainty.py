@@ -104,7 +104,7 @@ class Uncertainty(Finding):
         """Each response with what the keys do to it, then the bands."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             heading = (*self.statistics.named, "worst case")
-            yield Section(heading, [self._statistics_row(g)], line=goal_line(goal, reading))
+            yield Section(heading, [self._statistics_row(g)], line=_goal_line(goal, reading))
             yield self._parts(g)
         if self.bands:
             yield Section(BAND_HEADINGS, self._band_rows())
@@ -234,8 +234,7 @@ class Uncertainty(Finding):
         )  # fmt: skip
 
 
-def goal_line(goal: str, reading: Reading) -> str:
-    """With all nominal values."""
+def _goal_line(goal: str, reading: Reading) -> str:
     return f"{goal}: {reading.in_words()} with all parameters at nominal values"
 
 
@@ -276,8 +275,8 @@ def find_uncertainty(
     if by == "gradients" and indices:
         raise InputError("uncertainty: expected Sobol indices of samples, found --by gradients")
     names = list(dict.fromkeys(of))
-    goals = tuple(parse_goal(text) for text in names if not is_history(text))
-    curves = tuple(Curve(text, text) for text in names if is_history(text))
+    goals = tuple(parse_goal(text) for text in names if not _is_history(text))
+    curves = tuple(Curve(text, text) for text in names if _is_history(text))
     spreads = read_spreads(runs.path, spread)
     if not names or not spreads:
         raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
@@ -286,8 +285,7 @@ def find_uncertainty(
     return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
 
 
-def is_history(text: str) -> bool:
-    """Whether a history as a whole is meant, no goal: one word."""
+def _is_history(text: str) -> bool:
     return len(text.split()) == 1 and text.strip() != "mass"
 
 

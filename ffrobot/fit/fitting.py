@@ -88,8 +88,7 @@ class LinkTarget:
         return {_beside(self._path, output): with_values(read_text(self._path, "link file"), dict(changes))}
 
 
-def fitted_name(path: Path, more: str = "") -> Path:
-    """LINK.fitted.toml of LINK.toml, `more` before the ending."""
+def _fitted_name(path: Path, more: str = "") -> Path:
     return path.with_name(f"{path.stem}{more}.fitted.toml")
 
 
@@ -97,7 +96,7 @@ def _beside(path: Path, output: Path | None) -> Path:
     """`output`, or the fitted file of `path`. Raises `InputError` for one elsewhere."""
     if output is not None and output.parent.resolve() != path.parent.resolve():
         raise InputError(f"{output}: output: expected a file next to {path}, to which its file names are relative")
-    return output or fitted_name(path)
+    return output or _fitted_name(path)
 
 
 ANALYSIS = {"name": "fit", "kind": "linear"}
@@ -154,7 +153,7 @@ class RobotTarget:
         found = {}
         for body, values in of_links.items():
             old = self._links[body]
-            new = fitted_name(old, f".{body}")
+            new = _fitted_name(old, f".{body}")
             found[new] = with_values(read_text(old, "link file"), values)
             link = next(entry["link"] for entry in self._scene["body"] if entry["name"] == body)
             of_scene["body", body, "link"] = Path(link).with_name(new.name).as_posix()

@@ -38,8 +38,7 @@ class MovieOptions:
     scale: float | None = None
 
 
-def moving_analysis(results: Results, wanted: str | None) -> str:
-    """The analysis asked for, or the first that goes through time. Raises `InputError` where there is none."""
+def _moving_analysis(results: Results, wanted: str | None) -> str:
     moving = [name for name in results.analyses if len(results.time(name)) > 1]
     if wanted is None and moving:
         return moving[0]
@@ -86,16 +85,15 @@ def make_movie(results_path: Path, path: Path, options: MovieOptions | None, dra
     notes: list[str] = []
     check_movie(path)
     with Results(results_path) as results:
-        analysis = moving_analysis(results, options.analysis)
+        analysis = _moving_analysis(results, options.analysis)
         outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
-        image = gif_image if path.suffix.lower() == ".gif" else mp4_image
+        image = _gif_image if path.suffix.lower() == ".gif" else mp4_image
         frames = draw(results, analysis, outputs, shown, options.scale, notes)
         write_atomically(path, image(frames), "movie", make_folder=True)
     return list(dict.fromkeys(notes))
 
 
-def gif_image(frames: Iterable[Frame]) -> bytes:
-    """An endless GIF of frames, each with a palette of its own."""
+def _gif_image(frames: Iterable[Frame]) -> bytes:
     from io import BytesIO
 
     from PIL import Image

@@ -71,7 +71,7 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
     yield from named_tables("residual vibration", rows)
     analyses = solution.analyses.items()
     yield from named_tables("stress in", (row for name, result in analyses for row in _stresses(name, result)))
-    yield from control_tables(_details(solution))
+    yield from _control_tables(_details(solution))
 
 
 def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
@@ -84,7 +84,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         if isinstance(run.details, AroundPath) and run.details.inversion is not None:
             yield "motors only", f"{name}: {_inversion(run, run.details)}"
     if solution.mode_choice is not None:
-        yield "modes", chosen_modes([body.spatial for body in solution.bodies.values()], solution.mode_choice)
+        yield "modes", _chosen_modes([body.spatial for body in solution.bodies.values()], solution.mode_choice)
     if solution.divided:
         yield "pieces", ", ".join(f"{name}: {len(body.names)}" for name, body in solution.divided.items())
     yield from (("links", note) for note in solution.notes)
@@ -120,8 +120,7 @@ def _stresses(name: str, result: AnalysisResult) -> Iterator[tuple[str, Cells]]:
         yield name, {"of": body, "largest von Mises (MPa)": most, "at": place, "t (s)": at, "by": by}
 
 
-def chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
-    """How many modes were enough, and what leaving out the others costs and saves."""
+def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
     kept = [f"{body.name}: {modes_kept(body)}" for body in bodies if body.n_modes]
     lines = ["; ".join(kept)]
     for name, errors in choice.errors.items():
@@ -149,8 +148,7 @@ TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with 
 UNDAMPED = 1e-9  # ratios below are rounding
 
 
-def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
-    """A table of each kind that was found, from what analyses found by name."""
+def _control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
     loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
     yield from named_tables("closed loop", ((name, loop_cells(metrics)) for name, metrics in loops.items()))
     kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {

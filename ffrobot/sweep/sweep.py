@@ -129,7 +129,7 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
     before = len(sweep.earlier)
 
     def tabulate() -> None:
-        write_table(sweep.table, sweep.keys, [*sweep.earlier, *(rows[k] for k in sorted(rows))])
+        _write_table(sweep.table, sweep.keys, [*sweep.earlier, *(rows[k] for k in sorted(rows))])
 
     if rows or sweep.table.exists():
         tabulate()
@@ -261,8 +261,7 @@ SHOWN = 5  # quantities on the screen
 GAP = 2  # between columns
 
 
-def write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
-    """One line for each run: number, values of the keys, status, quantities, message."""
+def _write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
     quantities = _quantities(rows)
     lines: list[list[object]] = [["run", *keys, "status", *quantities, "message"]]
     for row in rows:

@@ -33,7 +33,7 @@ def user_function(function: object) -> TimeFunction:
         values = called(function, t, t)
         if values.shape not in ((), (3,)):
             raise InputError(
-                f"{name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
+                f"{_name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
                 f" shape {values.shape} at t = {t:g} s"
             )
         value, rate, acceleration = (float(values), np.nan, np.nan) if values.ndim == 0 else map(float, values)
@@ -50,18 +50,17 @@ def called(function: Callable[..., object], t: float, *arguments: object) -> Arr
     try:
         returned = function(*arguments)
     except Exception as error:
-        error.add_note(f"raised by {name_of(function)}, a function of the scene, at t = {t:g} s")
+        error.add_note(f"raised by {_name_of(function)}, a function of the scene, at t = {t:g} s")
         raise
     try:
         return np.asarray(returned, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"{name_of(function)}: expected numbers, found {shown(repr(returned))} at t = {t:g} s"
+            f"{_name_of(function)}: expected numbers, found {shown(repr(returned))} at t = {t:g} s"
         ) from None
 
 
-def name_of(function: object) -> str:
-    """What messages call a user's function."""
+def _name_of(function: object) -> str:
     return str(getattr(function, "__qualname__", function))
 
 
@@ -161,7 +160,7 @@ def _checked(
         values = called(function, t, t, np.array(position), np.array(velocity))
         if values.shape not in ((linear,), (all_of_them,)):
             raise InputError(
-                f"{name_of(function)}: expected a force ({', '.join(components[:linear])}), or"
+                f"{_name_of(function)}: expected a force ({', '.join(components[:linear])}), or"
                 f" ({', '.join(components)}), found an array of shape {values.shape} at t = {t:g} s"
             )
         return [*map(float, values), *[0.0] * (all_of_them - len(values))]

@@ -98,8 +98,7 @@ FAR, APART = 2.0, 10.0  # a center of mass from its frame: times the way to the 
 TURNS = 4 * np.pi  # rad: limits of joints that turn are within; a full turn in degrees is 360
 
 
-def remarks_on_scale(robot: Robot) -> Iterator[str]:
-    """What looks like another unit, one line each."""
+def _remarks_on_scale(robot: Robot) -> Iterator[str]:
     ways = {joint.name: float(np.linalg.norm(joint.origin.xyz)) for joint in robot.joints.values()}
     reach = sum(ways.values())
     if ways and max(ways.values()) > LONGEST:
@@ -212,7 +211,7 @@ def import_urdf(
             remarks += [about, *(f"{link.file_name}: {remark}" for remark in link.remarks)]
         payloads, about_rest = _compared(robot, links, folder, scene, keep_rest=keep_rest)
         keys = {**scene.keys, **({"payload": payloads} if payloads else {})}
-        remarks += [*about_rest, *about_meshes, *remarks_on_scale(robot)]
+        remarks += [*about_rest, *about_meshes, *_remarks_on_scale(robot)]
         files = {SCENE: _scene_text(urdf, keys, remarks)}
         files |= {link.file_name: _link_text(urdf, link) for link in links.values()}
         written = _write(folder, files, force=force)

@@ -7,7 +7,6 @@ import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -17,7 +16,20 @@ from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import of_quaternion, of_rpy, rpy_of
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_bytes
-from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink, three
+from .robot import (
+    TYPES,
+    Inertial,
+    MeshFile,
+    Mimic,
+    Numbers3,
+    Origin,
+    Primitive,
+    Robot,
+    Shape,
+    UrdfJoint,
+    UrdfLink,
+    three,
+)
 
 Element = ElementTree.Element
 
@@ -44,7 +56,7 @@ def read_urdf(path: Path) -> Robot:
         InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
     """
     try:
-        return robot_of(_root_element(read_bytes(path, "URDF file")))
+        return _robot_of(_root_element(read_bytes(path, "URDF file")))
     except InputError as error:
         if str(error).startswith(f"{path}:"):
             raise
@@ -82,8 +94,7 @@ def _parsed(content: bytes) -> Element:
     return builder.close()
 
 
-def robot_of(root: Element) -> Robot:
-    """The robot of a <robot> element."""
+def _robot_of(root: Element) -> Robot:
     links = [_link(each) for each in root.findall("link")]
     joints = [_joint(each) for each in root.findall("joint")]
     _check_once("link", (link.name for link in links))
@@ -162,11 +173,15 @@ def _left_of(element: Element) -> Iterator[tuple[tuple[str, ...], str]]:
         elif child.tag not in SHAPES:
             yield (child.tag,), f"<{shown(child.tag)}>"
         for shape in child.iterfind("geometry/*") if child.tag in SHAPES else ():
-            if shape.tag not in GEOMETRY:
+            if shape.tag not in ("mesh", *SIZES):
                 yield (child.tag, shape.tag), f"<{shown(shape.tag)}> in <{child.tag}>"
 
 
-GEOMETRY = ("mesh", "box", "cylinder", "capsule", "sphere")
+SIZES: Mapping[Shape, Mapping[str, int]] = {
+    "box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "capsule": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+}  # fmt: skip
+"""Attributes of shapes with so many numbers each."""
 
 
 def _check_once(kind: str, names: Iterable[str]) -> None:
@@ -218,17 +233,13 @@ def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primiti
             if geometry.tag == "mesh" and (filename := geometry.get("filename")):
                 scale = three(_numbers(geometry, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>"))
                 yield MeshFile(filename, scale, _origin(element, where))
-            elif geometry.tag == "box":
-                yield Primitive("box", _sizes(geometry, "size", 3), _origin(element, where))
-            elif geometry.tag in ("cylinder", "capsule"):
-                sizes = *_sizes(geometry, "radius"), *_sizes(geometry, "length")
-                shape: Literal["cylinder", "capsule"] = "capsule" if geometry.tag == "capsule" else "cylinder"
-                yield Primitive(shape, sizes, _origin(element, where))
-            elif geometry.tag == "sphere":
-                yield Primitive("sphere", _sizes(geometry, "radius"), _origin(element, where))
+            for shape, counts in SIZES.items():
+                if geometry.tag == shape:
+                    sizes = (size for key, count in counts.items() for size in _sizes(geometry, key, count))
+                    yield Primitive(shape, tuple(sizes), _origin(element, where))
 
 
-def _sizes(shape: Element, key: str, count: int = 1) -> tuple[float, ...]:
+def _sizes(shape: Element, key: str, count: int) -> tuple[float, ...]:
     """Sizes, m; NaN where there are none: a shape that only viewers need may be wrong."""
     try:
         sizes = tuple(map(float, shape.get(key, "").split()))

@@ -107,6 +107,9 @@ class MeshFile:
     origin: Origin
 
 
+Shape = Literal["box", "cylinder", "capsule", "sphere"]
+
+
 @dataclass(frozen=True)
 class Primitive:
     """A shape about its center: a box of `size` x, y, z; a cylinder along z (radius, length); a sphere (radius,). m.
@@ -114,7 +117,7 @@ class Primitive:
     A capsule (radius, length) is a cylinder with half a sphere on either end.
     """
 
-    shape: Literal["box", "cylinder", "capsule", "sphere"]
+    shape: Shape
     size: tuple[float, ...]
     origin: Origin
 

@@ -50,7 +50,7 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
 def _frames(
     results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
 ) -> Iterator[Frame]:
-    scene = moving_scene(results, analysis, outputs, scale, notes)
+    scene = _moving_scene(results, analysis, outputs, scale, notes)
     exaggerated = "" if scene.scale == 1.0 else f", deformations × {scene.scale:g}"
     picture = _Picture(results, f"{results.name}: {analysis}{exaggerated}", results.time(analysis)[outputs], scene)
     for k in shown:
@@ -81,8 +81,7 @@ class Scene:
     paths: Sequence[tuple[Target, Array]]
 
 
-def moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
-    """The scene at the outputs `frames`; `scale` as large as can be seen if None."""
+def _moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
     bodies = moving_bodies(results, analysis, frames)
     size = size_of(bodies)
     if scale is None:

@@ -100,8 +100,7 @@ def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: Figure
     axes.figure.colorbar(picture, ax=axes, label=figure.y_label)
 
 
-def draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
-    """Draw every curve of `figure` over its `x`, and the limits of the motor of `figure.joint`."""
+def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
     for k, curve in enumerate(figure.curves):
         x, values = curve_points(results, curve, figure.scale)
         axes.plot(x, values[:, 0], label=curve.label, **line_style(k, len(x), alone=len(figure.curves) == 1))
@@ -134,7 +133,7 @@ def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     legend(axes)
 
 
-DRAW = {"time": draw_time_history, "placement": draw_placement, "torque-speed": draw_torque_speed}
+DRAW = {"time": draw_time_history, "placement": draw_placement, "torque-speed": _draw_torque_speed}
 DRAW_WHOLE = {  # with axes of their own
     "path": draw_path,
     "configurations": draw_configurations,

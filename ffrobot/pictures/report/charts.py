@@ -120,7 +120,7 @@ class Chart:
         lines = [
             {
                 "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": limit, "y1": limit,
-                "line": limit_style(), "showlegend": limit == self.limits[0], "name": f"limits {texts}",
+                "line": _limit_style(), "showlegend": limit == self.limits[0], "name": f"limits {texts}",
                 "legendgroup": "limits", "visible": True if abs(limit) < FAR * self.top else "legendonly",
             }
             for limit in self.limits
@@ -159,8 +159,7 @@ def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
     return entry
 
 
-def limit_style() -> dict[str, Any]:
-    """Of lines that say what a motor or a patch can do."""
+def _limit_style() -> dict[str, Any]:
     return {"color": LIMIT, "dash": "dash", "width": 1.5}
 
 
@@ -222,7 +221,7 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
             for curve, look in _looks(record, source, looks, len(chart.traces)):
                 _add(chart, results, record, curve, source, look, DASHES[number % len(DASHES)])
             if record.joint is not None and len(limits := motor_limits(results, record)):
-                chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
+                chart.add(f"{source}: limits" if source else "limits", *limits.T, line=_limit_style())
     return list(charts.values())
 
 

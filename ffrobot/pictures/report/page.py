@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,14 +45,16 @@ def _named(first: str, rows: Iterable[tuple[str, Cells]]) -> Table:
     return Table(heading, [(name, *cells.values()) for name, cells in named])
 
 
-def analyses_table(runs: Sequence[Run], verdicts: Sequence[RunVerdict]) -> Table:
-    """One row for each run, as `ffrobot solve --verbose` has it, with more columns."""
+def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], runs: Sequence[Run]) -> Table:
+    return _named(first, ((run.label, cells) for run in runs for cells in cells_of(run.results, run.analysis)))
+
+
+def _analyses_table(runs: Sequence[Run], verdicts: Sequence[RunVerdict]) -> Table:
     pairs = zip(runs, verdicts, strict=True)
     return _named("analysis", ((run.label, analysis_cells(run.results, one.verdict)) for run, one in pairs))
 
 
-def warnings_table(runs: Sequence[Run]) -> Table:
-    """Why results may be wrong, and what is worth knowing of right ones, a text in each row."""
+def _warnings_table(runs: Sequence[Run]) -> Table:
     rows = [
         (run.label, kind, text)
         for kind, attribute in (("warning", "warnings"), ("note", "notes"))
@@ -61,8 +64,7 @@ def warnings_table(runs: Sequence[Run]) -> Table:
     return Table(("analysis", "", "text"), rows)
 
 
-def bending_table(runs: Sequence[Run]) -> Table:
-    """How far the links bend in every run, and how wrong that makes it."""
+def _bending_table(runs: Sequence[Run]) -> Table:
     heading = ("analysis", "link", "deflection (% of length)", "rotation (rad)", "foreshortening (mm)",
                "change of stiffness (%)", "error of points (% of length)", "of moments (% of peak)")  # fmt: skip
     scaled = (("largest_deflection", 100), ("largest_rotation", 1), ("foreshortening", 1e3), ("stiffness_change", 100),
@@ -99,18 +101,6 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, float]]:
     for point in bending_points(results, analysis):
         deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
         yield f"deflection of {point}", millimeters(deflection), at
-
-
-def voltages_table(runs: Sequence[Run]) -> Table:
-    """What the patches of every link should give, and what they can."""
-    cells = ((run.label, of) for run in runs for of in voltage_cells(run.results, run.analysis))
-    return _named("voltages of", cells)
-
-
-def settling_table(runs: Sequence[Run]) -> Table:
-    """How far points are from their final position once all paths are over."""
-    cells = ((run.label, of) for run in runs for of in settling_cells(run.results, run.analysis))
-    return _named("residual vibration", cells)
 
 
 def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Table:
@@ -164,15 +154,13 @@ def verdicts(runs: Sequence[Run]) -> list[RunVerdict]:
     return [RunVerdict(run.label, run.results.verdict[run.analysis]) for run in runs]
 
 
-def loops_table(runs: Sequence[Run]) -> Table:
-    """Closed loops, one row each."""
+def _loops_table(runs: Sequence[Run]) -> Table:
     closed = (run for run in runs if run.results.has(f"{run.analysis}/control/commands"))
     metrics = ((run.label, run.results.attributes(f"{run.analysis}/control")) for run in closed)
     return _named("closed loop", ((label, loop_cells(read_metrics(about))) for label, about in metrics))
 
 
-def zeros_table(runs: Sequence[Run]) -> Table:
-    """How the paths of motors-only analyses were inverted, and the zeros nearest to instability."""
+def _zeros_table(runs: Sequence[Run]) -> Table:
     rows = []
     for run in runs:
         group = f"{run.analysis}/zero_dynamics"
@@ -204,14 +192,14 @@ def placements_table(runs: Sequence[Run]) -> Table:
 
 
 TABLES: Mapping[str, Callable[[Sequence[Run]], Table]] = {
-    "loops": loops_table,
-    "zeros": zeros_table,
+    "loops": _loops_table,
+    "zeros": _zeros_table,
     "placements": placements_table,
-    "warnings": warnings_table,
-    "bending": bending_table,
+    "warnings": _warnings_table,
+    "bending": _bending_table,
     "peaks": peaks_table,
-    "voltages": voltages_table,
-    "settling": settling_table,
+    "voltages": partial(_of_cells, "voltages of", voltage_cells),
+    "settling": partial(_of_cells, "residual vibration", settling_cells),
 }
 """What the page calls them."""
 
@@ -284,7 +272,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "modes_3d": _script_data(shapes),
         "histories": folded(histories),
         "modes": modes,
-        "analyses": analyses_table(all_runs, answers),
+        "analyses": _analyses_table(all_runs, answers),
         "verdicts": answers,
         **{name: table(all_runs) for name, table in TABLES.items()},
         "notes": notes,

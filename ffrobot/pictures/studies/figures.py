@@ -29,15 +29,15 @@ def write_diagrams(diagrams: Sequence[Diagram], folder: Path) -> list[Path]:
 def _draw(diagram: Diagram) -> Figure:
     match diagram:
         case Bars():
-            return draw_bars(diagram)
+            return _draw_bars(diagram)
         case Parallel():
-            return draw_parallel(diagram)
+            return _draw_parallel(diagram)
         case Band():
-            return draw_band(diagram)
+            return _draw_band(diagram)
         case Progress():
-            return draw_progress(diagram)
+            return _draw_progress(diagram)
         case Points():
-            return draw_points(diagram)
+            return _draw_points(diagram)
 
 
 MOST = 15  # the largest
@@ -45,8 +45,7 @@ WIDTH, BAR, REST = 5.0, 0.22, 0.8  # inches: of the figure, of a bar, of title a
 ROOM = 0.2  # of the axis, beside the longest bars: for their numbers
 
 
-def draw_bars(diagram: Bars) -> Figure:
-    """The first labels, on top the first of all."""
+def _draw_bars(diagram: Bars) -> Figure:
     labels, count = diagram.labels[:MOST], len(diagram.series)
     rows = max(1, len(labels)) * (1 if count == 1 else 0.8 * count)
     picture = Figure(figsize=(WIDTH, REST + BAR * (rows + (count > 1))), layout="constrained")
@@ -88,8 +87,7 @@ def _number(value: float | None, sign: str) -> str:
     return "none" if value is None else f"{value:{sign}.3g}".replace("-", "−") if value else "0"
 
 
-def draw_band(band: Band) -> Figure:
-    """The worst case behind the band, the median, and the history with all parameters at nominal values."""
+def _draw_band(band: Band) -> Figure:
     figure, axes = new_axes(band.title)
     axes.fill_between(
         band.time, band.lowest, band.highest, color=COLORS[5], alpha=0.3, linewidth=0.0, label=band.worst_label
@@ -104,8 +102,7 @@ def draw_band(band: Band) -> Figure:
     return figure
 
 
-def draw_progress(diagram: Progress) -> Figure:
-    """A mark for each design, by its state, and the best so far as a line; of failed ones at the lower edge."""
+def _draw_progress(diagram: Progress) -> Figure:
     figure, axes = new_axes(diagram.title)
     number = np.arange(len(diagram.values))
     values = _numbers(diagram.values)
@@ -132,8 +129,7 @@ def _numbers(values: tuple[float | None, ...]) -> Array:
     return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
-def draw_points(diagram: Points) -> Figure:
-    """Points, joined by a line if so; those that are not sure hollow."""
+def _draw_points(diagram: Points) -> Figure:
     figure, axes = new_axes(diagram.title)
     x, y = np.array(diagram.x), np.array(diagram.y)
     sure = np.array(diagram.sure or (True,) * len(x), dtype=bool)
@@ -151,8 +147,7 @@ LETTERS, LINE = 18, 9  # of a name, in a line; points that a line takes
 FAINT = 0.35  # opacity of many lines
 
 
-def draw_parallel(diagram: Parallel) -> Figure:
-    """Axes side by side."""
+def _draw_parallel(diagram: Parallel) -> Figure:
     count = len(diagram.axes)
     figure = Figure(figsize=(max(3.5, AXIS_WIDTH * (count + 0.3)), HEIGHT), layout="constrained")
     axes = figure.subplots()
