@@ -151,11 +151,8 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
             columns, modes = modal_columns(setup, name, link.own.shape[1]), link.own[:m]
         G[np.ix_(setup.patch_places(name), columns)] = damping @ modes
         bandwidth = max(bandwidth, float(link.omega[m - 1]))
-    return (
-        LinearFeedback(setup, None, G, bandwidth=bandwidth)
-        if record.sensor == "pzt"
-        else LinearFeedback(setup, G, bandwidth=bandwidth)
-    )
+    P, D = (None, G) if record.sensor == "pzt" else (G, None)
+    return LinearFeedback(setup, P, D, bandwidth=bandwidth)
 
 
 def modal_columns(setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:

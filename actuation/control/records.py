@@ -33,7 +33,7 @@ from ...mbs.scene.loads import Load
 PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 
 
-class Sensor(Record):
+class Sensor(Referring):
     """A sensor of a joint coordinate, of the position x, y (z) of a point, or of patch voltages.
 
     Noise comes before rounding to the `resolution`. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
@@ -58,6 +58,11 @@ class Sensor(Record):
     capacitance: Positive | None = None
     """Capacitance of each patch, F; by default computed."""
 
+    refers_to = (
+        ("point", "body"), ("modal", "body"), ("modal", "flexible body"), ("pzt", "patches"), ("joint", "joint"),
+        ("motor", "elastic joint"),
+    )  # fmt: skip
+
     @model_validator(mode="after")
     def _consistent(self) -> Sensor:
         subject = one_of(self, ("joint", "motor", "point", "pzt", "modal"))
@@ -69,20 +74,6 @@ class Sensor(Record):
         if self.capacitance is not None and subject != "pzt":
             raise ValueError(f'expected the key "capacitance" only with "pzt", found it with "{subject}"')
         return self
-
-    def references(self) -> Iterator[Reference]:
-        """What is measured."""
-        if self.point is not None:
-            yield Reference("", self.point)
-        if self.modal is not None:
-            yield Reference("modal", self.modal)
-            yield Reference("modal", self.modal, "flexible body")
-        if self.pzt is not None:
-            yield Reference("pzt", self.pzt, "patches")
-        if self.joint is not None:
-            yield Reference("joint", self.joint, "joint")
-        if self.motor is not None:
-            yield Reference("motor", self.motor, "elastic joint")
 
 
 class ControllerRecord(Referring):

@@ -165,15 +165,15 @@ class MechanismKeys(Record):
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
-        records: list[tuple[str, AnyJoint | Tool | Trajectory | Load | Payload]] = [
-            (joint.label, joint) for joint in self.joint
-        ]
-        records += [(f'tool "{tool.name}"', tool) for tool in self.tool]
-        records += [(f'trajectory "{trajectory.name}"', trajectory) for trajectory in self.trajectory]
-        records += [(f"load no. {k}", load) for k, load in enumerate(self.load, 1)]
-        records += [(f"payload no. {k}", payload) for k, payload in enumerate(self.payload, 1)]
-        for label, record in records:
-            yield from under(label, record.references())
+        for joint in self.joint:
+            yield from under(joint.label, joint.references())
+        for tool in self.tool:
+            yield from under(f'tool "{tool.name}"', tool.references())
+        for path in self.trajectory:
+            yield from under(f'trajectory "{path.name}"', path.references())
+        for table in ("load", "payload"):
+            for k, record in enumerate(getattr(self, table), 1):
+                yield from under(f"{table} no. {k}", record.references())
         yield from (replace(found, key=f"initial.{found.key}") for found in self.initial.references())
 
 

@@ -1,4 +1,4 @@
-"""What PyVista draws of grids: `main` is a process of its own (`pictures.draw_pictures`)."""
+"""What PyVista draws of grids: `main` is a process of its own (`view.draw_pictures`)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyvista
+from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from ...common.arrays import Array
 from ..projection import AXIS_LENGTH, LINK, SPACE, TOOL_COLORS, TOOL_LENGTH, View
@@ -37,9 +40,7 @@ LINE, VERTEX = 3, 1  # VTK's numbers of cells
 
 
 def main() -> None:
-    """Draw the pictures (`pictures.Picture`) of the JSON list on the standard input."""
-    from vtkmodules.vtkCommonCore import vtkLogger
-
+    """Draw the pictures (`view.Picture`) of the JSON list on the standard input."""
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it tells of every way to OpenGL that it tries
     for job in json.loads(sys.stdin.buffer.read()):
         _draw_modes(job) if job["scale"] is None else _draw_motion(job)
@@ -47,8 +48,6 @@ def main() -> None:
 
 def _draw_motion(job: dict[str, Any]) -> None:
     """Bodies where they were, pale, and as exaggerated, colored; the same view and colors in all frames."""
-    import pyvista
-
     grids = [_exaggerated(job, step) for step in job["steps"]]
     everything = np.concatenate([shown.points for _, shown in grids])
     name = SHOWN[job["color"]][0]
@@ -101,8 +100,6 @@ def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
 
 
 def _draw_modes(job: dict[str, Any]) -> None:
-    import pyvista
-
     grid = _read(job["grid"], 0)
     names = sorted(name for name in grid.point_data if name.startswith("mode "))[:MODES]
     columns, rows = min(COLUMNS, len(names)), -(-len(names) // COLUMNS)
@@ -129,9 +126,6 @@ def round_above(value: float) -> float:
 
 
 def _read(path: str, step: int) -> Any:
-    import pyvista
-    from vtkmodules.vtkIOHDF import vtkHDFReader
-
     reader = vtkHDFReader()
     reader.SetFileName(path)
     reader.UpdateInformation()
@@ -170,8 +164,6 @@ def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: fl
 
     Joints are balls, or in planar scenes, with a `depth`, pins through the robot.
     """
-    import pyvista
-
     for at, *axes in job["joints"][k]:
         if depth:
             _add_bar(plotter, at, (0.0, 0.0, 1.0), PIN * size, depth, METAL)
@@ -188,15 +180,11 @@ def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: fl
 
 
 def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:
-    import pyvista
-
     bar = pyvista.Cylinder(at, along, radius=radius, height=length)
     plotter.add_mesh(bar, color=color, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
 
 
 def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) -> None:
-    import pyvista
-
     foot = (np.array(at) - 0.5 * STAND * size * np.array(up)).tolist()
     stand = pyvista.Cone(foot, up, height=STAND * size, radius=0.5 * STAND * size, resolution=4)
     plotter.add_mesh(stand, color=METAL, ambient=0.3)

@@ -21,7 +21,6 @@ from ...results.file import Results
 from ..figures.shared import file_name
 from ..motion import Marker, ground_places, joint_markers, moving_bodies, targets, tool_markers, visible_exaggeration
 from ..movie_file import Frame, MovieOptions, make_movie
-from . import drawing
 from .vtkhdf import Grid, modes_grid, results_grid, vtkhdf_image
 
 SECONDS = 300.0  # after which a machine that cannot draw is given up …
@@ -75,7 +74,7 @@ def draw_pictures(pictures: Sequence[Picture]) -> None:
             "pictures need PyVista, which is not installed: pip install pyvista (with 'numpy<2' next to Debian's)"
         )
     jobs = json.dumps([asdict(picture) for picture in pictures])
-    command = [sys.executable, "-c", f"from {drawing.__name__} import main; main()"]
+    command = [sys.executable, "-c", f"from {__package__}.drawing import main; main()"]
     seconds = SECONDS + SECONDS_A_FRAME * sum(len(picture.steps) for picture in pictures)
     try:
         done = subprocess.run(
