@@ -23,14 +23,13 @@ from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
-from .motion.read_motion import (
+from .motion.read_motion import path_text, read_motion
+from .motion.robot_motion import (
     RobotMotion,
     Side,
     csv_text,
     joint_trajectory_bag,
     joint_trajectory_text,
-    path_text,
-    read_motion,
     robot_motion,
 )
 from .urdf.export_urdf import scene_as_urdf
