@@ -80,8 +80,7 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
     if output is None:
         return
     draft = draft_link(part, file, output.stem, output.absolute().parent, density)
-    from ..pictures.figures.body_shape import draw_part
-    from ..pictures.figures.plot import write_figure
+    from ..pictures.figures.plot import draw_part, write_figure
 
     write_atomically(output, draft.encode(), "draft of a link file")
     for path in (output, *write_figure(draw_part(part, LISTED), output.parent, f"{output.stem}.faces", ("png",))):

@@ -10,7 +10,7 @@ import ffrobot
 from ffrobot.cli import cli
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
+from ffrobot.pictures.figures.plot import FOLD, _outline, draw_mesh, draw_modes
 
 # Faces of a unit cube, their corners in order around each.
 CUBE = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
