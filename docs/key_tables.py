@@ -50,7 +50,7 @@ UNSUPPORTED = (
         "sensors and controllers on spherical and free joints, which have no coordinates, and on all joints of a"
         " kinematic loop where none has a `rotor_inertia`",
         "sensors of points, or of other joints of the loop",
-        "ffrobot.actuation.control.signals",
+        "ffrobot.actuation.control.robot",
     ),
 )
 """What keys of scenes can say and ffrobot does not support, what to write instead, and the module that rejects it."""

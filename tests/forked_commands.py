@@ -21,7 +21,7 @@ LOADED = (
     "h5py", "scipy.linalg", "scipy.optimize", "scipy.interpolate", "matplotlib.backends.backend_agg",
     "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.resume",
     "ffrobot.fe_models.link", "ffrobot.present.details", "ffrobot.present.summary",
-    "ffrobot.pictures.figures.plot", "ffrobot.pictures.report", "ffrobot.present.console", "ffrobot.present.progress",
+    "ffrobot.pictures.figures.plot", "ffrobot.pictures.report", "ffrobot.present.console",
     "ffrobot.present.start_postures", "ffrobot.scene.plausibility", "ffrobot.results.judging", "ffrobot.sweep.sweep",
     "ffrobot.actuation.feasibility", "scipy.integrate", "scipy.signal", "email.message", "concurrent.futures.thread",
 )  # fmt: skip

@@ -12,7 +12,7 @@ from beam_links import beam_link, tube
 
 import ffrobot
 from ffrobot.cli import cli
-from ffrobot.present import progress
+from ffrobot.present import console
 
 LINK = beam_link(0.6, tube(0.02, 0.016), 10, name="arm", modes={"count": 3, "family": "in-plane-bending"})
 KEYS = {"time", "bodies/arm/angle", "points/arm.tip/position[0]", "joints/shoulder/moment", "energy/kinetic"}
@@ -240,8 +240,8 @@ def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
 
 
 def test_progress_in_a_log_is_a_line_now_and_then(capsys, monkeypatch):
-    monkeypatch.setattr(progress, "EVERY", 0.0)
-    with progress.Display() as display:
+    monkeypatch.setattr(console, "EVERY", 0.0)
+    with console.Display() as display:
         display.stage('analysis "inverse"')
         display.advance(0.25, 1.0)
     lines = capsys.readouterr().err.splitlines()

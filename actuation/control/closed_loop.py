@@ -46,8 +46,7 @@ from .margins import Feedback, lowest_frequency
 from .metrics import Followed, last_change, place_of_tip
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, SampledAnalysis, Sensor
 from .records import Controller as Record
-from .robot import Robot, input_names
-from .signals import Sensing, Signal, make_signals, merged
+from .robot import Robot, Sensing, Signal, input_names, make_signals, merged
 
 APART = 1e-6  # of a run, between two times of a spline
 

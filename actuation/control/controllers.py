@@ -33,8 +33,7 @@ from ...mbs.model.model import Model
 from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
 from .records import ComputedTorque, JointPid, ModalVelocity
-from .robot import RigidArm, Robot, estimate
-from .signals import Signal
+from .robot import RigidArm, Robot, Signal, estimate
 
 
 class Controller(Protocol):

@@ -68,8 +68,7 @@ def bench(
     """
     from ..bench.campaign import Campaign, Settings
     from ..bench.precision import INTEGRATORS, TOLERANCES
-    from ..present.console import summary_console
-    from ..present.progress import Display
+    from ..present.console import Display, summary_console
     from ..run.inputs import files_of
 
     protect(files_of(scene_file))

@@ -38,8 +38,7 @@ def _study(
 
     Raises `SolveError` where that is not what was asked for.
     """
-    from ..present.console import summary_console
-    from ..present.progress import Display
+    from ..present.console import Display, summary_console
     from ..run.inputs import files_of
 
     protect(files_of(scene_file))

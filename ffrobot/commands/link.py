@@ -46,7 +46,7 @@ def link(
         raise InputError("--unit, --density: expected --inspect with them, found none")
     from ..fe_models.link import make_link
     from ..fe_models.link_file import read_link
-    from ..present.progress import Display
+    from ..present.console import Display
     from ..run.inputs import files_of
     from ..scene.plausibility import remarks_on_link
 

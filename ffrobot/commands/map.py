@@ -59,9 +59,8 @@ def map_(
     """  # noqa: D301 (click wants the backspace itself)
     from ..map.map_file import TABLE, write_map
     from ..map.pose_map import make_map, plan_map
-    from ..present.console import summary_console
+    from ..present.console import Display, summary_console
     from ..present.pose_map import print_map
-    from ..present.progress import Display
     from ..run.inputs import files_of
 
     folder = output or scene_file.with_suffix(".map")

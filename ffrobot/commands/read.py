@@ -62,8 +62,7 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 @logging_options
 def pose(scene_file: Path) -> None:
     """Print the posture in which a scene starts, and the other ones that reach the same places (elbow, wrist)."""
-    from ..present.console import summary_console
-    from ..present.progress import Display
+    from ..present.console import Display, summary_console
     from ..present.start_postures import print_start
     from ..run.inputs import files_of
 

@@ -12,7 +12,7 @@ from ..present.logs import FILE, VERBOSE, logging_options, python_option
 from .options import protect
 
 if TYPE_CHECKING:
-    from ..present.progress import Display
+    from ..present.console import Display
     from ..run.solution import Solution
 
 
@@ -48,9 +48,8 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
 def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
-    from ..present.console import summary_console, summary_width
+    from ..present.console import Display, summary_console, summary_width
     from ..present.lines import error_budget, folded
-    from ..present.progress import Display
     from ..present.start_postures import chosen_posture
     from ..present.summary import summary_lines
     from ..results.file import Results

@@ -52,8 +52,7 @@ def sweep(
     Entries of lists of tables are selected by name or body. The same command resumes a stopped sweep. -j runs in
     parallel on one machine, mpirun on several.
     """  # noqa: D301 (click wants the backspace itself)
-    from ..present.console import summary_console
-    from ..present.progress import Display
+    from ..present.console import Display, summary_console
     from ..run.inputs import files_of
     from ..sweep import drop_results, forget_failures, missing_columns, plan_sweep, print_table, run_sweep, stale_rows
 

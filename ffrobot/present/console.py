@@ -1,4 +1,7 @@
-"""The standard output as a console; importing this loads nothing of an analysis."""
+"""The standard output as a console, and progress: a bar on a terminal, a line now and then in a pipe or a log.
+
+Importing this loads nothing of an analysis.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,17 @@ from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
+import logging
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from ..common.parallel import is_first
+from ..run.watcher import Watcher
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 
@@ -28,3 +42,66 @@ def plain_console(file: TextIO, width: int) -> Console:
 def summary_console() -> Console:
     """The standard output."""
     return plain_console(sys.stdout, summary_width())
+
+
+logger = logging.getLogger(__name__)
+
+EVERY = 30.0  # s between lines where the error stream is no terminal
+
+
+class Display(Watcher):
+    """Shows the stage, and a bar with the remaining time for analyses; cleared when done."""
+
+    def __init__(self) -> None:
+        self._progress: Progress | None = None
+        self._task: TaskID | None = None
+        self.signal = 0  # that has asked for an end
+        self._title = ""
+        self._began = self._last_shown = time.monotonic()
+
+    def __enter__(self) -> Display:
+        if sys.stderr.isatty() and is_first():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+            columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+            self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._progress.start()
+            self._progress.console.show_cursor()  # for a kill leaves it as it is
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if self._progress:
+            self._progress.stop()
+
+    def stage(self, title: str) -> None:
+        """Replace what is shown by `title`, with a pulse until a time is known."""
+        logger.info("%s", title)
+        self._title = title
+        if self._progress is None:
+            self._tell()
+            return
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+        self._task = self._progress.add_task(title, total=None)
+
+    def stopping(self, number: int) -> None:
+        """Say so at once: evaluating and writing what was computed may take a while."""
+        self.signal = number
+        # not by way of Python's streams, which the signal may have found in the middle of something
+        os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
+
+    def advance(self, t: float, end: float) -> bool:
+        """Move the bar."""
+        if self._progress is not None and self._task is not None:
+            self._progress.update(self._task, completed=t, total=end)
+        elif self._progress is None:
+            self._tell(f", {t:.4g} of {end:g}")
+        return True
+
+    def _tell(self, reached: str = "") -> None:
+        """A line on the error stream where the last one is long ago: nothing of short runs."""
+        now = time.monotonic()
+        if now - self._last_shown > EVERY and is_first():
+            self._last_shown = now
+            print(f"ffrobot: {self._title}{reached} ({now - self._began:.0f} s)", file=sys.stderr, flush=True)

@@ -11,8 +11,7 @@ import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 
-from ..actuation.catalog import Choice, JointTask, choices, read_catalog
-from ..actuation.motors import MotorFeasibility
+from ..actuation.motors import Choice, JointTask, MotorFeasibility, choices, read_catalog
 from ..common.errors import InputError, quoted
 from ..results.file import Results
 from .lines import plain_table, print_table

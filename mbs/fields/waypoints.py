@@ -16,7 +16,7 @@ from ...common.errors import InputError, quoted
 from ...common.tables import LARGEST, parse_csv, shown
 from ...common.toml_files import read_text
 from .._core import TimeFunction
-from .piecewise import Piecewise, superposed
+from .paths import Piecewise, superposed
 
 TIME = re.compile(r"_*(t|time|times?tamp|stamp|sec(?:ond)?s?)[ _.]*[(\[]?(s|sec|ms|us|µs|ns)?[)\]]?", re.IGNORECASE)
 """Names of the column of times, as programs write them, with or without a unit: t, time, time [ms], timestamp_ns."""

@@ -12,8 +12,7 @@ from ...common.arrays import Array
 from ...common.errors import quoted
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive, Quantity, Referring
-from ..fields.paths import SMOOTHNESS, Legs, Limits, impulses, path_of, shaped
-from ..fields.piecewise import Piecewise
+from ..fields.paths import SMOOTHNESS, Legs, Limits, Piecewise, impulses, path_of, shaped
 from ..fields.waypoints import Waypoints
 
 Place = Quantity | tuple[Quantity, ...]

@@ -12,7 +12,7 @@ from ...common.rotations import of_rpy, smallest_turn
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
-from ..fields.piecewise import Piecewise
+from ..fields.paths import Piecewise
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 from ..fields.waypoints import Waypoints
 from .motion_keys import LIMITS, MotionKeys, OfPlaces, Place

@@ -12,8 +12,7 @@ import ffrobot
 from ffrobot.actuation.context import ActuatedContext
 from ffrobot.actuation.control.linear_model import sampled
 from ffrobot.actuation.control.lqr import gains
-from ffrobot.actuation.control.robot import RigidArm
-from ffrobot.actuation.control.signals import volts_on_file
+from ffrobot.actuation.control.robot import RigidArm, volts_on_file
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed
 from ffrobot.mbs.model.model import without_paths

@@ -28,7 +28,7 @@ from ffrobot import FfrobotError
 from ffrobot.common.toml_files import toml_text
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.exchange.urdf.robot import FORBIDDEN
-from ffrobot.present.progress import Display
+from ffrobot.present.console import Display
 from ffrobot.results.write import write_results
 from ffrobot.run.solve import solve_scene
 

@@ -10,6 +10,7 @@ from ffrobot.mbs.fields.paths import (
     RESIDUAL,
     Legs,
     Limits,
+    Piecewise,
     impulses,
     law_in,
     law_within,
@@ -17,7 +18,6 @@ from ffrobot.mbs.fields.paths import (
     polynomial_law,
     shaped,
 )
-from ffrobot.mbs.fields.piecewise import Piecewise
 
 LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]
 

@@ -12,7 +12,7 @@ from ffrobot import InputError, Results
 from ffrobot.common.validation import validate
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.mbs.scene.bodies import Visual
-from ffrobot.pictures.view.vtkhdf import results_grid
+from ffrobot.pictures.view.view import results_grid
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
 MESH_AT, BALL_AT, HIP = [0.1, 0.2, -0.1], [0.0, 0.3, 0.0], np.array([0.0, 0.0, 0.5])

@@ -10,8 +10,7 @@ import click
 from ffrobot.bench import OF_A_SCENE
 from ffrobot.bench.campaign import Settings
 from ffrobot.bench.precision import INTEGRATORS, TOLERANCES
-from ffrobot.present.console import summary_console
-from ffrobot.present.progress import Display
+from ffrobot.present.console import Display, summary_console
 
 from .source_tree import PARTS, PEER, SourceTree
 
