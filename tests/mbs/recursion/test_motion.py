@@ -105,6 +105,20 @@ def test_dependent_rows_are_found_and_left_out():
     assert np.count_nonzero(lambda_) == 3
 
 
+def test_of_dependent_rows_the_largest_are_kept():
+    """A point held along x and z, and the sum of both a million times smaller, listed first: S of the kept is regular.
+
+    Multipliers of the small row would be a million times as large.
+    """
+    rng = np.random.default_rng(8)
+    directions = 1e-6 * np.array([1.0, 0, 1]), np.eye(3)[0], np.eye(3)[2], 1e-9 * np.eye(3)[1]
+    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), axis) for axis in directions]
+    bodies, bases = three_links(rng), ground(rng, 2)
+    mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
+    model = mechanism.model()
+    assert model.keep_independent_rows(*state_near_rest(rng, mechanism, model, 0.1, 1.0)) == [1, 2, 3]
+
+
 LAWS = {
     "turning a reference": OrientationLaw("rotation_vector", ("0.8*sin(t)", "t**2", "1-2*t"), (0.3, -2.0, 1.1)),
     "through no turn": OrientationLaw("rotation_vector", ("0", "t-0.7", "0"), (0.0, 0.0, 0.0)),

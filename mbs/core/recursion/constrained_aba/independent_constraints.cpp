@@ -1,6 +1,7 @@
 #include "core/recursion/constrained_aba/independent_constraints.h"
 
 #include "core/recursion/inverse/postures.h"
+#include "core/recursion/motion/natural_sizes.h"
 
 #include <algorithm>
 #include <numeric>
@@ -14,21 +15,27 @@ namespace {
 constexpr double dependent = 1e-10;
 
 // Nothing moves a constraint whose mobility, or squared gradient, is below this part of the largest: rounding leaves
-// 1e-30 of gradients, and units of constraints (m, mm, rad) make a difference of 1e6. Mobilities of constraints across
-// the plane of a mechanism are rounding of the elimination, which may be more.
+// 1e-30 of gradients. Mobilities of constraints across the plane of a mechanism are rounding of the elimination, which
+// may be more.
 constexpr double immobile = 1e-24;
 
+// A constraint that moves less than this part of the largest comes after those that it depends on: its multiplier would
+// be as much larger as theirs.
+constexpr double slight = 1e-6;
+
+// Both in natural sizes of constraints
 std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
   const Eigen::VectorXd own = S.diagonal();
-  const double least = immobile * own.maxCoeff(), smallest = immobile * squares.maxCoeff();
+  const double largest = own.maxCoeff(), smallest = immobile * squares.maxCoeff();
   std::vector<int> left(static_cast<std::size_t>(S.rows())), kept;
   std::iota(left.begin(), left.end(), 0);
-  while (!left.empty()) {
-    const auto part = [&](int i) { return own[i] > least && squares[i] > smallest ? S(i, i) / own[i] : 0; };
-    const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return part(i) < part(j); });
+  const auto depends = [&](int i) {
+    return !(S(i, i) > std::max(dependent * own[i], immobile * largest) && squares[i] > smallest);
+  };
+  const auto rank = [&](int i) { return S(i, i) / std::max(own[i], slight * largest); };
+  while (std::erase_if(left, depends), !left.empty()) {
+    const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return rank(i) < rank(j); });
     const int k = *best;
-    if (!(part(k) > dependent))
-      break;
     kept.push_back(k), left.erase(best);
     for (const int i : left)
       for (const int j : left)
@@ -49,14 +56,19 @@ std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const d
   w.keep(all);
   if (count == 0)
     return all;
-  const Eigen::VectorXd squares = gradients(m, q, w).rowwise().squaredNorm();
+  Eigen::VectorXd sizes = Eigen::VectorXd::Ones(count);
+  const double length = NaturalSizes(m).length();
+  for (Eigen::Index r = 0; r < count; ++r)
+    if (!is_moment(m, m.constraints[static_cast<std::size_t>(r)]))
+      sizes[r] = 1 / length;
+  const Eigen::VectorXd squares = (sizes.asDiagonal() * gradients(m, q, w)).rowwise().squaredNorm();
   const std::vector<double> target(m.constraints.size(), 0.0);
   std::vector<double> a(static_cast<std::size_t>(m.n_v));
   w.keeps_delassus = true;
   accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_delassus = false;
   const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(w.delassus.data(), count, count);
-  w.keep(pivots(S, squares));
+  w.keep(pivots(sizes.asDiagonal() * S * sizes.asDiagonal(), squares));
   return w.active;
 }
 
