@@ -18,6 +18,7 @@ import basix
 import numpy as np
 
 from ..common.arrays import Array, Booleans, Integers
+from ..common.errors import SolveError
 from ..common.structs import struct
 from .cells import HEXAHEDRON, KUHN, TETRAHEDRON
 from .compat import coordinate_element, geometry_nodes
@@ -157,15 +158,18 @@ def _lattice(tetrahedral: bool, affine: bool, degree: int) -> tuple[Array, Integ
 
 
 def _onto_plane(cells: _Cells, cell: Integers, X: Array, along: Array) -> Array:
-    """Move reference points `X` (q, 3) onto the plane in the directions `along` (q, 3), by Newton."""
-    for _ in range(4):
+    """Move reference points `X` (q, 3) onto the plane in the directions `along` (q, 3), by Newton.
+
+    Raises `SolveError` where a curved cell has no such point.
+    """
+    for _ in range(20):
         f, gradient = cells.distance(cell, X)
         slope = np.einsum("qi,qi->q", gradient, along)
         step = np.divide(f, slope, out=np.zeros_like(f), where=slope != 0)
         X = X - np.clip(step, -0.5, 0.5)[:, None] * along
         if np.all(np.abs(step) < 1e-8):  # the next would be rounding
-            break
-    return X
+            return X
+    raise SolveError("expected curved cells that a section cuts in points, found none in one: use smaller elements")
 
 
 def _integrate(cells: _Cells, triangles: _Triangles, degree: int) -> SectionQuadrature:

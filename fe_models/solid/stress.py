@@ -87,16 +87,18 @@ def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers,
 
 
 def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
-    """(q, 3) reference coordinates of `points` (q, 3) in `cells` (q,); far outside a curved cell anything."""
+    """(q, 3) reference coordinates of `points` (q, 3) in `cells` (q,); NaN where none are found, far outside cells."""
     element = coordinate_element(mesh)
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     X = np.full_like(points, 0.25)
+    step = np.zeros_like(X)
     for _ in range(NEWTON_STEPS if len(points) else 0):
         x = np.einsum("qv,qvi->qi", element.tabulate(0, X)[0, :, :, 0], corners)
         step = np.linalg.solve(jacobians(mesh, cells, X), (points - x)[:, :, None])[:, :, 0]
         X += np.clip(step, -1.0, 1.0)  # far from the cell a curved map may fold
         if np.abs(step).max(initial=0.0) < 1e-12:
-            break
+            return X
+    X[np.abs(step).max(axis=1) > INSIDE] = np.nan
     return X
 
 

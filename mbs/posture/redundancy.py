@@ -151,6 +151,11 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
     found = least_squares(
         moments, np.zeros((count - 2) * len(places)), diff_step=1e-6, ftol=1e-8, xtol=1e-6, max_nfev=20
     )
+    if not found.success:
+        raise SolveError(
+            f'{model.scene.path}: redundancy = "least-torque": expected the least within 20 iterations, found none:'
+            ' "least-motion" needs none, or prescribe a joint by a trajectory'
+        )
     return moved(found.x, 0)
 
 

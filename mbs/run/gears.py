@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, SolveError, quoted
 from ..joints.twist_spring import TwistSpring
 from ..model.frame_motors import turning_motors
 from ..model.gears import compliance, elastic_joints, with_compliance
@@ -212,7 +212,7 @@ def _read(curve: BSpline, time: Array) -> Array:
 def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
     """δ(t) with k(δ) + c δ̇ = `moment` at all outputs: a quintic spline without knots next to the ends.
 
-    By Newton, which ends where no output changes its part of the spring.
+    By Newton, which ends where no output changes its part of the spring. Raises `SolveError` where it does not.
     """
     from scipy.interpolate import BSpline, make_interp_spline
     from scipy.sparse import diags
@@ -230,8 +230,11 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
         found = spsolve(left, moment - gear.spring.moment(twist) + slope * twist)
         twist = values @ found
         if np.array_equal(gear.spring.slope(twist), slope):
-            break
-    return BSpline(knots, found, DEGREE)
+            return BSpline(knots, found, DEGREE)
+    raise SolveError(
+        f"{gear.where}: expected the twist of its gear within {MOST_STEPS} iterations, found none: smooth the path, or"
+        " refine output_step"
+    )
 
 
 def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:

@@ -9,6 +9,9 @@ from scipy.linalg import eigh
 from tables_3d import ORIGIN, revolute
 
 import ffrobot
+from ffrobot.common.errors import SolveError
+from ffrobot.mbs.joints.twist_spring import TwistSpring
+from ffrobot.mbs.run.gears import GearSpring, gear_motion
 
 J, N, K = 3e-3, 9.0, 500.0
 GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
@@ -283,3 +286,14 @@ def test_springs_at_rest_do_not_hold_the_steps():
     """Rounding of the angles at their ends once drove steps below any size: 100 000 led to 0.6 ms."""
     with solve(wrist_at_rest()) as found:
         assert found.attributes("lift")["status"] == "completed"
+
+
+def test_a_twist_that_newton_does_not_find_is_an_error():
+    """Moments without any smoothness on a spring that becomes 600 times as stiff: its parts go on to change."""
+    rng = np.random.default_rng(3)
+    slopes, knots = tuple(np.exp(rng.uniform(0, 9, 3))), tuple(np.cumsum(rng.uniform(0.001, 0.1, 2)))
+    time = np.linspace(0.0, 1.0, int(rng.integers(12, 40)))
+    gear = GearSpring(TwistSpring(slopes, knots), np.exp(rng.uniform(-3, 6)), 1.0, "scene.toml: joint.A: gear")
+    moment, still = rng.standard_normal(len(time)) * np.exp(rng.uniform(0, 8)), np.zeros((len(time), 3))
+    with pytest.raises(SolveError, match=r"joint\.A: gear: expected the twist of its gear within 50 iterations"):
+        gear_motion(gear, time, moment, still[:, 0], still)

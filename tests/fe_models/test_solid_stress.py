@@ -85,6 +85,12 @@ def test_curved_cells_are_inverted(curved):
     points = values @ x[space.dofmap.cell_dofs(0)]
     np.testing.assert_allclose(pulled_back(curved, np.zeros(50, dtype=int), points), reference, atol=1e-10)
     assert set(locate(curved, points, 1e-6)[0]) == set(range(50))
+    far = 5.0 * np.random.default_rng(2).standard_normal((200, 3))  # the map folds there: found, or known not to be
+    found = pulled_back(curved, np.zeros(200, dtype=int), far)
+    is_found = np.isfinite(found).all(axis=1)
+    values = space.sub(0).element.basix_element.tabulate(0, found[is_found])[0, :, :, 0]
+    np.testing.assert_allclose(values @ x[space.dofmap.cell_dofs(0)], far[is_found], atol=1e-4)
+    assert 0 < np.count_nonzero(is_found) < 200
 
 
 def test_point_next_to_a_curved_face(curved):
