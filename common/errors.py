@@ -58,7 +58,7 @@ def of_file(name: object) -> Iterator[None]:
         first = str(error).partition(":")[0]  # this file, or another one
         if str(error).startswith(str(name)) or str(name).startswith(f"{first}:") or Path(first).suffix:
             raise
-        raise type(error)(f"{name}: {error}") from None
+        raise type(error)(f"{name}: {error}") from error.__cause__
     except (LinAlgError, FloatingPointError) as error:
         raise SolveError(f"{name}: {error}: numbers that differ too much in size, or are too large or small") from error
 

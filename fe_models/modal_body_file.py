@@ -101,11 +101,11 @@ def _read(path: Path, reader: Callable[[h5py.File], Found]) -> Found:
     except InputError as error:
         raise InputError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
     except KeyError as error:
-        raise InputError(f"{path}: damaged modal body file: {error.args[0]}") from None
+        raise InputError(f"{path}: damaged modal body file: {error.args[0]}") from error
     except MemoryError:
         raise InputError(f"{path}: damaged modal body file: larger than memory") from None
     except (OSError, RuntimeError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from None
+        raise InputError(f"{path}: not a modal body file, or a damaged one: {error}") from error
 
 
 def is_modal_body_file(path: Path) -> bool:

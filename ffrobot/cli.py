@@ -101,7 +101,8 @@ def main() -> None:
             end_all()
             sys.exit(1)
         if is_first():
-            LOGGER.error("%s", message)
+            cause = error.__cause__  # such as what a reader met in a file: damage, or a fault of the program
+            LOGGER.error("%s", message, exc_info=None if isinstance(cause, FfrobotError) else cause)
             click.echo(f"ffrobot: {message}", err=True)
         without_output()
         sys.exit(error.exit_code if isinstance(error, FfrobotError) else 1)

@@ -43,7 +43,7 @@ def read_med(path: Path, where: str) -> RawMesh:
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     except Exception as error:  # whatever h5py and NumPy meet in a damaged file
-        raise InputError(f"{where}: expected a MED file, found one that cannot be read: {error!r}") from None
+        raise InputError(f"{where}: expected a MED file, found one that cannot be read: {error!r}") from error
 
 
 def _mesh(file: h5py.File) -> RawMesh:

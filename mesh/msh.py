@@ -43,7 +43,7 @@ def read_msh(path: Path, where: str) -> RawMesh:
         raise InputError(f"{where}: {error}") from None
     except Exception as error:  # gmsh raises nothing more special; of a damaged file, numbers that are none or too few
         reason = " ".join(str(error).split())
-        raise InputError(f"{where}: expected a mesh in gmsh's format, found a damaged one: {reason}") from None
+        raise InputError(f"{where}: expected a mesh in gmsh's format, found a damaged one: {reason}") from error
 
 
 def _by_gmsh(content: bytes) -> RawMesh:

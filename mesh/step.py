@@ -45,7 +45,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         except Exception as error:  # gmsh raises nothing more special
             raise InputError(
                 f"{where}: expected a STEP file, found one that OpenCASCADE cannot read: {error}"
-            ) from None
+            ) from error
         _check_volumes(text, where)
         # Of a damaged file OpenCASCADE makes a part of what is left, and says so.
         if complaints := [f"{what.lower()} ({count})" for what, count in _COMPLAINT.findall(printed())]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +22,8 @@ from .motion import MovingBody
 
 if TYPE_CHECKING:
     import trimesh
+
+logger = logging.getLogger(__name__)
 
 AMPLITUDE = 0.1  # of the length: the largest displacement of a mode as drawn
 
@@ -129,6 +132,7 @@ def visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array
         notes.append("bodies are drawn without their meshes, which need trimesh: pip install trimesh pycollada")
         return None
     except Exception as error:  # whatever a reader of damaged or missing files raises
+        logger.warning("mesh of %s", name, exc_info=error)
         notes.append(f"{name} is drawn without its mesh: {shown(str(error))}")
         return None
     first = np.cumsum([0, *(len(skin.vertices) for skin in skins[:-1])])

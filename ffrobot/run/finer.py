@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +33,8 @@ from ..scene.scene import Scene
 from .solution import FinerCheck, Solution
 from .watcher import Watcher
 
+logger = logging.getLogger(__name__)
+
 Prepare = Callable[[Scene, Watcher], Solution]
 """All that analyses of a scene start from."""
 
@@ -50,6 +53,8 @@ def with_finer_check(solution: Solution, prepare: Prepare, watcher: Watcher) -> 
             watcher.stage(f'check of "{name}" on finer links')
             results[name] = replace(results[name], check=_check(solution, results[name].run, finer, watcher))
     except Exception as error:
+        if failure is not None:  # which is raised
+            logger.error("check on finer links failed, too", exc_info=error)
         failure = failure or error
     return replace(solution, analyses=results, failure=failure)
 

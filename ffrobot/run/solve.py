@@ -133,7 +133,10 @@ def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Fea
             assert found.failure is not None
             raise found.failure
         (result,) = found.analyses.values()
-    except SolveError:
+    except SolveError as error:
+        numerical = FfrobotError | ArithmeticError | np.linalg.LinAlgError | None
+        if not isinstance(error.__cause__, numerical):  # a fault of the program, which the log has
+            raise
         return None
     return None if result.run.failed or result.actuation is None else result.actuation.feasibility
 

@@ -35,3 +35,15 @@ def test_a_log_that_cannot_be_written_ends_with_one_message(two_link_copy, ffrob
     assert done.returncode == 0
     assert done.stderr == "ffrobot: /dev/full: log ends here: No space left on device\n"
     assert (folder / "link1.h5").exists()
+
+
+def test_log_has_what_a_reader_met_in_a_file(ffrobot, two_link_copy):
+    """Damage or a fault of the program: the message is the same, the traceback tells."""
+    folder = two_link_copy()
+    (folder / "link1.h5").write_text("no HDF5", encoding="ascii")
+    scene = (folder / "scene.toml").read_text(encoding="utf-8").replace('link = "link1.toml"', 'modal = "link1.h5"')
+    (folder / "scene.toml").write_text(scene, encoding="utf-8")
+    done = ffrobot("solve", "scene.toml", "--log-file", "log", cwd=folder)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert re.search(r" ERROR .*link1\.h5.*\nTraceback(.*\n)+OSError", (folder / "log").read_text(encoding="utf-8"))

@@ -167,7 +167,7 @@ def _from_bag(path: Path) -> Waypoints:
     except Exception as error:  # whatever a reader of damaged files raises
         is_told = type(error).__module__.startswith("rosbags")
         reason = shown(str(error)) if is_told else "one that is damaged or not complete"
-        raise InputError(f"expected a bag of ROS, found {reason}") from None
+        raise InputError(f"expected a bag of ROS, found {reason}") from error
 
 
 def _of_bag(bag: Any) -> Waypoints:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -21,6 +22,8 @@ from .robot import Inertial, MeshFile, Origin, Primitive, Robot, UrdfLink, three
 
 if TYPE_CHECKING:
     import trimesh
+
+logger = logging.getLogger(__name__)
 
 NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh pycollada"
 
@@ -64,6 +67,7 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
         try:
             parts = [loaded_mesh(mesh, path) for mesh, path in zip(meshes, paths, strict=True) if path is not None]
         except Exception as error:  # whatever a reader of damaged or unknown files raises
+            logger.warning("mesh of %s", link.name, exc_info=error)
             remarks.append(f'link "{shown(link.name)}": mesh not read: {type(error).__name__}: {shown(str(error))}')
             continue
         found.append(_mass_of(link.name, trimesh.util.concatenate(parts), link.inertial))
@@ -259,6 +263,6 @@ def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[I
     except ModuleNotFoundError:
         raise InputError(f"{label}: masses of meshes need trimesh: pip install trimesh pycollada") from None
     except Exception as error:  # whatever a reader of damaged or unknown files raises
-        raise InputError(f"{label}: mesh not read: {type(error).__name__}: {shown(str(error))}") from None
+        raise InputError(f"{label}: mesh not read: {type(error).__name__}: {shown(str(error))}") from error
     sign = np.sign(mass)  # of a mesh whose faces look inward
     return Inertial(sign * mass, np.array(solid.center_mass), sign * inertia), is_hull
