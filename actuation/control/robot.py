@@ -24,7 +24,7 @@ from ...mbs.model.parts import ZERO
 from ...mbs.model.rows import rows_of_joint
 from ...mbs.model.system import MultibodySystem
 from ...mbs.model.tree import KinematicTree
-from ...mbs.posture.posture import MET, posture_search
+from ...mbs.posture.posture import MET, mobility, posture_search
 from ...mbs.posture.start import undeformed_posture
 from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.run.gears import with_motor_coordinates
@@ -198,9 +198,7 @@ def check_joint(model: Model, joint: str) -> None:
 
 def rigid_freedom(model: Model) -> int:
     """How many independent joint coordinates the mechanism with rigid links has where it starts."""
-    joints, q = model.tree.joint_columns, undeformed_posture(model).q
-    C_v = constraint_values(model, q[None], np.zeros(1))[1][0][model.loop_rows][:, joints]
-    return int(np.count_nonzero(joints)) - int(np.linalg.matrix_rank(C_v) if C_v.size else 0)
+    return mobility(model, undeformed_posture(model).q).freedom + len(model.tree.gears)
 
 
 class RigidArm:

@@ -2,6 +2,7 @@
 #include "core/recursion/constrained_aba/independent_constraints.h"
 #include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/inverse/observe.h"
+#include "core/recursion/motion/mobility.h"
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -237,6 +238,23 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
           "q (T, n_q) moved onto the rows at times (T), and what is left (T) in natural sizes: see "
           "mbs/core/recursion/inverse/postures.h.")
       .def(
+          "mobilities",
+          [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
+             const std::vector<bool> &is_path, double length, Index loop_rank) {
+            check_postures(model, scene, times, q);
+            check_size("is_path", static_cast<Index>(is_path.size()), model.rows());
+            const PostureWatch watch{{is_path.begin(), is_path.end()}, length};
+            std::vector<Mobility> found;
+            for (std::size_t i = 0; i < times.size(); ++i) {
+              turn_markers(scene, times[i], model.w);
+              found.push_back(
+                  mobility(model.mechanism, watch, q.row(static_cast<Index>(i)).data(), model.w, loop_rank));
+            }
+            return found;
+          },
+          "scene"_a, "times"_a, "q"_a, "is_path"_a, "length"_a, "loop_rank"_a,
+          "How joints can move with rigid links at times (T) and q (T, n_q); loop_rank -1: what loops have there.")
+      .def(
           "without_work",
           [](Model<Space> &model, const RowMajor &q, const RowMajor &forces) {
             check_size("forces", forces.rows(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
@@ -291,6 +309,14 @@ void bind_recursion(nb::module_ &m) {
       .def_ro("C_q", &ForcesAtRest::C_q, "(rows, n_v)")
       .def_ro("force", &ForcesAtRest::force, "N, the largest that a joint transmits, or a load.")
       .def_ro("moment", &ForcesAtRest::moment, "N m, the same.");
+  nb::class_<Mobility>(m, "Mobility", "Of rigid links; see mbs/core/recursion/motion/mobility.h.")
+      .def_ro("loop_rank", &Mobility::loop_rank)
+      .def_ro("free", &Mobility::free, "(joint coordinates, freedoms)")
+      .def_prop_ro("ratio", &Mobility::ratio)
+      .def_prop_ro("loop_ratio", &Mobility::loop_ratio)
+      .def_prop_ro("followed", &Mobility::followed)
+      .def_prop_ro("left", &Mobility::left, "(joint coordinates, m)")
+      .def_prop_ro("hardest", &Mobility::hardest, "(joint coordinates)");
   bind_body<Planar>(m, "PlanarBody"), bind_body<Spatial>(m, "SpatialBody");
   bind_outputs(bind_model<Planar>(m, "PlanarModel", "A mechanism in the plane, in joint coordinates."));
   bind_outputs(bind_model<Spatial>(m, "SpatialModel", "A mechanism in space, in joint coordinates."));

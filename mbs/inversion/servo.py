@@ -18,7 +18,7 @@ from ..model.frame_motors import turning_motors
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.rows import ConstraintRow
-from ..posture.posture import check_smooth, describe_posture, mobility, solve_posture
+from ..posture.posture import check_smooth, describe_posture, mobility, solve_posture, worst_posture
 from ..posture.prescribed import PrescribedMotion, following_motors
 from ..posture.reach import out_of_reach
 from ..posture.start import undeformed_posture
@@ -82,9 +82,9 @@ class Servo:
     @cached_property
     def doubt(self) -> str:
         """What to say of the worst posture along the path; "" where all are fine."""
-        ratios = [mobility(self.model, q).ratio for q in self.near[::EVERY]]
-        worst = EVERY * int(np.argmin(ratios))
-        return describe_posture(self.model, min(ratios), float(self.near_times[worst]), self.near[worst], is_end=False)
+        times, near = self.near_times[::EVERY], self.near[::EVERY]
+        ratio, worst = worst_posture(self.model, times, near)
+        return describe_posture(self.model, ratio, float(times[worst]), near[worst], is_end=False)
 
     def targets(self) -> Iterator[Target]:
         """What the path follows."""

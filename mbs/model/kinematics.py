@@ -93,6 +93,15 @@ class Kinematics:
             self._scene, as_list(times), q, more, search.scales, search.sizes, search.largest_step
         )
 
+    def mobilities(
+        self, q: Array, times: Array, is_path: Sequence[bool], length: float, loop_rank: int = -1
+    ) -> list[_core.Mobility]:
+        """How joints can move with rigid links at q (T, n_q) and `times` (T,), ways in terms of `length` (m).
+
+        Rows that are of no path close loops, of `loop_rank`; by default of the rank that they have there.
+        """
+        return self.core.mobilities(self._scene, as_list(times), q, is_path, length, loop_rank)
+
 
 class Places:
     """Where frames and sections of a tree are in states, and how they move."""

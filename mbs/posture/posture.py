@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, as_floats, null_space
+from ...common.arrays import Array, Booleans, as_floats
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
+from .. import _core
 from .._core import TimeFunction
 from ..model.kinematics import PostureSearch
 from ..model.known_motion import State
@@ -108,19 +109,39 @@ class Mobility:
     loop_rank: int  # how many rows of the loops are independent with rigid links
 
 
+def mobilities(model: Model, times: Array, q: Array, loop_rank: int = -1) -> list[_core.Mobility]:
+    """With rigid links and gears at `times` (T,) and q (T, n_q).
+
+    Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
+    `loop_rank` is their rank with straight ones.
+    """
+    is_path = [row.is_trajectory for row in model.rows]
+    return model.constraints.mobilities(q, times, is_path, robot_size(model), loop_rank)
+
+
+def row_ratios(model: Model, times: Array, q: Array, rank: int) -> Array:
+    """(T,) of the singular values of all rows, not zero by their `rank`: least over largest, as in `mobilities`."""
+    is_path = [False] * len(model.rows)
+    found = model.constraints.mobilities(q, times, is_path, robot_size(model), rank)
+    return np.array([at.loop_ratio for at in found])
+
+
 def mobility(model: Model, q: Array) -> Mobility:
     """Of the mechanism with rigid links and gears at q (n_q,)."""
-    J, is_loop = _scaled_rows(model, q), model.loop_rows
-    free = null_space(J[is_loop], SINGULAR, 1.0)
-    path = J[~is_loop] @ free
-    values = np.linalg.svd(path, compute_uv=False)
-    still_free = null_space(path, SINGULAR, 1.0)
-    moving = np.abs(free @ still_free).max(axis=1, initial=0.0) > MOVES
+    at = mobilities(model, np.zeros(1), q[None])[0]
+    freedom, left = at.free.shape[1] - len(model.tree.gears), _joints(model, _largest(at.left) > MOVES)
+    return Mobility(freedom, at.followed, at.ratio, left, at.loop_rank)
+
+
+def _largest(motions: Array) -> Array:
+    """Of motions (joint coordinates, m), the largest by joint coordinate."""
+    return as_floats(np.abs(motions).max(axis=1, initial=0.0))
+
+
+def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
+    """Names of joints by their coordinates (joint coordinates,)."""
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
-    ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
-    count, left = free.shape[1], tuple(dict.fromkeys(names[moving].tolist()))
-    followed = count - still_free.shape[1]
-    return Mobility(count - len(model.tree.gears), followed, ratio, left, J.shape[1] - count)
+    return tuple(dict.fromkeys(names[are].tolist()))
 
 
 def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
@@ -128,47 +149,31 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
 
     0 with rigid links: there nothing lets such rows move.
     """
-    J, is_loop = _scaled_rows(model, q), model.loop_rows
+    is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
         return 0, ()
-    free = null_space(J[is_loop], SINGULAR, 1.0)
-    moving = np.abs(free).max(axis=1, initial=0.0) > MOVES
-    rows = J[~is_loop]
-    is_locked = (np.abs(rows[:, moving]).max(axis=1, initial=0.0) <= MOVES) & (
-        np.abs(rows).max(axis=1, initial=0.0) > MOVES
-    )
-    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
-    return int(np.count_nonzero(is_locked)), tuple(dict.fromkeys(names[~moving].tolist()))
+    C_v = constraint_values(model, q[None], now)[1][0] * joint_scales(model) / row_sizes(model)[:, None]
+    moving = _largest(mobilities(model, now, q[None])[0].free) > MOVES
+    rows = C_v[~is_loop][:, model.tree.joint_columns]
+    is_locked = (_largest(rows[:, moving]) <= MOVES) & (_largest(rows) > MOVES)
+    return int(np.count_nonzero(is_locked)), _joints(model, ~moving)
 
 
-def worst_posture(model: Model, times: Array, q: Array, loop_rank: int) -> tuple[float, int]:
-    """The least ratio of `Mobility` at `times` (T,) and q (T, n_q), and at which of these.
-
-    Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
-    `loop_rank` is their rank with straight ones.
-    """
-    J, is_loop = _scaled_rows_at(model, times, q), model.loop_rows
-    free = np.linalg.svd(J[:, is_loop])[2][:, loop_rank:].swapaxes(1, 2)
-    values = np.linalg.svd(J[:, ~is_loop] @ free, compute_uv=False)
-    ratios = values[:, -1] / values[:, 0]
-    return float(ratios.min()), int(ratios.argmin())
+def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
+    """The least ratio of `Mobility` at `times` (T,) and q (T, n_q), and at which; `loop_rank` as in `mobilities`."""
+    ratios = [at.ratio for at in mobilities(model, times, q, loop_rank)]
+    return min(ratios), int(np.argmin(ratios))
 
 
-def describe_posture(
-    model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int | None = None
-) -> str:
+def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
     """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine.
 
-    Of one in which the run ends it is said to be singular. `loop_rank` as in `worst_posture`.
+    Of one in which the run ends it is said to be singular. `loop_rank` as in `mobilities`.
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
-    J, is_loop = _scaled_rows(model, q, t), model.loop_rows
-    loops = J[is_loop]
-    free = null_space(loops, SINGULAR, 1.0) if loop_rank is None else np.linalg.svd(loops)[2][loop_rank:].T
-    least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
-    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
-    moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
+    least = np.abs(mobilities(model, np.array([t]), q[None], loop_rank)[0].hardest)
+    moving = quoted(_joints(model, least > MOVING * least.max()))
     how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
 
@@ -176,10 +181,9 @@ def describe_posture(
 def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
     """Where loops pass a singular posture, in which branches meet, at `times` (T,) and q (T, n_q); "" if far from one.
 
-    `loop_rank` as in `worst_posture`.
+    `loop_rank` as in `mobilities`.
     """
-    values = np.linalg.svd(_scaled_rows_at(model, times, q)[:, model.loop_rows], compute_uv=False)
-    ratios = values[:, loop_rank - 1] / values[:, 0] if loop_rank else np.ones(len(times))
+    ratios = np.array([at.loop_ratio for at in mobilities(model, times, q, loop_rank)])
     worst = int(ratios.argmin())
     if not ratios[worst] < BRANCHING or worst in (0, len(times) - 1):
         return ""
@@ -200,7 +204,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
     if not loops.rows or before is None:
         return ""
     found = mobility(model, before)
-    ratio = _ratio(_scaled_rows(loops, q), found.loop_rank)
+    ratio = row_ratios(loops, np.array([t]), q[None], found.loop_rank)[0]
     if ratio < NEARLY_SINGULAR:
         return (
             f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
@@ -208,7 +212,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
             " and coupler in a line. No finite force determines the further motion. Avoid this posture or drive a joint"
             " instead"
         )
-    ratio = _ratio(_scaled_rows(model, q, t), found.loop_rank + found.followed)
+    ratio = row_ratios(model, np.array([t]), q[None], found.loop_rank + found.followed)[0]
     if ratio < NEARLY_SINGULAR:
         paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
         return (
@@ -217,23 +221,6 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
             " Keep clear of it, or drive a joint instead"
         )
     return ""
-
-
-def _ratio(J: Array, rank: int) -> float:
-    """Of the singular values that are not zero by its `rank`, the least over the largest."""
-    values = np.linalg.svd(J, compute_uv=False)
-    return float(values[rank - 1] / values[0]) if rank else 1.0
-
-
-def _scaled_rows(model: Model, q: Array, t: float = 0.0) -> Array:
-    """C_v (rows, joint coordinates) at q (n_q,) and time t, in radians and sizes of the robot."""
-    return _scaled_rows_at(model, np.array([t]), q[None])[0]
-
-
-def _scaled_rows_at(model: Model, times: Array, q: Array) -> Array:
-    """The same (T, rows, joint coordinates) at `times` (T,) and q (T, n_q)."""
-    C_v = constraint_values(model, q, times)[1]
-    return as_floats((C_v * joint_scales(model) / row_sizes(model)[:, None])[:, :, model.tree.joint_columns])
 
 
 def check_path(model: Model, q: Array, end: float) -> Iterator[str]:

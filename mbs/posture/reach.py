@@ -11,12 +11,12 @@ from ...common.arrays import Array, Booleans, Indices, as_floats
 from ...common.errors import InputError
 from ...common.toml_files import toml_line
 from ..fields.field_types import split_point
-from ..model.model import Model, constraint_values
+from ..model.model import Model
 from ..model.nodes import Node
 from ..scene.mechanism import MechanismKeys
 from ..scene.space import SPACES
 from ..scene.trajectories import Trajectory
-from .posture import joint_scales, row_sizes, solve_postures
+from .posture import row_ratios, solve_postures
 
 TURNING = ("revolute", "universal", "spherical", "weld")
 TRIES = 60
@@ -135,11 +135,8 @@ def regular_postures(model: Model, q: Array) -> Array:
 
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
     """(T,) whether joints follow all rows at `times` (T,) in the postures q (T, n_q)."""
-    joints = model.tree.joint_columns
-    scales = joint_scales(model)[joints]
-    J = constraint_values(model, q, times)[1][:, :, joints] * scales / row_sizes(model)[:, None]
-    values = np.linalg.svd(J, compute_uv=False)
-    return np.asarray(values[:, -1] > REGULAR * values[:, 0])
+    rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
+    return np.asarray(row_ratios(model, times, q, rank) > REGULAR)
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -18,7 +18,7 @@ from ffrobot.mbs.model.model import constraint_rates, constraint_values
 from ffrobot.mbs.model.nodes import Section
 from ffrobot.mbs.model.rows import ConstraintRow, coordinate_row
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.posture.posture import solve_postures
+from ffrobot.mbs.posture.posture import joint_scales, mobilities, row_sizes, solve_postures
 
 CLOSE = 1e-12
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -183,3 +183,31 @@ def test_postures_keep_to_loops(types):
     np.testing.assert_allclose(row_values(model, found[is_met], np.zeros(5)[is_met])[0], 0.0, atol=1e-11)
     for node in model.tree.nodes:
         np.testing.assert_array_equal(found[:, node.p_q], q[:, node.p_q])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mobility_is_that_of_numpys_gradients(seed):
+    """Ranks, freedoms and singular ratios of loops and of a path through them, by singular values of NumPy's C_v."""
+    rng = np.random.default_rng(seed)
+    tree = random_tree(rng, ("prismatic", "spherical", "revolute", "cylindrical", "universal", "revolute"), ("solid",),
+                       chain=True, loops=1)  # fmt: skip
+    plain, tables = as_scene(tree, turned=False)
+    model = tree_model(plain, tables)
+    last = len(model.tree.nodes) - 1
+    path = [ConstraintRow("path", "point", GROUND, Section(last, "tip", np.eye(3), np.zeros(3)), e, e,
+                          target=_core.TimeFunction.polynomial(np.array([-1.0, 1.0]), rng.standard_normal((1, 4))))
+            for e in np.eye(3)[:2]]  # fmt: skip
+    model, (q, _), times = replace(model, rows=(*model.rows, *path)), states_of(rng, model), np.array([0.0, 0.2, 0.5])
+    scaled = row_values(model, q, times)[1] * joint_scales(model) / row_sizes(model)[:, None]
+    for J, at in zip(scaled[:, :, model.tree.joint_columns], mobilities(model, times, q), strict=True):
+        _, of_loops, V = np.linalg.svd(J[model.loop_rows])
+        rank = np.count_nonzero(of_loops > 1e-6 * max(of_loops[0], 1.0))
+        free, followed = V[rank:].T, J[~model.loop_rows]
+        _, sizes, V = np.linalg.svd(followed @ free)
+        left = free @ V[2:].T
+        assert (at.loop_rank, at.followed) == (rank, 2)
+        np.testing.assert_allclose(at.loop_ratio, of_loops[rank - 1] / of_loops[0], rtol=1e-9)
+        np.testing.assert_allclose(at.ratio, sizes[-1] / sizes[0], rtol=1e-9)
+        np.testing.assert_allclose(at.free @ at.free.T, free @ free.T, atol=1e-9)
+        np.testing.assert_allclose(at.left @ at.left.T, left @ left.T, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(followed @ at.hardest), sizes[-1], rtol=1e-9)

@@ -26,7 +26,7 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
     : Phi_(std::move(Phi)), gain_(std::move(gain)), limit_(std::move(limit)), scale_(std::move(scale)) {
   const Index k = Phi_.cols();
   const MatrixXd A = W_sqrt * Phi_ * scale_.asDiagonal();
-  const VectorXd values = singular_values(A);
+  const VectorXd values = RightVectors(A).values;
   VectorXd sizes = VectorXd::Zero(k); // eigenvalues of A^T A, ascending
   sizes.tail(values.size()) = values.reverse().cwiseAbs2();
   const double largest = sizes[k - 1];

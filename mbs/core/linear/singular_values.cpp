@@ -6,17 +6,24 @@
 
 namespace ffrobot {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 
-Eigen::VectorXd singular_values(const MatrixXd &A) { return Eigen::JacobiSVD<MatrixXd>(A).singularValues(); }
-
-MatrixXd null_space(const MatrixXd &A, double dependent) {
-  if (A.rows() == 0)
-    return MatrixXd::Identity(A.cols(), A.cols());
+RightVectors::RightVectors(const MatrixXd &A) : V(MatrixXd::Identity(A.cols(), A.cols())) {
+  if (A.size() == 0)
+    return;
   const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullV);
-  const double least = dependent * std::max(svd.singularValues()[0], 1.0);
-  const Eigen::Index rank = (svd.singularValues().array() > least).count();
-  return svd.matrixV().rightCols(A.cols() - rank);
+  values = svd.singularValues(), V = svd.matrixV();
+}
+
+Index RightVectors::rank(double dependent) const {
+  return values.size() ? (values.array() > dependent * std::max(values[0], 1.0)).count() : 0;
+}
+
+double RightVectors::ratio(Index rank) const {
+  if (rank == 0)
+    return 1;
+  return rank <= values.size() && values[0] > 0 ? values[rank - 1] / values[0] : 0;
 }
 
 } // namespace ffrobot

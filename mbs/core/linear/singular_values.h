@@ -5,10 +5,18 @@
 
 namespace ffrobot {
 
-Eigen::VectorXd singular_values(const Eigen::MatrixXd &A); // descending; none without rows or columns
+// Singular values of A, descending, none without rows or columns, and its right singular vectors, square.
+struct RightVectors {
+  explicit RightVectors(const Eigen::MatrixXd &A);
 
-// Orthonormal columns that A takes to zero: singular values below `dependent` times the largest, which counts as 1 at
-// least, are zero.
-Eigen::MatrixXd null_space(const Eigen::MatrixXd &A, double dependent);
+  // How many values are above `dependent` times the largest, which counts as 1 at least
+  Eigen::Index rank(double dependent) const;
+  // Orthonormal columns that A takes to zero if its rank is that
+  Eigen::MatrixXd null_space(Eigen::Index rank) const { return V.rightCols(V.cols() - rank); }
+  double ratio(Eigen::Index rank) const; // of value no. `rank` to the first; 1 of rank 0
+
+  Eigen::VectorXd values;
+  Eigen::MatrixXd V;
+};
 
 } // namespace ffrobot

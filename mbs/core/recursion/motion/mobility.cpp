@@ -1,0 +1,78 @@
+#include "core/recursion/motion/mobility.h"
+
+#include "core/recursion/inverse/postures.h"
+#include "core/recursion/motion/natural_sizes.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double singular = 1e-6; // of the largest singular value: ranks of equations
+
+// Rates of constraints by the joints' velocities (constraints, joint coordinates), lengths in units of `length`
+template <class Space>
+MatrixXd gradients_by_joints(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
+  std::vector<int> joints, ways;
+  for (const Node<Space> &node : m.nodes)
+    for (int k = 0; k < node.shape.freedoms.count; ++k) {
+      if (node.shape.freedoms.component[k] < Space::linear)
+        ways.push_back(static_cast<int>(joints.size()));
+      joints.push_back(node.v + k);
+    }
+  MatrixXd J = gradients(m, q, w)(Eigen::all, joints);
+  J(Eigen::all, ways) *= length;
+  for (std::size_t r = 0; r < m.constraints.size(); ++r)
+    if (!is_moment(m, m.constraints[r]))
+      J.row(static_cast<Index>(r)) /= length;
+  return J;
+}
+
+MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path, bool path) {
+  std::vector<Index> chosen;
+  for (std::size_t r = 0; r < is_path.size(); ++r)
+    if ((is_path[r] != 0) == path)
+      chosen.push_back(static_cast<Index>(r));
+  return J(chosen, Eigen::all);
+}
+
+} // namespace
+
+double Mobility::determinant() const {
+  return loops.values.size() || rates.rows() != rates.cols() ? 0 : rates.determinant();
+}
+
+Index Mobility::followed() const { return path.rank(singular); }
+
+MatrixXd Mobility::left() const { return free * path.null_space(followed()); }
+
+VectorXd Mobility::hardest() const {
+  if (free.cols() == 0)
+    return VectorXd::Zero(free.rows());
+  return free * path.V.col(std::max<Index>(path.values.size(), 1) - 1);
+}
+
+template <class Space>
+Mobility mobility(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w,
+                  Index loop_rank) {
+  const MatrixXd J = gradients_by_joints(m, watch.length, q, w);
+  RightVectors loops(rows_of(J, watch.is_path, false));
+  const Index rank = loop_rank < 0 ? loops.rank(singular) : loop_rank;
+  MatrixXd free = loops.null_space(rank), rates = rows_of(J, watch.is_path, true) * free;
+  RightVectors path(rates);
+  return {std::move(loops), rank, std::move(free), std::move(rates), std::move(path)};
+}
+
+template Mobility mobility(const Mechanism<Planar> &, const PostureWatch &, const double *, Workspace<Planar, double> &,
+                           Index);
+template Mobility mobility(const Mechanism<Spatial> &, const PostureWatch &, const double *,
+                           Workspace<Spatial, double> &, Index);
+
+} // namespace ffrobot::recursion
