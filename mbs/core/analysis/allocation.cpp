@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace ffrobot {
 
@@ -18,7 +20,6 @@ constexpr double vanishing = 1e-12;      // eigenvalues of A^T A below this frac
 constexpr double ridge = 1e-9;           // of the smallest other one is added then: picks one of many solutions
 constexpr double smallest_ridge = 1e-13; // of the largest
 constexpr double rounding = 1e-15;       // of the gradient, relative to its terms
-constexpr int most_changes = 500;
 
 } // namespace
 
@@ -55,15 +56,18 @@ const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
     return V_;
   }
   d_.head(W_sqrt_.rows()).noalias() = W_sqrt_ * F;
-  for (int i = 0; i < most_changes; ++i) {
+  const Index most_changes = 500 + 20 * u_.size();
+  for (Index i = 0; i < most_changes; ++i) {
     ++iterations_;
     if (!move())
       continue;
-    if (!release())
-      break;
+    if (!release()) {
+      V_ = u_.cwiseProduct(scale_).cwiseMax(-limit_).cwiseMin(limit_);
+      return V_;
+    }
   }
-  V_ = u_.cwiseProduct(scale_).cwiseMax(-limit_).cwiseMin(limit_);
-  return V_;
+  throw std::runtime_error("voltages within limits: expected the best within " + std::to_string(most_changes) +
+                           " changes of those at a limit, found none");
 }
 
 // To the minimum of the free voltages, or as far as the first limit on the way: that voltage is held, and false
