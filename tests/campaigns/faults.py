@@ -21,6 +21,7 @@ PROJECTION, MASSES, LOADS = "mbs/model/projection.py", "mbs/model/masses.py", "m
 PATCHES, RESULTS, CORE, MBS = "actuation/patches/", "ffrobot/results/", "mbs/core", "tests/mbs/"
 RECURSION, INTEGRATE = f"{CORE}/recursion/", f"{CORE}/integrate/"
 ABA, SPACE = RECURSION + "constrained_aba/", MBS + "recursion/test_space.py"
+INVERSE, TREE, STATICS = RECURSION + "inverse/", MBS + "test_tree.py", MBS + "test_statics.py"
 PROJECTED = "tests/mbs/test_projection.py tests/mbs/test_projected_trees.py"
 POINTS = "tests/cases/test_actuation_points.py"
 ARM = "tests/references/test_references.py::test_made_scenes[arm]"
@@ -87,6 +88,19 @@ FAULTS = [
           "frequency > 0 ? 1 / (frequency * frequency) : 0", MBS + "recursion/test_norm.py"),
     Fault(RECURSION + "motion/newton_system.cpp", "f -= factors.S.cwiseProduct(y);",
           "f += factors.S.cwiseProduct(y);", MBS + "recursion/test_newton.py"),
+    Fault(INVERSE + "postures.cpp", "unit[r] = -1;", "unit[r] = 1;", TREE),
+    Fault(INVERSE + "postures.cpp", "rate_[static_cast<Index>(r)] -= targets_[r].rate;",
+          "rate_[static_cast<Index>(r)] += targets_[r].rate;", TREE),
+    Fault(INVERSE + "postures.cpp", "J.array().rowwise() *= scales", "J.array().rowwise() /= scales", TREE),
+    Fault(INVERSE + "observe.cpp", "R.row(1).transpose(), R.row(2)", "R.row(2).transpose(), R.row(1)", TREE),
+    Fault(INVERSE + "force_slopes.cpp", "found.lambda_q, K, -1);", "found.lambda_q, K, 1);", STATICS),
+    Fault(INVERSE + "force_slopes.cpp", "of_i * of_j * stiffness", "of_i * stiffness", STATICS),
+    Fault(RECURSION + "motion/mobility.cpp", "J(Eigen::all, ways) *= length;",
+          "J(Eigen::all, ways) /= length;", TREE),
+    Fault(RECURSION + "motion/mobility.cpp", "free * path.null_space(followed())",
+          "free * path.null_space(followed() + 1)", TREE),
+    Fault(ABA + "independent_constraints.cpp", "slight * largest", "0 * largest", MBS + "recursion/test_motion.py"),
+    Fault(CORE + "/linear/singular_values.cpp", "values[rank - 1] / values[0]", "values[rank - 1]", TREE),
 ]  # fmt: skip
 
 
