@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .patches.patches import PatchArray, Voltages
 
 ROWS = 50  # of a run, about, at which mass matrices are made, and at twice as many around the largest shift
+KEPT = 1.0 + 1e-6  # times limits of rates: more is beyond them
 RINGING = 2.0  # times the static shift, of a force that is missing all at once
 
 
@@ -167,7 +168,12 @@ class PatchFeasibility:
     # required_moment, available_moment: (k,) N·m, c times the required voltage, c times the limit
     required_moment: Array
     available_moment: Array
-    saturation_time: Array  # (k,) s, when the limit is first exceeded; NaN where it never is
+    saturation_time: Array  # (k,) s, when a limit is first exceeded; NaN where none is
+    # slew, current: (k,) V/s and A, largest of the required voltage, means between outputs, and what amplifiers have
+    slew: Array
+    slew_limit: Array
+    current: Array
+    current_limit: Array
     field: Array  # (k,) V/m in a layer at the required voltage
     limited_field: Array  # (k,) V/m at the voltage within the limit
     strain: Array  # (k,) of the outer surface, from the bending of the link, its mean along the patch
@@ -183,8 +189,9 @@ class PatchFeasibility:
 
     @property
     def factor(self) -> Array:
-        """(k,) required over available moment: above 1 the patch cannot do it."""
-        return self.required_moment / self.available_moment
+        """(k,) required over available moment, slew rate or current: above 1 the patch cannot do it."""
+        rates = np.maximum(self.slew / self.slew_limit, self.current / self.current_limit)
+        return np.maximum(self.required_moment / self.available_moment, rates)
 
     @property
     def mode_factor(self) -> Array:
@@ -237,38 +244,65 @@ def judge_patches(
     it no other numbers of patches are tried.
     """
     time, p, F_p = motion
-    required = np.abs(voltages.required).max(axis=0)
+    amplifiers, pace = patches.amplifiers, 1.0 / np.diff(time)[:, None]
+    required, limit = worst(voltages.required, amplifiers.range)
+    charge = voltages.required * amplifiers.capacitance + p @ patches.Phi_V
+    slew, current = (np.abs(np.diff(of, axis=0) * pace) for of in (voltages.required, charge))
+    beyond = np.any([voltages.required < amplifiers.range[0], voltages.required > amplifiers.range[1]], axis=0)
+    beyond[1:] |= (slew > amplifiers.slew * KEPT) | (current > amplifiers.current * KEPT)
+    toward = [np.where(sign * patches.Phi_V > 0.0, *amplifiers.range[::-1]) for sign in (-1.0, 1.0)]
+    of_modes = np.array([(patches.Phi_V * V).sum(axis=1) for V in toward])
+    mode_required, mode_available = worst(F_p[:, : patches.served], of_modes[:, : patches.served])
     curvature = np.abs(p @ patches.turn).max(axis=0) / patches.layout.length
     return PatchFeasibility(
         required_moment=np.abs(patches.moment_per_volt) * required,
-        available_moment=np.abs(patches.moment_per_volt) * patches.limit,
-        saturation_time=first_time(time, np.abs(voltages.required) > patches.limit),
+        available_moment=np.abs(patches.moment_per_volt) * limit,
+        saturation_time=first_time(time, beyond),
+        slew=slew.max(axis=0, initial=0.0),
+        slew_limit=amplifiers.slew,
+        current=current.max(axis=0, initial=0.0),
+        current_limit=amplifiers.current,
         field=required / patches.layout.thickness,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
         strain=patches.lever * patches.surface_distance * curvature,
-        mode_required=np.abs(F_p[:, : patches.served]).max(axis=0),
-        mode_available=np.abs(patches.Phi_V[: patches.served]) @ patches.limit,
-        find_remedies=partial(_remedies, patches, required, with_count),
+        mode_required=mode_required,
+        mode_available=mode_available,
+        find_remedies=partial(_remedies, patches, required, limit, with_count),
     )
 
 
-def _remedies(patches: PatchArray, required: Array, with_count: Callable[[int], float | None] | None) -> Remedies:
+def worst(values: Array, range: Array) -> tuple[Array, Array]:
+    """Of values (T, k) the absolute ones (k,) nearest to their limits or farthest beyond, and these limits.
+
+    `range` (2, k): the negative limits, then the positive ones.
+    """
+    pair = np.array([-values.min(axis=0, initial=0.0), values.max(axis=0, initial=0.0)])
+    limit = np.abs(range)
+    share = np.divide(pair, limit, out=np.zeros_like(pair), where=limit > 0.0)
+    side = np.where(share[1] == share[0], pair[1] >= pair[0], share[1] > share[0]).astype(int)
+    each = np.arange(len(side))
+    return pair[side, each], limit[side, each]
+
+
+def _remedies(
+    patches: PatchArray, required: Array, limit: Array, with_count: Callable[[int], float | None] | None
+) -> Remedies:
     """What limit, layers, thickness or count alone would do, by c ∝ N (t_b + N t_p) for the patch that lacks most."""
-    worst = int(np.argmax(required / patches.limit))
-    factor = float(required[worst] / patches.limit[worst])
-    t_b, t_p, N = float(patches.height[worst]), patches.layout.thickness, patches.layout.layers
+    k = int(np.argmax(required / limit))
+    factor = float(required[k] / limit[k])
+    t_b, t_p, N = float(patches.height[k]), patches.layout.thickness, patches.layout.layers
     lever = max(factor, 1.0) * N * (t_b + N * t_p)  # of N' (t_b + N' t_p), the layers that would do
     layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
     lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # of t (t_b + N t), the thickness that would do
     thickness = (-t_b + np.sqrt(t_b**2 + 4 * N * lever)) / (2 * N)
     count, most, most_factor = (0, len(patches.edges), factor) if with_count is None else _count(patches, with_count)
-    return Remedies(float(required[worst]), layers, float(thickness), count, most, most_factor)
+    return Remedies(float(required[k]), layers, float(thickness), count, most, most_factor)
 
 
 def _count(patches: PatchArray, with_count: Callable[[int], float | None]) -> tuple[int, int, float]:
     """The smallest number of patches that do, the largest that has room, and what factor is missing then."""
     most, missing = len(patches.edges), np.inf
-    limit = float(patches.limit.min())
+    limit = float(np.abs(patches.amplifiers.range).min())
     for count in range(patches.served, MOST_PATCHES):
         largest = with_count(count)
         if largest is None:

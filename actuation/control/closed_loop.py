@@ -14,9 +14,10 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
 from ...mbs._core import TimeFunction
-from ...mbs.analysis.forward import actuator_commands, largest_moments
+from ...mbs.analysis.forward import actuator_commands, command_ranges, largest_moments, strain_directions
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.linear.statics import initial_state
+from ...mbs.model.amplifiers import joined
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
@@ -29,6 +30,7 @@ from ...mbs.run.outcome import Outcome
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
+from .amplified_loop import AmplifiedLoop
 from .controllers import (
     ComputedTorqueControl,
     Controller,
@@ -113,7 +115,8 @@ class ClosedLoop(SampledAnalysis):
     """Motion under sampled control; reference, feed-forward and start are those of the inverse analysis `actuation`.
 
     Samples are at 0, sample_time, …; a zero-order hold applies the command of each `delay` later. Torques and voltages
-    are limited as in the scene unless `unlimited`. The initial state is that of the inverse analysis, or [initial] of
+    are limited as in the scene unless `unlimited`; bandwidth and delay of amplifiers act in any case, but the linear
+    model of the loop leaves them out. The initial state is that of the inverse analysis, or [initial] of
     the scene, on the trajectories. `seed` initializes the noise. `tip` is the point whose position error is computed.
 
     Sensors name patches by their layout. Joints with several coordinates have one signal per coordinate, "joint/NAME
@@ -150,17 +153,25 @@ class ClosedLoop(SampledAnalysis):
             self.sample_time, self.delay, reference, _feed_forward(context, self, source, moved, samples), robot.source,
         )  # fmt: skip
         acting = [make_controller(record, setup, self.controller) for record in self.controller]
-        limit = np.full(len(setup.inputs), np.inf) if self.unlimited else _limits(context)
+        amplifiers = joined(context.patches.values())
+        ranges = command_ranges(context.model, context.patches)
+        if self.unlimited:
+            amplifiers, ranges = amplifiers.unlimited(), np.inf * np.sign(ranges)
         begun = [of if isinstance(of, PythonControl) else copy(of) for of in acting]
-        loop = Loop(setup, read, acting, limit, self.seed)
+        loop = Loop(setup, read, acting, ranges, self.seed)
         splits = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
 
         def at_sample(k: int, t: float, state: Array) -> Array:
             return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
 
-        held = partial(held_commands, setup=setup, loop=loop)
+        arriving: Loop | AmplifiedLoop = loop
+        if amplifiers.acts:
+            directions = strain_directions(plant, context.patches)
+            arriving = AmplifiedLoop(loop, at_sample, samples, self.sample_time, amplifiers, directions, splits)
+            samples, at_sample = arriving.times, arriving
+        held = partial(held_commands, samples=samples, delay=self.delay, loop=arriving)
         before, inputs = partial(held, after=-1e-9), actuator_commands(plant, context.patches)
-        control = Control(inputs, loop.first, setup.times, self.delay, at_sample, before)
+        control = Control(inputs, arriving.first, samples, self.delay, at_sample, before)
         disturbing = ((place_of(whole, str(load.point)), load.components) for load in self.disturbance)
         drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
         run = drive_robot(
@@ -258,13 +269,6 @@ def _feed_forward(
             values[:, column : column + len(columns)] = between(middle, source.time, moments)
         column += len(columns)
     return values
-
-
-def _limits(context: ActuatedContext) -> Array:
-    """(inputs,) largest moments and voltages, infinite where the scene gives none."""
-    return np.concatenate(
-        [largest_moments(context.model, limits=True), *(of.reach.limit for of in context.patches.values())]
-    )
 
 
 def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: MotorCoordinates) -> State:

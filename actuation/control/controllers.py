@@ -247,7 +247,7 @@ class Loop:
     """What the core asks at every sample: noise and resolution, controllers, limits."""
 
     def __init__(
-        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], limit: Array, seed: int
+        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], range: Array, seed: int
     ) -> None:
         samples = (len(setup.times), len(read))
         noise = np.array([signal.noise for signal in read])
@@ -255,17 +255,18 @@ class Loop:
         resolution = np.array([signal.resolution for signal in read])
         self._coarse = np.flatnonzero(resolution)
         self._resolution = resolution[self._coarse]
-        self._controllers, self._limit, self._feed_forward = controllers, limit, setup.feed_forward
+        self._controllers, self._range, self._feed_forward = controllers, range, setup.feed_forward
         self.blur = resolution + noise  # (outputs,)
         self.readings = np.zeros(samples)
         self.commands, self.wanted = np.zeros_like(setup.feed_forward), np.zeros_like(setup.feed_forward)
-        self.first: Array = np.clip(setup.feed_forward[0], -limit, limit)
+        self.first: Array = np.clip(setup.feed_forward[0], *range)
         self.taken = 0
 
     @property
     def at_limits(self) -> Booleans:
         """(K, inputs) at the samples taken, also where a controller has cut its commands itself."""
-        return np.abs(self.commands[: self.taken]) >= self._limit * (1.0 - 1e-9)
+        lowest, highest = self._range * (1.0 - 1e-9)
+        return (self.commands[: self.taken] <= lowest) | (self.commands[: self.taken] >= highest)
 
     def __call__(self, k: int, _t: float, y: Array) -> Array:
         """Commands at sample k for what the sensors are exposed to."""
@@ -276,6 +277,6 @@ class Loop:
         wanted = self._feed_forward[k].copy()
         for controller in self._controllers:
             wanted += controller(k, y)
-        command: Array = np.minimum(np.maximum(wanted, -self._limit), self._limit)
+        command: Array = np.minimum(np.maximum(wanted, self._range[0]), self._range[1])
         self.readings[k], self.wanted[k], self.commands[k], self.taken = y, wanted, command, k + 1
         return command

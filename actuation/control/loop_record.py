@@ -11,6 +11,7 @@ from ...common.peaks import largest
 from ...common.structs import struct
 from ...mbs.run.outcome import Details
 from ...mbs.run.samples import in_order
+from .amplified_loop import AmplifiedLoop
 from .controllers import Controller, Loop, Setup
 from .margins import Loops, Margins, advice, margins
 from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched
@@ -58,10 +59,10 @@ def between(times: Array, known: Array, values: Array) -> Array:
     return CubicSpline(known, values)(times)
 
 
-def held_commands(times: Array, setup: Setup, loop: Loop, after: float = 1e-9) -> Array:
+def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float = 1e-9) -> Array:
     """Commands (T, inputs) that act at `times`, or `after` (s) them: accelerations are those before a change."""
     taken = slice(loop.taken)
-    which = np.searchsorted(setup.times[taken] + setup.delay, times + after, side="right")
+    which = np.searchsorted(samples[taken] + delay, times + after, side="right")
     return np.vstack([loop.first, loop.commands[taken]])[which]
 
 

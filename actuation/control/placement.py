@@ -322,9 +322,8 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
     reached, layout = of_link.modes[label], of_link.arrays[label].layout
 
     def patches(**changes: object) -> PatchArray:
-        limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit  # one holds for all
-        keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None, "limit": limit} | changes
-        found = link_patches(path, [layout.model_copy(update=keys)], body, context.carrying[name])
+        one = layout.with_one_limit(**({"mode_weights": None, "point_weights": None} | changes))
+        found = link_patches(path, [one], body, context.carrying[name])
         if not np.array_equal(found.modes[label].rows, reached.rows):
             raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
         return found.arrays[label]

@@ -30,8 +30,6 @@ from ...mbs.fields.field_types import (
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
 
-PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
-
 
 class Sensor(Referring):
     """A sensor of a joint coordinate, of the position x, y (z) of a point, or of patch voltages.

@@ -33,7 +33,7 @@ from ...mbs.scene.space import SPACES
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import PatchArray, voltage_gain
 from .linear import voltages_at
-from .records import PERMITTIVITY, Sensor
+from .records import Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
@@ -164,13 +164,10 @@ def volts_per_turn(patches: PatchArray, capacitance: float | None = None) -> Arr
     """Voltage (k,) of each patch per turn: its charge c [φ'(x2) − φ'(x1)] over its capacitance.
 
     By reciprocity the charge of a rotation is the moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The
-    capacitance of a patch is ε w l/t_p of each layer; one that also drives the link is read through a bridge, which
+    free capacitance of a patch is that of its layers; one that also drives the link is read through a bridge, which
     leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992).
     """
-    layout = patches.layout
-    faces = 2 if layout.face == "both" else 1
-    own = faces * layout.layers * PERMITTIVITY * layout.width * layout.length / layout.thickness
-    return patches.moment_per_volt / (own if capacitance is None else capacitance)
+    return patches.moment_per_volt / (patches.layout.capacitance() if capacitance is None else capacitance)
 
 
 def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:

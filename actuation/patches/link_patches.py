@@ -18,6 +18,7 @@ from ...common.errors import InputError
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
+from ...mbs.model.amplifiers import Amplifiers, joined
 from ...mbs.model.body import Body
 from ...mbs.model.divided_link import spread_of
 from .composite import Placed
@@ -83,9 +84,9 @@ class LinkPatches:
         return self._by_layout(found.required, found.within_limit, self.unmet(F_p, found.within_limit))
 
     @property
-    def limit(self) -> Array:
-        """(k,) largest voltages, V; infinite where the scene gives none."""
-        return self.reach.limit
+    def amplifiers(self) -> Amplifiers:
+        """Of the k patches."""
+        return self.reach.amplifiers
 
     @property
     def edges(self) -> Array:
@@ -94,7 +95,7 @@ class LinkPatches:
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
         """By layout, of known V (T, k) where modal forces F_p (T, n) are wanted."""
-        within = np.clip(V, -self.limit, self.limit)
+        within = np.clip(V, *self.amplifiers.range)
         return self._by_layout(V, within, self.unmet(F_p, within))
 
     def _by_layout(self, required: Array, within: Array, unmet: Array) -> dict[str, Voltages]:
@@ -218,10 +219,8 @@ def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, co
     """As many of the same patches, evenly spread over the link, alone, with one limit; None where they have no room."""
     if count * layout.length > body.length * (1 + 1e-9):
         return None
-    limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
-    changed = {"count": count, "centers": None, "limit": limit, "allocation": "least-squares"}
     try:
-        return link_patches(path, [layout.model_copy(update=changed)], body, spatial)
+        return link_patches(path, [layout.with_one_limit(count=count, centers=None)], body, spatial)
     except InputError:  # across a step of the section, or weights for another number
         return None
 
@@ -264,7 +263,7 @@ def _together(
     Phi_V = reached.seen(per_volt).T
     return Reach(
         Phi_V=Phi_V,
-        limit=np.concatenate([array.limit for array in arrays.values()]),
+        amplifiers=joined(arrays.values()),
         W_sqrt=served_first(reached.served, *Phi_V.shape),
         frequency=np.sqrt(reached.stiffness) / (2 * np.pi),
         served=reached.served,

@@ -15,6 +15,7 @@ from ...common.structs import struct
 from ...fe_models.link_records.families import Family
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
+from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.model.body import Body
 from ...mbs.model.masses import uncoupling
 from .composite import SLIVER, Placed, stiffness_ratios
@@ -34,10 +35,15 @@ class Reach:
 
     _: KW_ONLY
     Phi_V: Array  # (n, k) modal forces per volt
-    limit: Array  # (k,) largest voltages, V; infinite where the scene gives none
+    amplifiers: Amplifiers  # of the k patches
     W_sqrt: Array  # (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small
     frequency: Array  # (n,) of the modes, Hz
     served: int  # number of modes, the first ones, that the patches are to serve: attachment modes are not among them
+
+    @property
+    def limit(self) -> Array:
+        """(k,) largest voltages of either sign, V; infinite where the scene gives none."""
+        return np.abs(self.amplifiers.range).max(axis=0)
 
     @property
     def condition_number(self) -> float:
@@ -211,8 +217,8 @@ def voltage_gain(patches: Reach) -> Array:
 
 def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
     """What turns modal forces into voltages, with the limits of the patches or without."""
-    limit = patches.limit if limited else np.full_like(patches.limit, np.inf)
-    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), limit, voltage_scale(patches))
+    range = (patches.amplifiers if limited else patches.amplifiers.unlimited()).range
+    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), *range, voltage_scale(patches))
 
 
 def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
@@ -283,7 +289,7 @@ def assembled(
     layout, edges = placed
     return PatchArray(
         layout, edges, of.extent, of.per_volt, (of.turn @ T).T, body, of.lever,
-        Phi_V=(of.Phi_V @ T).T, limit=np.full(len(edges), np.inf if layout.limit is None else layout.limit),
+        Phi_V=(of.Phi_V @ T).T, amplifiers=layout.amplifiers(),
         W_sqrt=W_sqrt, frequency=np.sqrt(stiffness) / (2 * np.pi), served=served,
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ from ...common.keys import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
 from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
+from ...mbs.model.amplifiers import Amplifiers
 
 
 class Lamina(NamedTuple):
@@ -85,6 +86,55 @@ OF_FIBRES = ("fibre_angle", "d33", "modulus_across", "shear_modulus", "poissons_
 NO_SHEAR = 1e-9  # of the other stress: a layer that shears less does not twist
 
 
+PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
+
+Each = Positive | Annotated[tuple[Positive, ...], NotEmpty]
+Range = tuple[float, float]
+
+
+class Amplifier(Record):
+    """Amplifier of the patches of a layout, each key with one value for all patches or a list with one for each.
+
+    The largest current limits C dV/dt and the charge of the strain together. `tracking` and `feasibility` take range,
+    current and slew rate as limits; forward runs with `limits = true` and closed loops cut voltages at them. Bandwidth
+    and delay act in forward runs and closed loops.
+    """
+
+    range: Range | Annotated[tuple[Range, ...], NotEmpty] | None = None
+    """Smallest and largest voltage, V, such as [-50.0, 200.0]; default: plus and minus `limit`."""
+    current: Each | None = None
+    """Largest current, A."""
+    slew: Each | None = None
+    """Largest rate of the voltage, V/s."""
+    bandwidth: Each | None = None
+    """Bandwidth of first order, Hz."""
+    delay: NotNegative | Annotated[tuple[NotNegative, ...], NotEmpty] = 0.0
+    """Delay of the voltage, s."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for lowest, highest in np.reshape(() if self.range is None else self.range, (-1, 2)):
+            if not lowest < 0.0 < highest:
+                raise ValueError(
+                    "range: expected a negative and a positive voltage, as patches are at 0 V where the robot rests,"
+                    f" found [{lowest:g}, {highest:g}]"
+                )
+        return self
+
+    def lists(self) -> Iterator[tuple[str, int]]:
+        """Keys with a list, and its length."""
+        for key in type(self).model_fields:
+            if np.ndim(value := getattr(self, key)) == (2 if key == "range" else 1):
+                yield key, len(value)
+
+    def for_any(self) -> Self:
+        """The same for each patch: what all of them can do."""
+        least = {key: float(np.min(getattr(self, key))) for key, _ in self.lists() if key not in ("range", "delay")}
+        lowest = np.reshape(() if self.range is None else self.range, (-1, 2))
+        range = (float(lowest[:, 0].max()), float(lowest[:, 1].min())) if len(lowest) else None
+        return self.model_copy(update={**least, "range": range, "delay": float(np.max(self.delay))})
+
+
 class PztLayout(Record):
     """Equal piezoelectric patches along one link; several layouts on a body have names.
 
@@ -124,6 +174,10 @@ class PztLayout(Record):
     """Density, kg/m³, for the mass of the patches."""
     limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
     """Largest voltage, V: of all, or of each."""
+    amplifier: Amplifier | None = None
+    """Amplifier of the patches."""
+    permittivity: Positive = PERMITTIVITY
+    """Permittivity along the field at constant stress, F/m, for the capacitance; default: that of PZT-5A."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     """Number of stacked layers."""
     face: Annotated[Face | None, Spelled(Literal["+y", "-y", "both"], as_written)] = None
@@ -167,6 +221,7 @@ class PztLayout(Record):
         self._check_constants()
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
+        self._check_amplifier()
         if self.adds_mass and self.density is None:
             raise ValueError(f'expected the key "density" with structural = {_toml(self.structural)}, found none')
         if self.mode_weights is not None and self.point_weights is not None:
@@ -191,6 +246,48 @@ class PztLayout(Record):
         allowed = FACES.get(self.bends)
         if self.face is not None and allowed is not None and self.face not in allowed:
             raise ValueError(f'expected face {quoted(allowed)} with bends = "{self.bends}", found "{self.face}"')
+
+    def _check_amplifier(self) -> None:
+        for key, found in self.amplifier.lists() if self.amplifier is not None else ():
+            if found != self.patch_count:
+                raise ValueError(
+                    f"amplifier: {key}: expected {self.patch_count} values, one for each patch, found {found}"
+                )
+        if self.limit is not None and self.amplifier is not None and self.amplifier.range is not None:
+            raise ValueError('expected one of the keys "limit" and "amplifier.range", found both')
+        uses = self.amplifier is not None or "permittivity" in self.model_fields_set
+        if uses and self.capacitance(clamped=True) <= 0.0:
+            least = self.permittivity * (1.0 - self.capacitance(clamped=True) / self.capacitance())
+            raise ValueError(
+                f"expected a permittivity above {least:.4g} F/m, the square of the piezoelectric constant times the"
+                f" modulus, which leaves the energy positive, found {self.permittivity:g}"
+            )
+
+    def capacitance(self, *, clamped: bool = False) -> float:
+        """Of one patch with all its layers and faces, F: free, or on a link that stands still."""
+        field = 1.0 / ((self.fibre_angle is not None and self.electrode_spacing) or self.thickness)
+        volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
+        C, per_volt = self.lamina
+        elastic = float(per_volt @ np.linalg.lstsq(C, per_volt, rcond=None)[0]) if clamped else 0.0
+        return volume * (self.permittivity * field**2 - elastic)
+
+    def amplifiers(self) -> Amplifiers:
+        """Of all patches."""
+        of, k = self.amplifier or Amplifier(), self.patch_count
+
+        def each(value: float | tuple[float, ...] | None) -> Array:
+            return np.broadcast_to(np.inf if value is None else np.asarray(value, dtype=float), k)
+
+        limit = each(self.limit)
+        range = np.stack([-limit, limit]) if of.range is None else np.broadcast_to(np.array(of.range), (k, 2)).T
+        capacitance = each(self.capacitance(clamped=True))
+        return Amplifiers(range, each(of.slew), each(of.current), capacitance, each(of.bandwidth), each(of.delay))
+
+    def with_one_limit(self, **changes: object) -> Self:
+        """The layout with these changes and the same limits for each patch, in number as may be."""
+        limit = min(self.limit) if isinstance(self.limit, tuple) else self.limit
+        of_all = {"limit": limit, "amplifier": self.amplifier and self.amplifier.for_any()}
+        return self.model_copy(update={**of_all, "allocation": "least-squares", **changes})
 
     def _check_plain(self) -> None:
         if abs(self.d31) < SMALLEST:

@@ -53,6 +53,8 @@ def _tables(results: Results, name: str) -> Iterator[Table | str]:
         yield _patches(body, group[f"pzt/{body}"], judged)
         yield _modes(body, judged)
         yield _remedy_line(judged)
+        if "current" in judged:
+            yield _amplifier_line(group[f"pzt/{body}"], judged)
     yield ""
 
 
@@ -139,6 +141,17 @@ def _remedy_line(judged: h5py.Group) -> str:
         f"sufficient alone: a limit of {_number(remedies['limit'])} V; {remedies['layers']} layers;"
         f" layers of {_number(1e3 * remedies['thickness'])} mm at the same field; {count}"
     )
+
+
+def _amplifier_line(pzt: h5py.Group, judged: h5py.Group) -> str:
+    """Between outputs, on the mean, of the patch that is nearest to its limit."""
+    texts = [f"capacitance {_number(1e9 * pzt.attrs['capacitance'])} nF each"]
+    for what, key, unit, size in (("current", "current", "mA", 1e3), ("slew rate", "slew", "V/ms", 1e-3)):
+        peaks, limits = judged[key][()], judged[f"{key}_limit"][()]
+        k = int(np.argmax(peaks / limits if np.isfinite(limits).any() else peaks))
+        of = f" of {_number(size * limits[k])}" if np.isfinite(limits[k]) else ""
+        texts.append(f"largest {what} {_number(size * peaks[k])}{of} {unit}")
+    return ", ".join(texts)
 
 
 def _verdict(factor: float, since: float) -> tuple[str, str, str]:

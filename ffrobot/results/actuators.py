@@ -68,6 +68,9 @@ def _write_layout(group: h5py.Group, patches: PatchArray, voltages: Voltages, un
     group.attrs["condition_number"] = patches.condition_number
     group["residual_force"] = unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
+    group.attrs["capacitance"] = patches.layout.capacitance()
+    if np.any(-patches.amplifiers.range[0] != patches.amplifiers.range[1]):
+        group.attrs["range"] = patches.amplifiers.range
 
 
 def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PztLayout]) -> None:
@@ -145,9 +148,10 @@ def write_tracking(group: h5py.Group, motion: RobotMotion, found: TrackedPath) -
     group = group.create_group("tracking")
     about = group.attrs
     about.update({key: getattr(found, key) for key in OF_TRACKING})
-    for kind, prices in (("voltage", found.voltage_prices), ("torque", found.torque_prices)):
+    for kind, prices in found.prices.items():
         for name, values in prices.items():
-            group[f"{kind}_price/{name}"] = values
+            if kind in ("voltage", "torque") or values.any():
+                group[f"{kind}_price/{name}"] = values
     if (bounds := found.bounds) is not None:
         group["bound/voltage"], group["bound/time"] = bounds.voltages, bounds.times
         group["bound/zero"] = np.stack([bounds.zeros.real, bounds.zeros.imag], axis=1)

@@ -133,6 +133,7 @@ def _answer(
         alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
         limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
         is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
+        is_one &= not any("range" in one.attrs for one in group["pzt"].values())
         size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
         least = f"; least voltage {size}{alone}"
     return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True

@@ -93,6 +93,8 @@ momentum/angular | kg m²/s | of all bodies, about the origin | axis
 constraint_violation | | of position, velocity, acceleration; relative | level
 resume/** | | what --resume needs
 tracking/voltage_price/* | 1/V | by how much less the objective is per volt of limit
+tracking/slew_price/* | s/V | by how much less the objective is per unit of limit
+tracking/current_price/* | 1/A | by how much less the objective is per unit of limit
 tracking/torque_price/* | SI | by how much less the objective is per unit of limit
 tracking/bound/voltage | V | that a zero requires at least
 tracking/bound/time | s | at which that counts

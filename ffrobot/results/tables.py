@@ -46,11 +46,15 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
         limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
         is_limited = np.isfinite(limits).any()
         span = " to ".join(dict.fromkeys((f"{limits.min():g}", f"{limits.max():g}")))
+        ratio, judged = np.max(required / limits), f"{analysis}/feasibility/pzt/{layout}/factor"
+        if "range" in about:
+            span = f"{about['range'][0].max():g} to {about['range'][1].min():g}"
+            ratio = np.max(results[judged]) if results.has(judged) else ratio
         yield {
             "on": layout,
             "largest (V)": volts(required.max()),
             "limit (V)": span if is_limited else "none",
-            "required /\nlimit": f"{np.max(required / limits):.3g}" if is_limited else "",
+            "required /\nlimit": f"{ratio:.3g}" if is_limited else "",
             "condition\nnumber": f"{about['condition_number']:.3g}",
         }
 

@@ -107,7 +107,7 @@ def judging(scene: Scene) -> TimedAnalysis:
             f"{where}: expected an inverse analysis (pcid, fcid, motors-only) with feasibility results, found none"
         )
     limited = any(of != MotorLimits() for joint in scene.motor_joints for of in joint.motor_limits)
-    if not limited and not any(layout.limit for layout in scene.pzt):
+    if not limited and not any(layout.limit or layout.amplifier for layout in scene.pzt):
         raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
     if any(body.modes == "auto" for body in scene.body):
         raise InputError(

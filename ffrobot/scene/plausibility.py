@@ -225,12 +225,13 @@ def _voltages(scene: Scene) -> Iterator[str]:
     last = max((analysis.last_time for analysis in scene.analysis), default=0.0)
     for k, load in enumerate(scene.load, 1):
         layout = layouts.get(load.pzt or "")
-        if layout is None or layout.limit is None:
+        if layout is None:
             continue
-        limits = np.broadcast_to(layout.limit, layout.patch_count)
+        limits = layout.amplifiers().range.T
         functions = [function for name, function in load.components.items() if name.startswith("voltage")]
-        for number, (function, limit) in enumerate(zip(functions, limits, strict=False), 1):
-            most = float(np.abs(np.nan_to_num(function.sample(np.linspace(0.0, last, SAMPLES))[0])).max())
+        for number, (function, (lowest, highest)) in enumerate(zip(functions, limits, strict=False), 1):
+            voltage = np.nan_to_num(function.sample(np.linspace(0.0, last, SAMPLES))[0])
+            most, limit = max((voltage.max(), highest), (-voltage.min(), -lowest), key=lambda one: one[0] / one[1])
             if most > limit * (1.0 + ROUNDING):
                 yield f"load no. {k}: patch {number} gets {most:.4g} V, beyond its limit of {limit:g} V"
 

@@ -10,11 +10,12 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, either
 from .. import _core
 from ..fields.waypoints import spline
 from ..linear.statics import hanging_joints, initial_state
+from ..model.amplifiers import joined
 from ..model.drives import Command, Drives, Replayed
 from ..model.frame_motors import motor_commands
 from ..model.gears import with_compliance
@@ -29,12 +30,16 @@ from ..run.outcome import Outcome
 from ..run.replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 
+STEPS = 20  # of the shortest lag or delay of amplifiers, and of outputs, between which voltages are linear
+MOST_STEPS = 100_000
+
 
 class Forward(ActuatedAnalysis):
     """Motion under the loads of the scene and the inputs computed by the inverse analysis `actuation`.
 
     `apply` selects the inputs: motor torques, motor torques and patch voltages, forces along the trajectories, or
-    forces at the actuation points. `limits` saturates motors and patches at their limits.
+    forces at the actuation points. `limits` saturates motors and patches at their limits, with the current and slew
+    rate of amplifiers. Their bandwidth and delay always act.
     """
 
     kind: Literal["forward"]
@@ -119,7 +124,7 @@ def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:
         return Replayed(point_numbers(source, context.points), (nothing,) * (3 * len(chosen)), at_points)
     _check_motors(model, analysis, source.q[0])
     patches = context.patches if analysis.apply == "joints+pzt" else {}
-    found = supplied(source, largest_moments(model, limits=analysis.limits), patches, limited=analysis.limits)
+    found = _supplied(source, largest_moments(model, limits=analysis.limits), patches, analysis)
     return Replayed(found, actuator_commands(model, patches), moments=numbers_of_motors(model))
 
 
@@ -152,13 +157,43 @@ def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Con
     commands = actuator_commands(model, context.patches)
     motors, patches = commands[: len(most)], commands[len(most) :]
     if analysis.apply == "joints+pzt":  # moments of rigid gears come with the voltages, and do nothing
-        found = _core.ForcesOfBoth(found, supplied(source, most, context.patches, limited=analysis.limits))
+        found = _core.ForcesOfBoth(found, _supplied(source, most, context.patches, analysis))
         motors = (*motors, *[Command(np.zeros(model.tree.n_v))] * len(most), *patches)
     replayed = Replayed(found, motors, moments=numbers_of_motors(model))
     return drive_robot(
         model, analysis, State(in_motors.q[0], in_motors.v[0]), context.progress, drives=Drives(replayed=replayed),
         times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
+
+
+def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
+    """(2, inputs) smallest and largest moments of motors and voltages of patches, infinite where there is no limit."""
+    most = largest_moments(model, limits=True)
+    return np.hstack([np.stack([-most, most]), joined(patches.values()).range])
+
+
+def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
+    """(k, n_v) of all patches the current Φ_Vᵀ ṗ by v, A."""
+    rows = [modal_directions(model, of_link.per_volt) for of_link in patches.values()]
+    return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
+
+
+def _supplied(source: Outcome, most: Array, patches: Mapping[str, PatchedLink], analysis: Forward) -> _core.ForceSource:
+    """What motors and amplifiers make of what `source` found: its charges are those of its own motion."""
+    found, amplifiers = supplied(source, most, patches, limited=analysis.limits), joined(patches.values())
+    amplifiers = amplifiers if analysis.limits else amplifiers.unlimited()
+    if not amplifiers.acts:
+        return found
+    times, late = replay_times(source, analysis), np.append(amplifiers.lag, amplifiers.delay)
+    step = min(float(late[late > 0.0].min(initial=np.inf)), analysis.output_step) / STEPS
+    count = int(np.clip(np.ceil(np.ptp(times) / step), 1, MOST_STEPS))
+    grid, closer = as_floats(np.linspace(times[0], times[-1], count + 1)), source.closer
+    current = closer.v @ strain_directions(source.model, patches).T
+    strain = np.stack([np.interp(grid, closer.time, of) for of in current.T], axis=1)
+    V = amplifiers.output(grid, found.sample(as_list(grid))[:, len(most) :], strain)
+    return _core.ForcesOfBoth(
+        supplied(source, most, {}, limited=analysis.limits), _core.ForcesOfTime(spline(grid, V, 1))
+    )
 
 
 def largest_moments(model: Model, *, limits: bool) -> Array:

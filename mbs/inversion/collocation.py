@@ -11,6 +11,7 @@ p̈ for a moment, as where a zero passes through infinity.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import comb
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -57,6 +58,15 @@ def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
     stage_once = c[:, None] ** (m + 1) * once @ to_powers
     stage_twice = c[:, None] ** (m + 2) * twice @ to_powers if of_second_order else stage_once @ stage_once
     return Scheme(c, to_powers, stage_once, stage_twice, once @ to_powers, twice @ to_powers)
+
+
+def bernstein_integral(scheme: Scheme) -> Array:
+    """(s + 1, s) Bernstein's coefficients on [0, 1] of the integral of the polynomial through values at c."""
+    s = len(scheme.c)
+    m = np.arange(s)
+    powers = scheme.to_powers / (m[:, None] + 1)  # of ξ, ξ² …, ξ^s
+    shares = np.array([[comb(i, k + 1) / comb(s, k + 1) for k in m] for i in range(s + 1)])
+    return shares @ powers
 
 
 GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)

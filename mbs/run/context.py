@@ -9,6 +9,7 @@ from typing import Protocol, TypeVar
 from ...common.arrays import Array
 from ...common.structs import struct
 from .. import _core
+from ..model.amplifiers import Amplifiers
 from ..model.divided_link import DividedLink
 from ..model.model import Model
 from .drive import Progress
@@ -25,8 +26,8 @@ class PatchedLink(Protocol):
         """(n, k) modal forces per volt."""
 
     @property
-    def limit(self) -> Array:
-        """(k,) largest voltages, V; infinite where there are none."""
+    def amplifiers(self) -> Amplifiers:
+        """Of its patches."""
 
     @property
     def edges(self) -> Array:

@@ -74,7 +74,7 @@ def _with_known_voltages(
     voltages: list[TimeFunction] = []
     for name, of_link in patches.items():
         breaks, V = run.prescribed.voltages[name]
-        within = np.clip(V, -of_link.limit, of_link.limit) if limited else V
+        within = np.clip(V, *of_link.amplifiers.range) if limited else V
         voltages += [function.held(breaks[0], breaks[-1]) for function in spline(breaks, within, 1)]
     return _core.ForcesOfBoth(torques, _core.ForcesOfTime(voltages)) if voltages else torques
 

@@ -3,14 +3,17 @@
 With patches r(t, p, ṗ, p̈) = Φ_V V (`zero_dynamics`). p̈ is a polynomial on each interval through the four Gauss
 points of `collocation`, V is linear between breaks: limits at breaks are limits everywhere. Each Newton step solves
 
-    min  1/(t₁−t₀) ∫ ½ |τ − τ_qs|²/τ_ref² + ½ |V|²/V_ref² + ½ T_r² |V̇|²/V_ref² dt,    |V| ≤ V_max, |τ| ≤ τ_max
+    min  1/(t₁−t₀) ∫ ½ |τ − τ_qs|²/τ_ref² + ½ |V|²/V_ref² + ½ T_r² |V̇|²/V_ref² dt,
+    V_min ≤ V ≤ V_max, |V̇| ≤ s_max, |C V̇ + Φ_Vᵀ ṗ| ≤ i_max, |τ| ≤ τ_max
 
-or the least share of the limits of voltages, or of torques, of the linearized equations; τ_qs carries the links as they
-sag. Links rest at both ends. Output transition with free internal states: Perez and Devasia, Automatica 39 (2003).
+or the least share of the limits of voltages, currents or torques, of the linearized equations; τ_qs carries the links
+as they sag. Links rest at both ends. Output transition with free internal states: Perez and Devasia, Automatica 39
+(2003).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -18,18 +21,22 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.structs import struct
-from ..inversion.collocation import GAUSS, Elimination, piecewise, stage_states
+from ..inversion.collocation import GAUSS, Elimination, bernstein_integral, piecewise, stage_states
 from ..inversion.servo import Servo
 from ..inversion.zero_dynamics import shape_along
+from ..model.amplifiers import Amplifiers
 from .interior_point import GAP, Minimum, Program, minimize
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-Objective = Literal["effort", "least-voltage", "least-torque"]
+Objective = Literal["effort", "least-voltage", "least-current", "least-torque"]
 
 MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
+RATE = 0.005  # s, T_r where nothing is said
+# of a polynomial's integral by its values at the Gauss points, five coefficients by four
+BERNSTEIN = bernstein_integral(GAUSS)
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
 FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
@@ -41,9 +48,9 @@ ROUGH_GAP = 1e-6  # of the objective, there
 
 @struct
 class Limits:
-    """Of patches (m,) V, and of motors (motors,) N·m or N; infinite where there are none."""
+    """Of the m patches, and of motors (motors,) N·m or N; infinite where there are none."""
 
-    voltage: Array
+    patches: Amplifiers
     torque: Array
 
 
@@ -74,9 +81,22 @@ class Transition:
 
     @property
     def units(self) -> Array:
-        """V by which shares count (m,)."""
-        limit = self.limits.voltage
-        return np.where(np.isfinite(limit), limit, self.weights.voltage)
+        """V by which shares count (m,): the larger of the two limits of a patch."""
+        return np.abs(self.ranges["voltage"]).max(axis=0)
+
+    @property
+    def ranges(self) -> dict[str, Array]:
+        """Smallest and largest values (2, …) by which shares count: limits, or sizes where there are none."""
+        of, weights = self.limits.patches, self.weights
+        rate = np.full_like(of.slew, weights.voltage / (weights.rate or RATE))
+        both = np.array([[-1.0], [1.0]])
+        pairs = {
+            "voltage": (of.range, both * np.full_like(of.slew, weights.voltage)),
+            "slew": (both * of.slew, both * rate),
+            "current": (both * of.current, both * rate * of.capacitance),
+            "torque": (both * self.limits.torque, both * np.full_like(self.limits.torque, weights.torque)),
+        }
+        return {name: np.where(np.isfinite(limit), limit, size) for name, (limit, size) in pairs.items()}
 
 
 @struct
@@ -89,9 +109,9 @@ class Tracked:
     iterations: int
     share: float  # σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none
     cost: float  # J; 0 where it is not the objective
-    # by how much less J, or σ, is for a limit that is larger by one: of patches (m,) 1/V, of motors (motors,) 1/(N·m)
-    # or 1/N; zero where a limit is not reached
-    prices: tuple[Array, Array]
+    # by how much less J, or σ, is for limits that are wider by one: "voltage", "slew" and "current" of patches (m,),
+    # 1/V, s/V, 1/A, and "torque" of motors (motors,) 1/(N·m) or 1/N; zero where a limit is not reached
+    prices: dict[str, Array]
     objective: Objective  # what was made small
     # largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one
     unmet: float = np.nan
@@ -216,7 +236,7 @@ class _Steps:
     effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
     unique, damping = UNIQUE, 0.0
     of_voltages: float | Array = 1.0  # (N,) times the share of the effort
-    owners: Indices  # of inequalities (i,): patches, then motors
+    rows: dict[str, tuple[slice, Array, Indices]]  # of inequalities, their limits (i,), and whose they are (i,)
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
         self.asked, self.breaks, self.h, self.tau_qs, self.size = asked, breaks, np.diff(breaks), tau_qs, size
@@ -248,8 +268,8 @@ class _Steps:
         starts[:, :, self.y] = np.eye(2 * n).reshape(2, n, 2 * n)
         ends = np.concatenate(stages.at_end(starts[0], starts[1], K_z), axis=1)
         offset = np.concatenate(stages.at_end(p[:-1], v[:-1], K + moved), axis=1) - x[1:, self.y]
-        tau_z = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
-        self.program = self._program(ends, offset, *tau_z, x)
+        of_torques = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
+        self.program = self._program(ends, offset, *of_torques, x, self._charges(v, K + moved, (starts[1], K_z)))
         found = minimize(self.program, self.gap, now.found)
         change = found.x * self.unit
         K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, self.program.z(change), optimize=True)
@@ -282,7 +302,18 @@ class _Steps:
             tau = tau + np.einsum("Nstn,Nsn->Nst", by, of_moved)
         return tau, found
 
-    def _program(self, ends: Array, offset: Array, tau_0: Array, tau_z: Array, x: Array) -> Program:
+    def _charges(self, v: Array, K: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
+        """Φ_Vᵀ ṗ (N, 5, m), A, by Bernstein's coefficients, which bound it between breaks, and its derivatives by z."""
+        if not np.isfinite(self.asked.limits.patches.current).any() and self.asked.objective != "least-current":
+            return np.zeros((len(self.h), 0, self.m)), np.zeros((len(self.h), 0, self.m, self.width + self.m))
+        v_z, K_z = by_z
+        v_0 = v[:-1, None] + self.h[:, None, None] * np.einsum("ij,Njn->Nin", BERNSTEIN, K)
+        v_z = v_z + self.h[:, None, None, None] * np.einsum("ij,Nj...->Ni...", BERNSTEIN, K_z)
+        return v_0 @ self.asked.Phi_V, np.einsum("nm,Ninz->Nimz", self.asked.Phi_V, v_z)
+
+    def _program(
+        self, ends: Array, offset: Array, tau_0: Array, tau_z: Array, x: Array, charges: tuple[Array, Array]
+    ) -> Program:
         """For changes of `x` (N+1, width) in `unit`: what is left stays small against what cancels."""
         n, width, N = self.n, self.width, len(offset)
         tau_z = tau_z * self.unit_z
@@ -298,7 +329,7 @@ class _Steps:
             keep = np.zeros((N, 1, width))
             keep[..., -1] = 1.0
             F, G, c = np.hstack([F, -keep]), np.hstack([G, keep]), np.hstack([c, np.zeros((N, 1))])
-        C, d = self._inequalities(tau_0, tau_z, now)
+        C, d = self._inequalities({"torque": (tau_0, tau_z)} | self._of_patches(now, charges))
         rows = np.eye(width)[self.y if self.asked.is_free else slice(self.y.stop)]
         rest = np.zeros((2, width))
         rest[:, self.y.start : self.y.start + n] = self.asked.rest / self.y_unit[:n]
@@ -333,53 +364,62 @@ class _Steps:
         self.effort = H + of_voltages, g + pull, constant
         return self.effort[:2]
 
-    def _inequalities(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
-        """C and d: limits of voltages at breaks, each in the interval that it begins, and of torques at stages."""
-        asked, N, width = self.asked, len(tau_z), self.width
-        V_max, tau_max = asked.limits.voltage, asked.limits.torque
-        rows, most, owners = [], [], []
-        is_shared = asked.objective == "least-voltage"
-        bounded = np.arange(self.m) if is_shared else np.flatnonzero(np.isfinite(V_max))
-        limit = asked.units[bounded] / asked.weights.voltage
-        at = np.arange(len(bounded))
-        places = [(slice(None), 0)]
-        if asked.is_free:  # else V ends at zero
-            places.append((slice(-1, None), width))  # no interval begins at the last break
-        for sign in (1.0, -1.0):
-            for of_intervals, first in places:
-                of = np.zeros((N, len(bounded), width + self.m))
-                of[of_intervals, at, first + bounded] = sign / limit
+    def _of_patches(self, now: Array, charges: tuple[Array, Array]) -> dict[str, tuple[Array, Array]]:
+        """What patches may have limits of: values (N, rows, m) and derivatives by z; "end" are voltages at the end."""
+        N, m, volt, each = len(now) - 1, self.m, self.asked.weights.voltage, np.arange(self.m)
+        V = volt * now[:, self.V]
+
+        def by_z(start: float | Array, end: float | Array, of: slice = slice(None)) -> Array:
+            found = np.zeros((N, 1, m, self.width + m))
+            found[of, 0, each, each], found[of, 0, each, self.width + each] = volt * start, volt * end
+            return found
+
+        found = {"voltage": (V[:-1, None], by_z(1.0, 0.0))}
+        if self.asked.is_free:  # else V ends at zero
+            found["end"] = np.broadcast_to(V[-1], (N, 1, m)), by_z(0.0, 1.0, slice(-1, None))
+        if charges[0].shape[1] or self.asked.limits.patches.has_rates:
+            C, pace = self.asked.limits.patches.capacitance, 1.0 / self.h[:, None]
+            slope, of_slope = (np.diff(V, axis=0) * pace)[:, None], by_z(-pace, pace)
+            found["slew"] = slope, of_slope
+            found["current"] = charges[0] + C * slope, charges[1] * self.unit_z + C[:, None] * of_slope
+        return found
+
+    def _inequalities(self, values: Mapping[str, tuple[Array, Array]]) -> tuple[Array, Array]:
+        """C and d: limits of voltages at breaks, of their rates and of currents between, and of torques at stages.
+
+        `values` (N, rows, …) with their derivatives by z.
+        """
+        limits, ranges, rows, most = self.asked.limits, self.asked.ranges, [], []
+        of_patches = limits.patches
+        known = {"voltage": of_patches.range, "slew": of_patches.slew, "current": of_patches.current}
+        self.rows, count = {}, 0
+        for name, (now, by_z) in values.items():
+            kind = "voltage" if name == "end" else name
+            is_shared = self.asked.objective == f"least-{kind}"
+            finite = np.isfinite(np.atleast_2d(known.get(kind, limits.torque))).any(axis=0)
+            bounded = np.arange(now.shape[2]) if is_shared else np.flatnonzero(finite)
+            for limit in ranges[kind][:, bounded]:
+                of = by_z[:, :, bounded] / limit[:, None]
+                acts = of.any(axis=3)
+                share = self.sigma if is_shared else 1.0
                 if is_shared:
-                    of[of_intervals, :, width - 1] = -1.0
-                rows.append(of)
-                reached = (of @ np.hstack([now[:-1], now[1:, self.V]])[..., None])[..., 0]
-                most.append(np.where(of.any(axis=2) & is_shared, 0.0, 1.0) - reached)
-                owners.append(bounded)
-        is_shared = asked.objective == "least-torque"
-        motors = np.arange(len(tau_max)) if is_shared else np.flatnonzero(np.isfinite(tau_max))
-        limit = np.where(np.isfinite(tau_max), tau_max, asked.weights.torque)[motors]
-        for sign in (1.0, -1.0):
-            of = sign * tau_z[:, :, motors] / limit[:, None]
-            if is_shared:
-                of[..., width - 1] = -1.0
-            rows.append(of.reshape(N, -1, width + self.m))
-            share = self.sigma if is_shared else 1.0
-            most.append((share - sign * tau_0[:, :, motors] / limit).reshape(N, -1))
-            owners.append(self.m + np.tile(motors, tau_z.shape[1]))
-        self.owners = np.concatenate(owners)
+                    of[..., self.width - 1] = -1.0 * acts
+                rows.append(of.reshape(len(of), -1, of.shape[3]))
+                most.append(np.where(acts, share - now[:, :, bounded] / limit, 1.0).reshape(len(of), -1))
+                repeated = np.tile(bounded, now.shape[1])
+                part = slice(count, count + len(repeated))
+                self.rows[f"{name} {len(self.rows)}"] = part, np.tile(np.abs(limit), now.shape[1]), repeated
+                count = part.stop
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
 
-    def prices(self, found: Minimum) -> tuple[Array, Array]:
+    def prices(self, found: Minimum) -> dict[str, Array]:
         """Those of `Tracked`, by the multipliers of the last program, whose rows are shares of limits."""
-        limits, weights = self.asked.limits, self.asked.weights
-        sizes = [
-            np.where(np.isfinite(limit), limit, unit)
-            for limit, unit in ((limits.voltage, weights.voltage), (limits.torque, weights.torque))
-        ]
-        of_shares = np.bincount(self.owners, found.multipliers.sum(axis=0), minlength=sum(map(len, sizes)))
-        by_voltage, by_torque = np.split(of_shares, [self.m])
-        own = {"least-voltage": (self.sigma, 1.0), "least-torque": (1.0, self.sigma)}.get(self.asked.objective, (1, 1))
-        return own[0] * by_voltage / sizes[0], own[1] * by_torque / sizes[1]
+        prices = {name: np.zeros(range.shape[1]) for name, range in self.asked.ranges.items()}
+        for name, (part, limit, owners) in self.rows.items():
+            kind = name.split()[0].replace("end", "voltage")
+            own = self.sigma if self.asked.objective == f"least-{kind}" else 1.0
+            np.add.at(prices[kind], owners, own * found.multipliers[:, part].sum(axis=0) / limit)
+        return prices
 
     def cost(self, found: Minimum) -> float:
         """J, with what `of_voltages` adds."""

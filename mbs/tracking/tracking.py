@@ -25,6 +25,7 @@ from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_a
 from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
+from ..model.amplifiers import joined
 from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors
 from ..run.context import Context, PatchedLink
@@ -41,9 +42,8 @@ from .advice import (
     singular_times,
 )
 from .intervals import SETTLED, refined, settled, start_breaks
-from .problem import Limits, Objective, Tracked, Transition, Weights, track
+from .problem import RATE, Limits, Objective, Tracked, Transition, Weights, track
 
-RATE = 0.005  # s, T_r where the scene does not say
 VOLT = 200.0  # V_ref where patches have no limits
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
@@ -68,14 +68,15 @@ class EffortWeights(Record):
 class Tracking(TimedAnalysis):
     """Motor torques and patch voltages that carry the robot along its trajectories from rest to rest, within limits.
 
-    Limits are those of [[pzt]] (`limit`) and [[joint]] (`moment_limit`). Without pre- and post-actuation nothing acts
-    before the path begins and after it ends. `least-voltage` finds the smallest share of the limits with which patches
-    can do it, `least-torque` (`least-moment` is another spelling) the smallest torques, and `effort` makes torques
+    Limits are those of [[pzt]] (`limit`, `amplifier`) and [[joint]] (`moment_limit`). Without pre- and post-actuation
+    nothing acts before the path begins and after it ends. `least-voltage` finds the smallest share of the limits with
+    which patches can do it, `least-current` the smallest currents, `least-torque` (`least-moment` is another spelling)
+    the smallest torques, and `effort` makes torques
     beyond the quasi-static ones, voltages and their rates small.
     """
 
     kind: Literal["tracking"]
-    objective: Literal["effort", "least-voltage", "least-torque", "least-moment"] = "effort"
+    objective: Literal["effort", "least-voltage", "least-current", "least-torque", "least-moment"] = "effort"
     """Objective of the optimal control problem."""
     pre_actuation: Around = 0.0
     """Duration of actuation before the path begins, s; "auto" takes it from the zero dynamics."""
@@ -142,14 +143,18 @@ class Tracking(TimedAnalysis):
             place = where(model.scene.path, self)
             raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
         (pre, post), servo = posed.around, posed.servo
-        has_limits, most = np.isfinite(posed.asked.limits.voltage).any(), float(posed.asked.units.max())
+        has_limits, most = np.isfinite(posed.asked.limits.patches.range).any(), float(posed.asked.units.max())
         around = TrackedPath(
             pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
             least_voltage_doubt=least.doubt * least.share * most,
             least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
             held=servo.model, unmet=found.unmet, bounds=bounds,
-            voltage_prices={name: prices[0] for name, prices in _by_body(context, found.prices[0][None]).items()},
-            torque_prices=model.by_motor(found.prices[1]),
+            prices={
+                kind: model.by_motor(of) if kind == "torque" else {
+                    name: prices[0] for name, prices in _by_body(context, of[None]).items()
+                }
+                for kind, of in found.prices.items()
+            },
         )  # fmt: skip
         times = output_times(self.end, self.output_step, pre, post)
 
@@ -174,9 +179,7 @@ class TrackedPath(AroundPath):
     cost: float  # the effort, without unit
     unmet: float  # see `Tracked`
     bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
-    # voltage_prices, torque_prices: `Tracked.prices` by body, and by joint
-    voltage_prices: Mapping[str, Array]
-    torque_prices: Mapping[str, Array]
+    prices: Mapping[str, Mapping[str, Array]]  # `Tracked.prices` by kind, then by body, of torques by joint
     # m or rad, how far off the path the same torques alone are at most; NaN where not found
     without_patches: float = float("nan")
     is_needed: bool = True  # whether that is more than the tolerance times the path's way
@@ -215,8 +218,7 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     check_rest(servo, analysis, (0.0, end))
     per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in patches.values()]
     Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
-    voltage = np.concatenate([of_link.limit for of_link in patches.values()] or [np.zeros(0)])
-    limits = Limits(voltage, largest_moments(model, limits=True))
+    limits = Limits(joined(patches.values()), largest_moments(model, limits=True))
     if not np.any(Phi_V):
         raise InputError(f'{place}: expected patches on flexible links for kind = "tracking", found none that bend one')
     linear = linearise(servo, end)
@@ -247,6 +249,14 @@ def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
     if least.converged:
         return
     asked, limits = posed.asked, posed.asked.limits
+    if limits.patches.has_rates:
+        none = np.full_like(limits.patches.slew, np.inf)
+        free = replace(asked, limits=replace(limits, patches=replace(limits.patches, slew=none, current=none)))
+        if track(free, posed.breaks).converged:
+            raise SolveError(
+                f"{posed.servo.where}: no motion follows the path within the largest current and slew rate of the"
+                " amplifiers, whatever the voltages: slow the path down, or raise current or slew"
+            )
     if np.isfinite(limits.torque).any():
         free = replace(asked, limits=replace(limits, torque=np.full_like(limits.torque, np.inf)))
         if track(free, posed.breaks).converged:
@@ -273,7 +283,7 @@ def _causes(context: Context, posed: _Posed) -> str:
 
 
 def _is_beyond(posed: _Posed, least: Tracked) -> bool:
-    return least.share > 1.0 + ENOUGH and bool(np.isfinite(posed.asked.limits.voltage).any())
+    return least.share > 1.0 + ENOUGH and bool(np.isfinite(posed.asked.limits.patches.range).any())
 
 
 def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
@@ -282,7 +292,8 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     if _is_beyond(posed, least):
         objective = "least-voltage"
     limits = posed.asked.limits  # torques reach beyond them between Gauss points, voltages by rounding
-    kept = Limits(limits.voltage * (1.0 - RESERVE), limits.torque * (1.0 - analysis.tolerance))
+    within = replace(limits.patches, range=limits.patches.range * (1.0 - RESERVE))
+    kept = Limits(within, limits.torque * (1.0 - analysis.tolerance))
     asked = replace(posed.asked, objective=objective, limits=kept)
     breaks = posed.breaks if objective == "effort" and least.share < AMPLE else least.voltage.x
     found = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
@@ -351,7 +362,7 @@ def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
         rest = np.zeros((len(times), len(servo.scale)))
         tau = servo.forces(times, rest, rest, rest)[1]
         torque = 0.5 * float(np.ptp(tau, axis=0).max()) or 1.0
-    known = limits.voltage[np.isfinite(limits.voltage)]
+    known = np.abs(limits.patches.range)[np.isfinite(limits.patches.range)]
     voltage = given.voltage or (float(known.max()) if known.size else VOLT)
     return Weights(torque, voltage, given.rate)
 
@@ -371,6 +382,6 @@ def _outcome(
 
 def _by_body(context: Context, V: Array) -> Mapping[str, Array]:
     """V (T, k) of all patches, by body."""
-    counts = [len(of_link.limit) for of_link in context.patches.values()]
+    counts = [len(of_link.edges) for of_link in context.patches.values()]
     parts: Sequence[Array] = np.split(V, np.cumsum(counts)[:-1], axis=1)
     return dict(zip(context.patches, parts, strict=True))

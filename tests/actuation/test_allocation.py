@@ -9,12 +9,12 @@ from ffrobot.mbs import _core
 RIDGE = 1e-8  # of the forces may be left where many voltages would do: picking the smallest costs so much at most
 
 
-def allocation(Phi, limit, W_sqrt=None):
+def allocation(Phi, limit, W_sqrt=None, lower=None):
     n = len(Phi)
     W_sqrt = np.eye(n) if W_sqrt is None else W_sqrt
     scale = np.where(np.isfinite(limit), limit, 1.0)
     gain = scale[:, None] * np.linalg.pinv(W_sqrt @ Phi * scale) @ W_sqrt
-    return _core.Allocation(Phi, W_sqrt, gain, limit, scale)
+    return _core.Allocation(Phi, W_sqrt, gain, -limit if lower is None else lower, limit, scale)
 
 
 def history(rng, count, n, size):
@@ -26,10 +26,10 @@ def history(rng, count, n, size):
 @pytest.mark.parametrize(("n", "k"), [(10, 10), (10, 4), (6, 14), (20, 20)])
 def test_agrees_with_scipy(n, k):
     rng = np.random.default_rng(n + k)
-    Phi, limit = rng.standard_normal((n, k)), rng.uniform(0.5, 2.0, k)
+    Phi, limit, lower = rng.standard_normal((n, k)), rng.uniform(0.5, 2.0, k), rng.uniform(-1.0, -0.1, k)
     F = history(rng, 50, n, 4.0)
-    V = allocation(Phi, limit).solve(F)
-    expected = np.array([lsq_linear(Phi, f, (-limit, limit), method="bvls", tol=1e-14).x for f in F])
+    V = allocation(Phi, limit, lower=lower).solve(F)
+    expected = np.array([lsq_linear(Phi, f, (lower, limit), method="bvls", tol=1e-14).x for f in F])
     cost, least = (np.linalg.norm(F - x @ Phi.T, axis=1) for x in (V, expected))
     np.testing.assert_allclose(cost, least, rtol=1e-9, atol=RIDGE * np.abs(F).max())
     if k <= n:  # unique

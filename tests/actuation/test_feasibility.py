@@ -90,7 +90,7 @@ def test_remedies_do(word):
     def factor(**keys):
         changed, body = layout.model_copy(update=keys), solution.bodies["link"]
         other = link_patches(solution.scene.path, [changed], body.modal, body.carrying)
-        return np.abs(other.voltages(F_p)["link"].required / other.limit).max()
+        return np.abs(other.voltages(F_p)["link"].required / other.amplifiers.range[1]).max()
 
     match word:
         case "limit":

@@ -105,7 +105,7 @@ def test_allocation_of_20_patches_at_1000_times(benchmark):
     rng, t = np.random.default_rng(9), np.linspace(0, 1, 1000)[:, None]
     Phi, one = rng.standard_normal((20, 20)), np.ones(20)
     F = 6 * np.sin(t * rng.uniform(5, 60, 20) + rng.uniform(0, 6, 20)) * rng.uniform(0.2, 2, 20)
-    solver = _core.Allocation(Phi, np.eye(20), np.linalg.inv(Phi), one, one)
+    solver = _core.Allocation(Phi, np.eye(20), np.linalg.inv(Phi), -one, one, one)
     V = benchmark(solver.solve, F)
     assert np.mean(np.abs(V) == 1.0) > 0.2
     general = seconds(lambda: [lsq_linear(Phi, f, (-1.0, 1.0)) for f in F[::50]]) * 50

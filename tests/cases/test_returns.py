@@ -37,7 +37,7 @@ class Patches:
     def allocation(self, *, limited):
         n, k = self.Phi_V.shape
         limit = self._limit if limited else np.full(k, np.inf)
-        return _core.Allocation(self.Phi_V, np.eye(n), np.linalg.pinv(self.Phi_V), limit, np.ones(k))
+        return _core.Allocation(self.Phi_V, np.eye(n), np.linalg.pinv(self.Phi_V), -limit, limit, np.ones(k))
 
 
 @pytest.fixture(scope="module")

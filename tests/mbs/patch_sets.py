@@ -29,7 +29,7 @@ class Patches:
     def allocation(self, *, limited):
         n, k = self.Phi.shape
         limit = self.limit if limited else np.full(k, np.inf)
-        return _core.Allocation(self.Phi, np.eye(n), np.linalg.pinv(self.Phi), limit, np.ones(n))
+        return _core.Allocation(self.Phi, np.eye(n), np.linalg.pinv(self.Phi), -limit, limit, np.ones(n))
 
 
 def patches(Phi, limit=UNLIMITED):

@@ -23,8 +23,10 @@ constexpr double rounding = 1e-15;       // of the gradient, relative to its ter
 
 } // namespace
 
-Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, VectorXd limit, VectorXd scale)
-    : Phi_(std::move(Phi)), gain_(std::move(gain)), limit_(std::move(limit)), scale_(std::move(scale)) {
+Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, VectorXd lower, VectorXd upper,
+                       VectorXd scale)
+    : Phi_(std::move(Phi)), gain_(std::move(gain)), lower_(std::move(lower)), upper_(std::move(upper)),
+      scale_(std::move(scale)) {
   const Index k = Phi_.cols();
   const MatrixXd A = W_sqrt * Phi_ * scale_.asDiagonal();
   const VectorXd values = RightVectors(A).values;
@@ -43,14 +45,13 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
   A_.bottomRows(k).diagonal().setConstant(std::sqrt(added));
   W_sqrt_ = W_sqrt;
   d_ = left_ = VectorXd::Zero(A_.rows());
-  bound_ = limit_.cwiseQuotient(scale_);
   V_ = u_ = gradient_ = VectorXd::Zero(k);
   held_.assign(static_cast<std::size_t>(k), 0);
 }
 
 const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
   multiply_small(gain_, F.data(), V_.data());
-  if ((V_.array().abs() <= limit_.array()).all()) {
+  if ((V_.array() >= lower_.array()).all() && (V_.array() <= upper_.array()).all()) {
     u_ = V_.cwiseQuotient(scale_);
     std::fill(held_.begin(), held_.end(), 0);
     return V_;
@@ -62,7 +63,7 @@ const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
     if (!move())
       continue;
     if (!release()) {
-      V_ = u_.cwiseProduct(scale_).cwiseMax(-limit_).cwiseMin(limit_);
+      V_ = u_.cwiseProduct(scale_).cwiseMax(lower_).cwiseMin(upper_);
       return V_;
     }
   }
@@ -76,15 +77,17 @@ bool Allocation::move() {
   minimise();
   double length = 1;
   Index first = -1;
+  int side = 0;
   for (std::size_t f = 0; f < free_.size(); ++f) {
     const Index j = free_[f];
     const double target = target_[static_cast<Index>(f)], way = target - u_[j];
-    if (std::abs(target) <= bound_[j])
+    if (std::abs(target) <= std::abs(bound(j, target)))
       continue;
-    const double until = std::max(0.0, (std::copysign(bound_[j], target) - u_[j]) / way);
+    const double until = std::max(0.0, (bound(j, target) - u_[j]) / way);
     if (until < length) {
       length = until;
       first = j;
+      side = target > 0 ? 1 : -1;
     }
   }
   for (std::size_t f = 0; f < free_.size(); ++f) {
@@ -93,8 +96,8 @@ bool Allocation::move() {
   }
   if (first < 0)
     return true;
-  held_[static_cast<std::size_t>(first)] = u_[first] > 0 ? 1 : -1;
-  u_[first] = std::copysign(bound_[first], u_[first]);
+  held_[static_cast<std::size_t>(first)] = side;
+  u_[first] = bound(first, side);
   return false;
 }
 

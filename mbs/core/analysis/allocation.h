@@ -7,8 +7,8 @@
 
 namespace ffrobot {
 
-// Minimises |W_sqrt (F - Phi V)|^2 over -limit <= V <= limit. Always has a solution; where it is not unique, the
-// smallest voltages relative to `scale` are picked.
+// Minimises |W_sqrt (F - Phi V)|^2 over lower <= V <= upper, 0 among them. Always has a solution; where it is not
+// unique, the smallest voltages relative to `scale` are picked.
 //
 // Active sets (P. B. Stark and R. L. Parker, Comput. Stat. 10, 1995: BVLS): voltages at a limit are held there, the
 // others go to their minimum or to the first limit on the way; then the one that presses most against the inner side of
@@ -18,9 +18,9 @@ class Allocation {
 public:
   // Phi: (n, k) modal forces per volt; W_sqrt: (rows, n); gain: (k, n) the best voltages without limits, V = gain F,
   // which are taken wherever they are within the limits (of many the smallest relative to scale, so that V does not
-  // jump where the first limit is met); limit: (k), infinite where there is none; scale: (k) ordinary voltages.
-  Allocation(Eigen::MatrixXd Phi, const Eigen::MatrixXd &W_sqrt, Eigen::MatrixXd gain, Eigen::VectorXd limit,
-             Eigen::VectorXd scale);
+  // jump where the first limit is met); lower, upper: (k), infinite where there is none; scale: (k) ordinary voltages.
+  Allocation(Eigen::MatrixXd Phi, const Eigen::MatrixXd &W_sqrt, Eigen::MatrixXd gain, Eigen::VectorXd lower,
+             Eigen::VectorXd upper, Eigen::VectorXd scale);
 
   // Voltages (k) for the modal forces F (n).
   const Eigen::VectorXd &solve(const Eigen::Ref<const Eigen::VectorXd> &F);
@@ -29,12 +29,13 @@ public:
   unsigned long iterations() const { return iterations_; }
 
 private:
+  double bound(Eigen::Index j, double side) const { return (side > 0 ? upper_ : lower_)[j] / scale_[j]; } // of u
   bool move();
   void minimise();
   bool release();
 
   Eigen::MatrixXd Phi_, gain_, W_sqrt_, A_; // A u = d with u = V / scale: W_sqrt Phi scale u = W_sqrt F, ridge u = 0
-  Eigen::VectorXd limit_, scale_, bound_;   // bound: limits of u
+  Eigen::VectorXd lower_, upper_, scale_;
   Eigen::VectorXd V_, u_, d_, left_, gradient_, target_; // left: d - A u
   std::vector<int> held_;                                // sign of the limit at which a voltage is held, 0 where free
   std::vector<Eigen::Index> free_, factorised_;

@@ -1,0 +1,90 @@
+"""Amplifiers of patches: their limits, the current that a motion takes, and the voltages that arrive of those wanted.
+
+A patch is a capacitor that its link stretches. By reciprocity its charge is q = C V + Φ_Vᵀ p: Φ_V are the modal forces
+of a volt, C is the capacitance of the patch on a link that stands still (Lee and Moon, J. Appl. Mech. 57, 1990).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Protocol
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.structs import struct
+
+
+@struct
+class Amplifiers:
+    """Of k patches; without an amplifier limits are infinite, and voltages arrive at once."""
+
+    range: Array  # (2, k) smallest and largest voltage, V
+    slew: Array  # (k,) largest rate of the voltage, V/s
+    current: Array  # (k,) largest current, A
+    capacitance: Array  # (k,) F, see above
+    bandwidth: Array  # (k,) of first order, Hz
+    delay: Array  # (k,) s
+
+    @property
+    def lag(self) -> Array:
+        """(k,) time constants, s."""
+        return 1.0 / (2 * np.pi * self.bandwidth)
+
+    @property
+    def has_rates(self) -> bool:
+        """Whether any rate or current is limited."""
+        return bool(np.isfinite([self.slew, self.current]).any())
+
+    @property
+    def acts(self) -> bool:
+        """Whether voltages may arrive late."""
+        return self.has_rates or bool(self.lag.any() or self.delay.any())
+
+    def unlimited(self) -> Amplifiers:
+        """The same with lag and delay alone."""
+        none = np.full_like(self.slew, np.inf)
+        return Amplifiers(np.stack([-none, none]), none, none, self.capacitance, self.bandwidth, self.delay)
+
+    def advance(self, h: float, now: Array, wanted: tuple[Array, Array], strain: Array) -> tuple[Array, Array]:
+        """Voltages (k,) after a step `h` (s) from those `now`, and their means, V.
+
+        `wanted` is linear in the step, from its first to its second value; `strain` (k,) the current Φ_Vᵀ ṗ in it, A.
+        """
+        with np.errstate(divide="ignore"):
+            x = h / self.lag
+        first, last = (np.clip(one, *self.range) for one in wanted)
+        decay, late = np.exp(-x), (last - first) / x
+        share = -np.expm1(-x) / x
+        after = last - late + (now - first + late) * decay
+        mean = (first + last) / 2 - late + (now - first + late) * share
+        most = h * np.minimum(self.slew, (self.current - strain) / self.capacitance)
+        least = -h * np.minimum(self.slew, (self.current + strain) / self.capacitance)
+        kept = np.clip(np.clip(after, now + least, now + most), *self.range)
+        return kept, np.where(kept == after, mean, (now + kept) / 2)
+
+    def output(self, times: Array, wanted: Array, strain: Array) -> Array:
+        """Voltages (T, k) at `times` (T,), s, of those `wanted` (T, k), linear between; `strain` (T, k) as before."""
+        late = [np.interp(times - d, times, V) for d, V in zip(self.delay, wanted.T, strict=True)]
+        asked, found = np.stack(late, axis=1), np.zeros_like(wanted)
+        found[0] = np.clip(asked[0], *self.range)
+        for k, h in enumerate(np.diff(times)):
+            found[k + 1] = self.advance(h, found[k], (asked[k], asked[k + 1]), (strain[k] + strain[k + 1]) / 2)[0]
+        return found
+
+
+class Driven(Protocol):
+    """What has amplifiers."""
+
+    @property
+    def amplifiers(self) -> Amplifiers:
+        """Those of its patches."""
+
+
+def joined(links: Iterable[Driven]) -> Amplifiers:
+    """Of all patches of links, one link after the other."""
+    none = np.zeros(0)
+    parts = [Amplifiers(np.zeros((2, 0)), *[none] * 5), *(of_link.amplifiers for of_link in links)]
+    keys = [field.name for field in fields(Amplifiers)]
+    return Amplifiers(*(as_floats(np.concatenate([getattr(of, key) for of in parts], axis=-1)) for key in keys))

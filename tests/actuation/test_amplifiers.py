@@ -1,0 +1,144 @@
+"""Amplifiers of patches: responses in closed form, currents by charges, and limits in tracking, replays and loops."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from patches_on_links import layout
+
+import ffrobot
+from ffrobot.common.errors import SolveError
+
+pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "tracking.md"
+TIME = np.linspace(0.0, 0.01, 1001)
+
+
+def output(wanted, strain=0.0, **keys):
+    """What arrives of a voltage over `TIME`, at a patch with 1 nF or so."""
+    amplifiers = layout(count=1, amplifier=keys).amplifiers()
+    columns = (np.broadcast_to(of, TIME.shape)[:, None] for of in (wanted, strain))
+    return amplifiers.output(TIME, *columns)[:, 0], float(amplifiers.capacitance[0])
+
+
+def test_responses_in_closed_form():
+    """Lag and delay of a ramp; rates by slew, and by current over capacitance with the current of the strain."""
+    ramp, tau = 2e4 * TIME, 1.0 / (2 * np.pi * 500.0)
+    found, C = output(ramp, bandwidth=500.0)
+    np.testing.assert_allclose(found, 2e4 * (TIME - tau * -np.expm1(-TIME / tau)), atol=1e-10)
+    np.testing.assert_allclose(output(ramp, delay=1e-3)[0], 2e4 * np.maximum(TIME - 1e-3, 0.0), atol=1e-10)
+    np.testing.assert_allclose(output(ramp, slew=5e3)[0], 5e3 * TIME, atol=1e-10)
+    np.testing.assert_allclose(output(ramp, range=(-50.0, 80.0))[0], np.minimum(ramp, 80.0), atol=1e-10)
+    strain = 0.25e4 * C
+    np.testing.assert_allclose(output(ramp, strain, current=1e4 * C)[0], 0.75e4 * TIME, atol=1e-10)
+    np.testing.assert_allclose(output(-ramp, strain, current=1e4 * C)[0], -1.25e4 * TIME, atol=1e-10)
+
+
+def test_capacitance():
+    """ε w l/t of each layer and face; on a link that stands still, 1 − k31² of it."""
+    of = layout(count=1, face="both", layers=3, permittivity=2e-8)
+    free = 2 * 3 * 2e-8 * 0.025 * 0.05 / 0.75e-3
+    assert of.capacitance() == pytest.approx(free, rel=1e-14)
+    k31 = 110e-12 * (63e9 / 2e-8) ** 0.5
+    assert of.capacitance(clamped=True) == pytest.approx(free * (1.0 - k31**2), rel=1e-13)
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """The soft arm of the page on tracking with an amplifier, its text changed by pairs."""
+    blocks = dict(re.findall(r"`(\w+\.toml)`:\n\n```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
+
+    def solve(amplifier, *changes, limit="limit = 200.0"):
+        for name, text in blocks.items():
+            for old, new in (("limit = 200.0 ", f"{limit}\n[pzt.amplifier]\n{amplifier}\n#"), *changes):
+                assert old in text or name != "scene.toml"
+                text = text.replace(old, new)
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        return ffrobot.solve(tmp_path / "scene.toml")
+
+    return solve
+
+
+def off_path(results, name):
+    found, wanted = (results[f"{of}/points/arm.tip/position"] for of in (name, "carried"))
+    return float(np.abs(found - wanted).max())
+
+
+def test_currents_of_tracking(solved):
+    """Limits hold between outputs of 0.1 ms, the charge by C V + Φ_Vᵀ p; the price of a limit by differences."""
+    costs = []
+    for current in (0.0147, 0.015, 0.0153):
+        with solved(f"current = {current}", ("output_step = 0.002", "output_step = 1e-4")) as results:
+            costs.append(results.attributes("carried/tracking")["cost"])
+            if current != 0.015:
+                continue
+            judged = "carried/feasibility/pzt/arm"
+            assert results[f"{judged}/factor"].max() == pytest.approx(1.0, abs=1e-6)
+            assert results[f"{judged}/current"].max() <= current * (1.0 + 1e-6)
+            V, time = results["carried/pzt/arm/voltage"], results.time("carried")
+            C = results.attributes("carried/pzt/arm")["capacitance"] * (1 - 110e-12**2 * 63e9 / (1700 * 8.8541878e-12))
+            alone = C * np.abs(np.diff(V, axis=0)).max() / (time[1] - time[0])
+            assert 0.7 * current < alone < 1.3 * current  # the strain takes the rest
+            price = results["carried/tracking/current_price/arm"].sum()
+            assert off_path(results, "replay") < 1e-7
+    assert price == pytest.approx((costs[0] - costs[2]) / 6e-4, rel=1e-3)
+
+
+def test_least_current_and_what_is_less(solved):
+    """No motion needs less than the least current."""
+    objective = 'kind = "tracking"', 'kind = "tracking"\nobjective = "least-current"'
+    with solved("current = 0.02", objective) as results:
+        least = results["carried/feasibility/pzt/arm/current"].max()
+    assert 0.004 < least < 0.01
+    with solved(f"current = {1.05 * least}") as results:
+        assert results.attributes("carried/tracking")["objective"] == "effort"
+    with solved(f"current = {0.9 * least}") as results:
+        assert results.attributes("carried/tracking")["least_share"] > 1.0  # with higher voltages
+    with pytest.raises(SolveError, match="within the largest current and slew rate of the amplifiers"):
+        solved("current = 1e-7")
+
+
+def test_unequal_ranges(solved):
+    """Of each patch its own; the least voltage is a share of both limits."""
+    ranges = [[-300.0, 250.0], [-200.0, 200.0], [-250.0, 300.0], [-90.0, 200.0]]
+    with solved(f"range = {ranges}", limit="") as results:
+        V = results["carried/pzt/arm/voltage"]
+        lowest, highest = np.array(ranges).T
+        assert (lowest * (1.0 + 1e-9) <= V).all()
+        assert (highest * (1.0 + 1e-9) >= V).all()
+        assert results.verdict["carried"].feasible
+        np.testing.assert_array_equal(results.attributes("carried/pzt/arm")["range"], np.transpose(ranges))
+
+
+def test_amplifiers_in_replays_and_loops(solved):
+    """A lag of 1 kHz costs microns; a loop without controllers, sampled fast, has the same voltages and motion."""
+    loop = """kind = "closed-loop"
+sample_time = 1e-4
+delay = 0.0
+feed_forward = "joints+pzt"
+actuation = "carried"
+"""
+    changes = ('kind = "forward"\nactuation = "carried"\napply = "joints"\n', loop)
+    with solved("bandwidth = 1000.0\ndelay = 2e-4", changes) as results:
+        assert 5e-6 < off_path(results, "replay") < 4e-5
+        found = [results[f"{name}/points/arm.tip/position"] for name in ("replay", "without_patches")]
+        assert np.abs(found[1] - found[0]).max() < 0.1 * off_path(results, "replay")
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({"amplifier": {"range": (50.0, 200.0)}}, "range: expected a negative and a positive voltage"),
+        ({"amplifier": {"range": (200.0, -50.0)}}, r"found \[200, -50\]"),
+        ({"amplifier": {"slew": (1e3, 1e3)}}, "slew: expected 10 values, one for each patch, found 2"),
+        ({"amplifier": {"range": (-50.0, 200.0)}, "limit": 100.0}, 'one of the keys "limit" and "amplifier.range"'),
+        ({"amplifier": {"current": 0.0}}, "greater than 0"),
+        ({"permittivity": 0.0}, "greater than 0"),
+        ({"permittivity": 7e-10}, r"above 7\.623e-10 F/m"),
+    ],
+)
+def test_amplifiers_that_do_not_fit(keys, text):
+    with pytest.raises(ValueError, match=text):
+        layout(**keys)
