@@ -273,6 +273,8 @@ def _feed_forward(
 
 def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: MotorCoordinates) -> State:
     """As the inverse analysis starts, or as the scene says, compliant gears with their twist there."""
+    if context.start is not None:
+        return context.start
     q, v = moved.q[0].copy(), moved.v[0].copy()
     if analysis.start == "actuation":
         return State(q, v)

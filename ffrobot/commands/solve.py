@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     "-o", "--output", metavar="RESULTS.h5", type=FILE, help="Output file [SCENE.results.h5 next to the input]."
 )
 @click.option("--resume", is_flag=True, help="Resume a stopped run from its results file.")
+@click.option("--robust", is_flag=True, help="State what remains of tracking and motors-only motions under deviations.")
 @click.option("--strict", is_flag=True, help="Exit code 1 if there is a warning; results are written nevertheless.")
 @python_option
 @logging_options
-def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) -> None:
+def solve(scene_file: Path, output: Path | None, *, resume: bool, robust: bool, strict: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
     Stage 1 runs first for link files that are not up to date. Prints a summary of at most fifteen lines: by analysis
@@ -42,24 +43,29 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     protect(files_of(scene_file))
     check_output(path, FORMAT)
     again = f"ffrobot solve {scene_file}{f' -o {output}' if output else ''} --resume"
-    _solve(scene_file, path, again, resume=resume, strict=strict)
+    _solve(scene_file, path, again, resume=resume, robust=robust, strict=strict)
 
 
-def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
+def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, robust: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
     from ..present.console import Display, summary_console, summary_width
-    from ..present.lines import error_budget, folded
+    from ..present.lines import error_budget, folded, named_tables
     from ..present.start_postures import chosen_posture
     from ..present.summary import summary_lines
     from ..results.file import Results
     from ..results.resume import how_to_go_on, resume_scene
+    from ..results.tables import robustness_cells
     from ..results.write import write_results
     from ..run.solve import solve_scene
     from ..scene.load import load_scene
     from ..scene.plausibility import remarks
 
     scene = load_scene(scene_file)
+    if robust:
+        from ..run.robustness import robust as robustly
+
+        scene = robustly(scene)
     remarked = list(folded(remarks(scene)))
     for remark in remarked:  # first: they may be why the run fails
         click.echo(f"note       {remark}")
@@ -96,6 +102,10 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         accuracy = "; ".join(error_budget(solution))
         lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarked))
         click.echo("\n".join(lines))
+        with Results(path) as results:
+            rows = [(name, cells) for name in results.analyses for cells in robustness_cells(results, name)]
+            for table in named_tables("robustness of", rows):
+                summary_console().print(table)
     _check_ended(solution, display, scene_file, again)
     for name, result in solution.analyses.items() if strict else ():
         for text in result.warnings:

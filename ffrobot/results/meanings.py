@@ -123,6 +123,7 @@ linear/controllability | | of each mode, 0 to 1
 linear/observability | | of each mode, 0 to 1
 linear/zeros/* | rad/s | real and imaginary part
 placement/** | | patches that were found
+robustness/* | m | largest distance of the tip from the computed motion, by cause
 tip_error | m | distance from the reference
 control/time | s | of samples
 control/readings | | of sensors, in their units | readings

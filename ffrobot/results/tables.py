@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .file import Results, status_in_words
-from .verdict import AnalysisVerdict, vibrates
+from .verdict import AnalysisVerdict, millimeters, vibrates
 
 if TYPE_CHECKING:
     from ..actuation.control.metrics import Metrics
@@ -56,6 +56,19 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
             "limit (V)": span if is_limited else "none",
             "required /\nlimit": f"{ratio:.3g}" if is_limited else "",
             "condition\nnumber": f"{about['condition_number']:.3g}",
+        }
+
+
+def robustness_cells(results: Results, analysis: str) -> Iterator[Cells]:
+    """Largest distance of the tip from the computed motion by cause, lanes side by side."""
+    if not results.has(group := f"{analysis}/robustness"):
+        return
+    for k, cause in enumerate(results.attributes(group)["causes"]):
+        lanes = sorted(results.names(group), key=lambda lane: (lane != "open_loop", lane))
+        values = {lane.replace("_", " "): results[f"{group}/{lane}"][k] for lane in lanes}
+        yield {"tip off by": str(cause)} | {
+            lane: "" if np.isnan(of) else millimeters(of, 3) if np.isfinite(of) else "failed"
+            for lane, of in values.items()
         }
 
 

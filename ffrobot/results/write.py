@@ -92,6 +92,12 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
     for point, found in result.settling.items():
         group.create_group(f"settling/{point}").attrs.update(vars(found))
+    if (left := result.deviations) is not None:
+        about = group.create_group("robustness")
+        about.attrs["bandwidth"] = left.bandwidth
+        about.attrs.create("causes", list(left.causes), dtype=h5py.string_dtype())
+        for lane, values in left.lanes.items():
+            about[lane] = values
     for key, values in vars(result.energies).items():
         group[f"energy/{key}"] = values
     group["momentum/linear"] = motion.space.along(result.momentum.linear)

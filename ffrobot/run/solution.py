@@ -46,6 +46,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.points import PointForces, PointSet
     from .actuation import Actuation
     from .mode_search import ModeChoice
+    from .robustness import Deviations
 
 
 @struct
@@ -114,6 +115,7 @@ class AnalysisResult:
         sharing: reactions that redundant constraints leave open; None where there are none.
         predicted_shift: by point, (T, 3) m: what voltages within their limits leave undone.
         settling: by point, of runs whose paths end before them.
+        deviations: what is left of it where the robot is not its model, where that is asked for.
     """
 
     run: Outcome
@@ -127,6 +129,7 @@ class AnalysisResult:
     sharing: Sharing | None = None
     predicted_shift: Mapping[str, Array] = field(default_factory=dict)
     settling: Mapping[str, Settling] = field(default_factory=dict)
+    deviations: Deviations | None = None
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:

@@ -92,11 +92,30 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
             from .finer import with_finer_check
 
             solution = with_finer_check(solution, prepare_scene, watcher)
+        solution = _with_deviations(solution, interruption)
         if keep is not None and solution.outcomes:
             keep(solution)
     if solution.failure is not None:
         raise solution.failure
     return solution
+
+
+def _with_deviations(solution: Solution, interruption: Interruption) -> Solution:
+    """The solution with what is left of completed motions where the robot is not its model, where that is asked for."""
+    results, failure = dict(solution.analyses), solution.failure
+    for name, result in solution.analyses.items():
+        if getattr(result.analysis, "robustness", None) is None or result.status != "completed":
+            continue
+        from .robustness import deviations
+
+        interruption.watcher.stage(f'robustness of "{name}"')
+        try:
+            with of_file(solution.scene.path):
+                context = _context(solution, result.analysis, results, interruption)
+                results[name] = replace(result, deviations=deviations(context, result.run))
+        except Exception as error:
+            failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
 
 
 def _with_enough_modes(solution: Solution, interruption: Interruption) -> Solution:

@@ -83,7 +83,7 @@ class Forward(ActuatedAnalysis):
         if self.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
             replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
         run = drive_robot(
-            model, self, State(source.q[0], source.v[0]), progress,
+            model, self, context.start or State(source.q[0], source.v[0]), progress,
             drives=Drives(replayed=replayed), times=replay_times(source, self), earlier=context.earlier,
         )  # fmt: skip
         if self.apply == "trajectory":  # others act without what makes up for vibrations

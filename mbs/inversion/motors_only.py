@@ -30,6 +30,7 @@ from ..run.context import Context
 from ..run.integrators import Choice
 from ..run.outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
 from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
+from ..scene.robustness import Robustness
 from .servo import Servo, Stopped, make_servo
 from .stable_inversion import Inversion, invert, shape_of
 from .zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along
@@ -156,6 +157,8 @@ class MotorsOnly(TimedAnalysis):
     """Duration of torques after the path, s; by default from the zero dynamics."""
     check: Check = None
     """Forward simulation under the result with twice the modes ("finer")."""
+    robustness: Robustness | None = None
+    """Simulations under the result where the robot is not its model."""
 
     is_integrated = True
     applicable = ("joints",)

@@ -148,6 +148,20 @@ def transformed(body: Body, T: Array, stiffness: Array) -> Body:
     )
 
 
+def scaled(body: Body, *, mass: float = 1.0, stiffness: float = 1.0) -> Body:
+    """The body with `mass` and `stiffness` times its own everywhere, at the same damping ratios."""
+    of_mass = ("mass", "first_moment", "second_moment", "S_bar", "I_bar", "S_bar_kl", "J_spin", "h_spin", "S_spin")
+    damping = body.damping * (mass * stiffness) ** 0.5
+    heavier = replace(body, damping=damping, **{key: mass * getattr(body, key) for key in of_mass})
+    if (of := body.stiffening) is not None:
+        scaled_up = {key: mass * getattr(of, key) for key in ("K_s", "K_x", "S_turned")}
+        heavier = replace(heavier, stiffening=replace(of, **scaled_up))
+    found = transformed(heavier, np.eye(body.n_modes) / mass**0.5, body.stiffness * stiffness / mass)
+    if (kept := body.reduction) is not None:
+        found = replace(found, reduction=replace(kept, whole=scaled(kept.whole, mass=mass, stiffness=stiffness)))
+    return found
+
+
 def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> Body:
     """All modes of a modal body; `stiffened`: with geometric stiffening; `is_planar`: for motion in z = 0 alone.
 

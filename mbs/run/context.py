@@ -11,6 +11,7 @@ from ...common.structs import struct
 from .. import _core
 from ..model.amplifiers import Amplifiers
 from ..model.divided_link import DividedLink
+from ..model.known_motion import State
 from ..model.model import Model
 from .drive import Progress
 from .outcome import EarlierRun, Outcome
@@ -85,6 +86,7 @@ class Context:
     patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # of links by body
     points: Mapping[str, ActuationPoints] = field(default_factory=dict)  # actuation points by body
     at_points: ForcesAtPoints = no_points  # what driving forces are there
+    start: State | None = None  # of a replay, in place of where the run that it replays starts
     whole: WholeLinks | None = None  # the links, where `model` has pieces of some
 
 

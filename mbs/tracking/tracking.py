@@ -32,6 +32,7 @@ from ..run.context import Context, PatchedLink
 from ..run.integrators import Choice
 from ..run.outcome import Outcome, Statistics
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
+from ..scene.robustness import Robustness
 from .advice import (
     Bounds,
     bounds_of_zeros,
@@ -88,6 +89,8 @@ class Tracking(TimedAnalysis):
     """Number of intervals to begin with; where they leave more than the tolerance, more follow."""
     check: Check = None
     """Forward simulation under the result with twice the modes ("finer"), and the least voltage with these."""
+    robustness: Robustness | None = None
+    """Simulations under the result where the robot is not its model."""
 
     is_integrated = True
     applicable = ("joints", "joints+pzt")

@@ -1,0 +1,196 @@
+"""What is left of a computed motion where the robot is not its model: a table of simulations, of one cause each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..actuation.context import ActuatedContext
+from ..actuation.control.closed_loop import ClosedLoop
+from ..actuation.control.records import JointPid, Sensor
+from ..actuation.control.robot import Robot
+from ..common.arrays import Array
+from ..common.errors import InputError, SolveError
+from ..common.structs import struct
+from ..mbs.analysis.forward import Forward
+from ..mbs.analysis.operating_points import locked_motors
+from ..mbs.linear.statics import static_equilibrium
+from ..mbs.model.body import scaled
+from ..mbs.model.gears import elastic_joints
+from ..mbs.model.known_motion import State, mass_matrices
+from ..mbs.model.model import Model, build_model, without_paths
+from ..mbs.run.context import place_of
+from ..mbs.run.outcome import Outcome
+from ..mbs.scene.loads import Load
+from ..mbs.scene.robustness import Robustness
+from ..scene.scene import Scene
+
+SAMPLED = 0.25  # of the rate with which damping acts on bending links, 1/sample time: half of it per unit of bandwidth
+LOOSEST = 1e-6  # tolerance of the simulations: open-loop arms add up errors
+
+
+@struct
+class Deviations:
+    """Largest distance (m) of the tip from the computed motion, by lane, of each cause; NaN where that has no meaning.
+
+    Infinite where the simulation ended early. `bandwidth` (rad/s): of the joint controller.
+    """
+
+    causes: tuple[str, ...]
+    lanes: Mapping[str, Array]  # (causes,)
+    bandwidth: float
+
+
+def robust(scene: Scene) -> Scene:
+    """The scene with robustness asked of all analyses that can state it."""
+    changed = [
+        one.model_copy(update={"robustness": Robustness()}) if getattr(one, "robustness", one) is None else one
+        for one in scene.analysis
+    ]
+    return scene.model_copy(update={"analysis": tuple(changed)})
+
+
+def deviations(context: ActuatedContext, source: Outcome) -> Deviations:
+    """Of the result of an analysis that asks for them. Raises `InputError` for robots with compliant gears."""
+    asked: Robustness = source.analysis.robustness  # type: ignore[attr-defined]
+    if elastic_joints(context.model):
+        raise InputError(
+            f'{context.model.scene.path}: analysis "{source.analysis.name}": robustness: expected rigid gears, found'
+            " joints with stiffness; closed-loop analyses simulate these"
+        )
+    runs, nominal, held = _Runs(context, source, asked), context.model, f"held for {1e3 * asked.sample_time:g} ms"
+    robots: dict[str, list[Model]] = {"as computed": [nominal], held: [nominal]}
+    for cause, robot in _varied(nominal, asked):
+        robots.setdefault(cause, []).append(robot)
+    forces = asked.force * np.eye(3)[: 2 if nominal.scene.is_planar else 3]
+    robots[f"{asked.force:g} N at the tip"] = [_with_force(nominal, runs.points[-1], force) for force in forces]
+
+    def lane(run: Callable[[Model], Outcome], *, is_sampled: bool) -> Array:
+        """Those that are sampled anyhow have no first row."""
+        first = [np.nan] if is_sampled else [runs.worst(run, [nominal]), runs.worst(runs.held, [nominal])]
+        return np.array(first + [runs.worst(run, of) for of in list(robots.values())[len(first) :]])
+
+    lanes = {
+        "open_loop": lane(runs.replayed, is_sampled=False),
+        "joint_control": lane(runs.controlled, is_sampled=True),
+    }
+    if runs.applied != "joints":
+        lanes["joint_control_without_voltages"] = lane(partial(runs.controlled, part="joints"), is_sampled=True)
+    return Deviations(tuple(robots), lanes, runs.bandwidth)
+
+
+def _varied(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
+    """Robots with other links, by cause: the same for both signs."""
+    for what in ("stiffness", "mass"):
+        for share in asked.parameters:
+            for factor in (1.0 - share, 1.0 + share):
+                bodies = [scaled(body, **{what: factor}) if body.n_modes else body for body in _bodies(model)]
+                yield f"{what} ± {100 * share:g} %", build_model(model.scene, bodies)
+
+
+def _bodies(model: Model) -> list[Any]:
+    names = {body.name for body in model.scene.body}
+    return [node.body for node in model.tree.nodes if node.body.name in names]
+
+
+def _with_force(model: Model, point: str, force: Array) -> Model:
+    keys = {axis: f"{size!r}" for axis, size in zip("xyz", force.tolist(), strict=True) if size}
+    load = Load.model_validate({"point": point, **keys})
+    return build_model(model.scene.model_copy(update={"load": (*model.scene.load, load)}), _bodies(model))
+
+
+class _Runs:
+    """Simulations of other robots under what `source` found."""
+
+    def __init__(self, context: ActuatedContext, source: Outcome, asked: Robustness) -> None:
+        given, scene = source.analysis, context.model.scene
+        self.context = replace(context, outcomes={**context.outcomes, given.name: source}, earlier=None)
+        self.source, self.asked = source, asked
+        self.applied = "joints+pzt" if "joints+pzt" in given.applicable else "joints"
+        nodes = [node for node in source.model.tree.nodes if node.body.points]
+        tip = f"{nodes[-1].body.name}.{'tip' if 'tip' in nodes[-1].body.points else next(iter(nodes[-1].body.points))}"
+        followed = dict.fromkeys(path.point for path in scene.trajectory if path.point is not None)
+        self.points = [place_of(context.whole, point) for point in followed] or [scene.tool_point or tip]
+        lowest = [float(node.body.stiffness.min()) ** 0.5 for node in nodes if node.body.n_modes]
+        self.bandwidth = asked.bandwidth or 0.5 * min(lowest, default=2.0 / asked.sample_time)
+        self.keys = {
+            "name": "robustness", "actuation": given.name, "end": given.last_time,
+            "output_step": getattr(given, "output_step", 0.0), "tolerance": min(given.tolerance, LOOSEST),
+        }  # fmt: skip
+        self.wanted = [_positions(source, point) for point in self.points]
+        self.controller = self._controller()
+
+    def _controller(self) -> dict[str, Any]:
+        """Critically damped with rigid links, and slow enough for its samples where links bend away from the motors."""
+        model, motors = self.context.model, self.context.model.motors
+        columns = np.concatenate([*motors.values()]).astype(int)
+        arm = Robot(without_paths(model), self.context.patches, self.source).rigid()
+        angles = arm.angles()
+        rigid = np.diag(np.linalg.inv(arm.terms(angles, np.zeros_like(angles))[0]))
+        bending = np.diag(np.linalg.inv(mass_matrices(model, self.source.q[:1])[0]))[columns]
+        if self.asked.bandwidth is None:
+            slow_enough = SAMPLED / self.asked.sample_time * float((rigid / bending).min())
+            self.bandwidth = min(self.bandwidth, slow_enough)
+        gains, first = {}, 0
+        for joint, of in motors.items():
+            gains[joint] = float((1.0 / rigid[first : first + len(of)]).min()) * self.bandwidth**2
+            first += len(of)
+        damping = {joint: 2.0 * gain / self.bandwidth for joint, gain in gains.items()}
+        pid = JointPid(kind="joint-pid", proportional=gains, derivative=damping, rate="difference")
+        encoders = [Sensor(joint=joint, resolution=self.asked.resolution) for joint in motors]
+        return {"controller": (pid,), "sensor": tuple(encoders)}
+
+    def replayed(self, model: Model) -> Outcome:
+        """Under the torques and voltages of the source, at any time."""
+        return self._run(Forward.model_validate({**self.keys, "kind": "forward", "apply": self.applied}), model)
+
+    def controlled(self, model: Model, part: str = "") -> Outcome:
+        """Sampled, with the controller of the joints."""
+        return self.held(model, part, self.controller)
+
+    def held(self, model: Model, part: str = "", controller: Mapping[str, Any] | None = None) -> Outcome:
+        """Sampled, with a controller beside them or without."""
+        keys = {"kind": "closed-loop", "sample_time": self.asked.sample_time, "feed_forward": part or self.applied}
+        return self._run(ClosedLoop.model_validate({**self.keys, **keys, **(controller or {})}), model)
+
+    def _run(self, analysis: Any, model: Model) -> Outcome:
+        run = analysis.run(replace(self.context, model=model, start=self._start(model)))
+        assert isinstance(run, Outcome)
+        return run
+
+    def _start(self, model: Model) -> State | None:
+        """At rest with the motors where those of the source begin, links in equilibrium; None for its own model."""
+        if model is self.context.model:
+            return None
+        alone, source = without_paths(model), self.source
+        q = source.q[0].copy()
+        for node in alone.tree.nodes:
+            q[node.p_q] = 0.0
+        return static_equilibrium(
+            replace(alone, rows=(*alone.rows, *locked_motors(alone, q))), State(q, 0.0 * source.v[0])
+        )
+
+    def worst(self, run: Callable[[Model], Outcome], robots: Sequence[Model]) -> float:
+        """The largest distance, m, of the followed points from where they are to be; infinite where a run fails."""
+        most = 0.0
+        for robot in robots:
+            try:
+                found = run(robot)
+            except SolveError:
+                return np.inf
+            if found.failed or len(found.time) < len(self.source.time):
+                return np.inf
+            offs = (
+                np.linalg.norm(_positions(found, p) - at, axis=1)
+                for p, at in zip(self.points, self.wanted, strict=True)
+            )
+            most = max(most, *(float(off.max()) for off in offs))
+        return most
+
+
+def _positions(run: Outcome, point: str) -> Array:
+    return run.model.tree.places(run.q).at(run.model.tree.section(point)).r
