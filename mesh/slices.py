@@ -157,19 +157,25 @@ def _lattice(tetrahedral: bool, affine: bool, degree: int) -> tuple[Array, Integ
     return points, corners.reshape(-1, 4)
 
 
+GRAZING = 1e-2  # of a cell: how far off the plane a point of one that touches it may be
+
+
 def _onto_plane(cells: _Cells, cell: Integers, X: Array, along: Array) -> Array:
     """Move reference points `X` (q, 3) onto the plane in the directions `along` (q, 3), by Newton.
 
-    Raises `SolveError` where a curved cell has no such point.
+    Raises `SolveError` where a curved cell has no such point, nor one nearby, as where it touches the plane.
     """
-    for _ in range(20):
+    for _ in range(4):
         f, gradient = cells.distance(cell, X)
         slope = np.einsum("qi,qi->q", gradient, along)
         step = np.divide(f, slope, out=np.zeros_like(f), where=slope != 0)
         X = X - np.clip(step, -0.5, 0.5)[:, None] * along
         if np.all(np.abs(step) < 1e-8):  # the next would be rounding
             return X
-    raise SolveError("expected curved cells that a section cuts in points, found none in one: use smaller elements")
+    f, gradient = cells.distance(cell, X)
+    if np.any(np.abs(f) > GRAZING * np.linalg.norm(gradient, axis=1)):
+        raise SolveError("expected curved cells that a section cuts in points, found none in one: use smaller elements")
+    return X
 
 
 def _integrate(cells: _Cells, triangles: _Triangles, degree: int) -> SectionQuadrature:
