@@ -18,8 +18,12 @@ from ...common.cache import cache_folder
 from ...common.errors import SolveError
 from ...common.locks import is_running, this_process
 
-# Unknowns above which the factors are kept in files: measured, that takes as long and a quarter of the memory.
-OUT_OF_CORE = 300_000
+# Share of the free memory that factors may take: larger ones are kept in files, which takes a quarter of it. Reading
+# those for each vector that SLEPc solves for took a third of the time of 377 000 unknowns.
+SHARE = 0.5
+# Bytes of the factors of n unknowns by n^(4/3), as nested dissection has: 0.88, 4.5 and 16.6 GB at 112, 377 and 1026
+# thousand.
+BYTES = 170.0
 _ICNTL_OUT_OF_CORE = 22
 # Columns solved for at once, as many as MUMPS takes: it reads the factors once for them.
 COLUMNS = 32
@@ -43,7 +47,7 @@ class Factors:
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         self.matrix, self._sizes = pc.getFactorMatrix(), K.getSizes()[0]
-        folder = _new_folder() if K.getSize()[0] > OUT_OF_CORE else None
+        folder = None if _fits(K) else _new_folder()
         if folder:
             os.environ["MUMPS_OOC_TMPDIR"] = str(folder)
             self.matrix.setMumpsIcntl(_ICNTL_OUT_OF_CORE, 1)
@@ -84,6 +88,16 @@ class Factors:
         matrix = PETSc.Mat().createDense((self._sizes, (None, block.shape[1])), array=block, comm=self.matrix.comm)
         matrix.assemble()
         return matrix
+
+
+def _fits(K: PETSc.Mat) -> bool:
+    """Whether memory has room for the factors, by the first process; collective."""
+    free = 8e9  # where nothing tells
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        free = 1024.0 * int(next(line for line in lines if line.startswith("MemAvailable")).split()[1])
+    fits: bool = K.comm.tompi4py().bcast(BYTES * K.getSize()[0] ** (4 / 3) < SHARE * free)
+    return fits
 
 
 def _new_folder() -> Path | None:

@@ -120,7 +120,7 @@ def test_factors_in_files(tmp_path, monkeypatch, cache):
     """Large parts keep them there: MUMPS takes the setting, modes stay, and no file does, not even of a killed run."""
     path = write_solid(tmp_path, divisions=(8, 1, 1), count=3)
     in_memory = body_of(path)
-    monkeypatch.setattr(factors, "OUT_OF_CORE", 0)
+    monkeypatch.setattr(factors, "SHARE", 0)
     killed = cache / "ffrobot" / "factors" / f"{this_process().replace(str(os.getpid()), str(2**22 + 1))}.x"  # no pid
     killed.mkdir(parents=True)
     (killed / "mumps").write_bytes(b"left")
