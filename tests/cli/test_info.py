@@ -1,5 +1,7 @@
 """`ffrobot info` says unit and meaning of every dataset there is."""
 
+import re
+
 import h5py
 import pytest
 
@@ -36,3 +38,6 @@ def test_every_dataset_of_a_modal_body_has_a_meaning(ffrobot, case_copy):
     text = describe(folder / "body.h5")
     assert "under the reference condition" in text
     assert "of a unit load" in text
+    # what the file was made with: by default dolfinx and SLEPc, as README and theory say
+    assert re.search(r"\nassembly: dolfinx \d+(\.\d+)+\S*, UFL \d+(\.\d+)+\S*\n", text)
+    assert re.search(r"\neigensolver: SLEPc \d+(\.\d+)+, Krylov–Schur with shift-and-invert\n", text)
