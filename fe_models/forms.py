@@ -1,4 +1,4 @@
-"""Compile the finite element forms of links ahead: `python -m ffrobot.fe_models.forms`, once for an installation.
+"""Compile the finite element forms of links ahead: `python -P -m ffrobot.fe_models.forms`, once for an installation.
 
 Forms of other orders and cells are compiled when a link first needs them, and kept in the user's cache.
 """
@@ -53,7 +53,7 @@ def main() -> None:
     with TemporaryDirectory() as own:
         os.environ["XDG_CACHE_HOME"] = own  # neither what is compiled already nor meshes of these links are to be seen
         for _ in range(PROCESSES):
-            subprocess.run([sys.executable, "-m", "ffrobot.fe_models.forms", "one"], check=True)
+            subprocess.run([sys.executable, "-P", "-m", "ffrobot.fe_models.forms", "one"], check=True)
         ignored = shutil.ignore_patterns("*.o", "*.lock")
         forms = cache_folder("forms")
         shutil.copytree(forms, target, dirs_exist_ok=True, ignore=ignored, copy_function=shutil.copyfile)

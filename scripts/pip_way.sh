@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Installs ffrobot with PyPI's dolfinx into a fresh environment, solves a beam, a solid from a STEP file and the two-link
-# case there, and compares the frequencies with those of .venv on the same meshes.
+# case there, and compares the frequencies with those of .venv, where there is one, on the same meshes.
 #
-#   scripts/pip_way.sh [PYTHON]     3.12 or later; by default the newest one that is found
+#   scripts/pip_way.sh [--stage1] [PYTHON]     3.12 or later; by default the newest one that is found
 #
-# Where there is no such Python, or PyPI cannot be reached, it says so and ends with 0.
+# --stage1: without the core, whose compilation is most of the time, and without the scene. Where there is no such
+# Python, or PyPI cannot be reached, it says so and ends with 0.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source scripts/pythons.sh
@@ -13,42 +14,53 @@ skip() {
   printf 'pip way: left out: %s\n' "$1"
   exit 0
 }
+core=()
+if [[ ${1:-} == --stage1 ]]; then
+  core=(--config-settings=wheel.cmake=false --config-settings=wheel.py-api=py3)
+  shift
+fi
 python=${1:-$(newer_python)} || skip "found no Python from 3.12 on with its headers"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-began=$SECONDS
+began=$SECONDS old=$PWD/.venv/bin
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
-export PIP_DISABLE_PIP_VERSION_CHECK=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XDG_CACHE_HOME=$folder/cache
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_CACHE_DIR=${PIP_CACHE_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/pip}
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XDG_CACHE_HOME=$folder/cache
 
 "$python" -m venv "$folder/venv"
 new=$folder/venv/bin
 "$new/pip" -q download --no-deps -d "$folder" 'dolfinx-solver-real==0.11.*' ||
   skip "PyPI cannot be reached, or has no dolfinx for this machine"
-FFROBOT_NATIVE=ON "$new/pip" -q wheel . --no-deps -w "$folder" --config-settings=build-dir="$folder/build"
+FFROBOT_NATIVE=ON "$new/pip" -q wheel . --no-deps -w "$folder" --config-settings=build-dir="$folder/build" "${core[@]}"
 "$new/pip" -q install --find-links "$folder" "$(ls "$folder"/ffrobot-*.whl)[fem]"
 printf 'pip way: %s, installed after %d s\n' "$("$new/python" -V)" $((SECONDS - began))
-"$new/python" -m ffrobot.fe_models.forms
+"$new/python" -P -m ffrobot.fe_models.forms
+printf 'pip way: forms compiled after %d s\n' $((SECONDS - began))
 
 cp -r cases/two_link cases/lightened_arm "$folder"
 rm -f "$folder"/*/*.h5
 cd "$folder"
 for link in two_link/link1 lightened_arm/forearm; do
-  "$new/ffrobot" link $link.toml -o new.h5
-  "$new/ffrobot" info new.h5 | grep -E '^(assembly|eigensolver)'
-  "$OLDPWD/.venv/bin/ffrobot" link $link.toml -o old.h5 # on the mesh that the other has left in the cache
-  "$new/python" - <<'PYTHON'
+  "$new/ffrobot" link $link.toml -o one.h5
+  "$new/ffrobot" info one.h5 | grep -E '^(assembly|eigensolver)'
+  PATH=$new:$PATH "$new/mpirun" -n 2 "$new/ffrobot" link --force $link.toml -o two.h5
+  [[ ! -x $old/ffrobot ]] || "$old/ffrobot" link --force $link.toml -o old.h5 # on the mesh that is in the cache now
+  "$new/python" - one.h5 two.h5 $(ls old.h5 2>/dev/null) <<'PYTHON'
+import sys
+
 import ffrobot
 import numpy as np
 
-new, old = (ffrobot.read_modal_body(f"{name}.h5") for name in ("new", "old"))
-assert new.family == old.family
-# Attachment modes have the errors of the shapes of eigenmodes, frequencies those errors squared.
-one, other = (body.frequency[: body.eigenmode_count] for body in (new, old))
-np.testing.assert_allclose(one, other, rtol=1e-9)
-np.testing.assert_allclose(new.frequency, old.frequency, rtol=1e-6)
-print(f"frequencies agree to {np.abs(one / other - 1).max():.1e}")
+one, *others = (ffrobot.read_modal_body(path) for path in sys.argv[1:])
+for path, other in zip(sys.argv[2:], others):
+    assert one.family == other.family
+    # Attachment modes have the errors of the shapes of eigenmodes, frequencies those errors squared.
+    f, g = (body.frequency[: body.eigenmode_count] for body in (one, other))
+    np.testing.assert_allclose(f, g, rtol=1e-9)
+    np.testing.assert_allclose(one.frequency, other.frequency, rtol=1e-6)
+    print(f"frequencies of one.h5 and {path} agree to {np.abs(f / g - 1).max():.1e}")
 PYTHON
-  rm new.h5 old.h5
+  rm ./*.h5
 done
-"$new/ffrobot" solve two_link/scene.toml
+((${#core[@]})) || "$new/ffrobot" solve two_link/scene.toml
 printf 'pip way: passed after %d s\n' $((SECONDS - began))
