@@ -186,7 +186,8 @@ def _compute(
         from .modal_body.krylov_schur import eigensolver
 
         hashes: dict[str, Any] = {"input_hash": digest, "modes_hash": modes_hash(link)}
-        return replace(body, **hashes, assembly=assembly(), eigensolver=eigensolver())
+        by = eigensolver("slepc" if isinstance(link, BeamLink) else link.modes.solver)
+        return replace(body, **hashes, assembly=assembly(), eigensolver=by)
 
     if processes() > 1 and isinstance(link, BeamLink):  # too small to share out
         on_first(lambda: write(make()))

@@ -43,7 +43,15 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     batch = needed + 2 if family == "all" else 2 * needed + 2
     key = "count" if link.modes.indices is None else "indices"
     most = min(available, 40 * needed + 200)  # far more than slender parts need
-    search = KrylovSchur(flexibility, mass, 3 * model.owned, flexibility.rank, comm=model.comm, total=model.total)
+    search = KrylovSchur(
+        flexibility,
+        mass,
+        3 * model.owned,
+        flexibility.rank,
+        comm=model.comm,
+        total=model.total,
+        solver=link.modes.solver,
+    )
     found = 0
     while True:
         if (family == "all" and needed > available) or found == available:
