@@ -15,6 +15,7 @@ from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import AnyPath, write_atomically
 from ..common.hdf5 import image_of, in_memory, numbers, open_checked, read
+from ..common.meanings import write_record
 from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:
@@ -228,17 +229,17 @@ def _image(body: ModalBody) -> bytes:
             file["modes"].attrs["damping_of"] = body.damping_of
         for name, (path, _) in _PARTS.items():
             if (part := getattr(body, name)) is not None:
-                _write_arrays(file.create_group(path), vars(part))
+                write_record(file.create_group(path), part)
         if body.measured is not None:
             file["modes/measured"].attrs["what"] = body.measured.in_words()
         _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
         for name, interface in sorted(body.interfaces.items()):
             group = file.create_group(f"interfaces/{name}")
-            _write_arrays(group, {key: value for key, value in vars(interface).items() if key != "coupling"})
+            write_record(group, interface)
             if interface.coupling:
                 group.attrs["coupling"] = interface.coupling
         for name, point in sorted(body.stress.items()):
-            _write_arrays(file.create_group(f"stress/points/{name}"), vars(point))
+            write_record(file.create_group(f"stress/points/{name}"), point)
         for name, path in _NAMES.items():
             if names := getattr(body, name):
                 _write_names(file, path, names)

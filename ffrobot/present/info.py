@@ -15,13 +15,13 @@ from rich.table import Table
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.hdf5 import open_checked
+from ..common.meanings import MODAL_BODY, RESULTS, Meaning, meaning
 from ..fe_models.modal_body import Interface, ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
 from ..results.linear import read_metrics
-from ..results.meanings import MODAL_BODY, RESULTS, Meaning, meaning
 
 
 def describe(path: Path) -> str:

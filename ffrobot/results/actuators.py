@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.meanings import names_of, write_record
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.space import SPACES, Space
 from ..run.actuation import Actuation
@@ -51,8 +51,7 @@ def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility
     layouts = {name: array.layout for of_link in solution.patches.values() for name, array in of_link.arrays.items()}
     entry.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
-        about = {key: value for key, value in vars(judged.unsupplied).items() if value not in ((), "")}
-        entry.create_group("unsupplied").attrs.update(about)
+        write_record(entry.create_group("unsupplied"), judged.unsupplied)
     _write_judgement(entry, judged, layouts)
     for joint in solution.scene.motor_joints:
         for k, unit in enumerate(joint.units):
@@ -63,9 +62,7 @@ def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility
 def _write_layout(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
     """Of one layout what has no peaks, and the modal forces `unmet` (T, n) that it leaves."""
     group["residual"] = voltages.residual
-    for key in ("edges", "moment_per_volt", "stiffness_ratio", "authority"):
-        group[key] = getattr(patches, key)
-    group.attrs["condition_number"] = patches.condition_number
+    write_record(group, patches)
     group["residual_force"] = unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
     group.attrs["capacitance"] = patches.layout.capacitance()
@@ -76,24 +73,22 @@ def _write_layout(group: h5py.Group, patches: PatchArray, voltages: Voltages, un
 def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PztLayout]) -> None:
     """What is required of each motor and each of the layouts, against what they can."""
     for joint, motor in judged.motors.items():
-        group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
+        write_record(group.create_group(f"joints/{joint}"), motor)
     for name, patches in judged.patches.items():
         entry, layout = group.create_group(f"pzt/{name}"), layouts[name]
-        arrays = {key: value for key, value in vars(patches).items() if isinstance(value, np.ndarray)}
-        for key, values in (arrays | {"factor": patches.factor, "mode_factor": patches.mode_factor}).items():
-            entry[key] = values
+        write_record(entry, patches)
         entry.attrs["depoling_field"] = layout.depoling_field or np.inf
         entry.attrs["strain_limit"] = layout.strain_limit or np.inf
-        entry.create_group("remedies").attrs.update(vars(patches.remedies))
+        write_record(entry.create_group("remedies"), patches.remedies)
 
 
 def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeasibility]:
     """Of the feasibility of an analysis: what every motor has to do, in the order of `joints`."""
     from ..actuation.motors import MotorFeasibility
 
-    known, entries = {field.name for field in fields(MotorFeasibility)}, group.get("joints", {})
-    about = {name: entries[name].attrs.items() for name in joints if name in entries}
-    return {name: MotorFeasibility(**{key: value for key, value in of if key in known}) for name, of in about.items()}
+    known = {name[1:] for name in names_of("MotorFeasibility")} - {"factor"}
+    about = {name: group["joints"][name].attrs for name in joints if f"joints/{name}" in group}
+    return {name: MotorFeasibility(**{key: of[key] for key in known & of.keys()}) for name, of in about.items()}
 
 
 def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
@@ -126,18 +121,10 @@ def write_placement(group: h5py.Group, _motion: RobotMotion, placed: Placed) -> 
     """
     group = group.create_group("placement")
     group.attrs.update({"body": placed.wanted.body, "criterion": placed.wanted.criterion})
-    group.attrs.update({"measure": placed.wanted.measure, "sets": placed.sets, "method": placed.method})
-    for key, found in (("best", placed.best), ("even", placed.even)):
-        for name, values in vars(found).items():
-            group[f"{key}/{name}"] = values
-    for key in ("frequency", "share", "largest_voltage", "candidates", "candidate_reach"):
-        group[key] = getattr(placed, key)
-
-
-OF_TRACKING = (
-    "objective", "least_voltage", "least_voltage_doubt", "least_share", "cost", "pre_actuation", "post_actuation",
-    "unmet", "without_patches", "is_needed",
-)  # fmt: skip
+    group.attrs["measure"] = placed.wanted.measure
+    write_record(group, placed)
+    write_record(group.create_group("best"), placed.best)
+    write_record(group.create_group("even"), placed.even)
 
 
 def write_tracking(group: h5py.Group, motion: RobotMotion, found: TrackedPath) -> None:
@@ -147,7 +134,7 @@ def write_tracking(group: h5py.Group, motion: RobotMotion, found: TrackedPath) -
     """
     group = group.create_group("tracking")
     about = group.attrs
-    about.update({key: getattr(found, key) for key in OF_TRACKING})
+    write_record(group, found)
     for kind, prices in found.prices.items():
         for name, values in prices.items():
             if kind in ("voltage", "torque") or values.any():

@@ -14,7 +14,18 @@ from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
 from .peaks import POWER, peak_of
-from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, Verdict, millimeters, off_path, tool_error, vibrates
+from .verdict import (
+    AnalysisVerdict,
+    PatchNeed,
+    Place,
+    Settled,
+    Verdict,
+    attributes_of,
+    millimeters,
+    off_path,
+    tool_error,
+    vibrates,
+)
 
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
@@ -102,14 +113,13 @@ def _answer(
     group: h5py.Group, motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
 ) -> tuple[str, bool | None]:
     """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
-    if "control" in group:
-        about = group["control"].attrs
-        held = f", {100 * about['saturated']:.2g} % of the samples saturated" if about["saturated"] else ""
-        most, rms = (millimeters(about[f"tip_error_{key}"]) for key in ("max", "rms"))
+    if loop := attributes_of(group, "control"):
+        held = f", {100 * loop['saturated']:.2g} % of the samples saturated" if loop["saturated"] else ""
+        most, rms = (millimeters(loop[f"tip_error_{key}"]) for key in ("max", "rms"))
         error = f"tip off by {most} at most, {rms} RMS"
-        is_settled = about["verdict"] == "stable" and np.isfinite(about["settling_time"])
-        alone = "" if "spectral_radius" in about else ", by the run alone"
-        return f"loop {'settled' if is_settled else about['verdict']}{alone}: {error}{held}", None
+        is_settled = loop["verdict"] == "stable" and np.isfinite(loop["settling_time"])
+        alone = "" if "spectral_radius" in loop else ", by the run alone"
+        return f"loop {'settled' if is_settled else loop['verdict']}{alone}: {error}{held}", None
     if "feasibility" not in group or _ended_early(group):
         return "", None
     short = dict(_short(motors, patches))
@@ -127,14 +137,13 @@ def _answer(
         within = " within their limits" if has_limits else ""
         return f"{means}{within} cannot do it: the path needs other forces on the links, see the warning", False
     within, least = "within the limits that are given" if has_limits else "no limits are given", ""
-    if "tracking" in group:
-        about = group["tracking"].attrs
-        off = about.get("without_patches", np.nan)
+    if tracked := attributes_of(group, "tracking"):
+        off = tracked.get("without_patches", np.nan)
         alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
         limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
         is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
         is_one &= not any("range" in one.attrs for one in group["pzt"].values())
-        size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
+        size = f"{tracked['least_voltage']:.3g} V" if is_one else f"{100 * tracked['least_share']:.3g} % of limits"
         least = f"; least voltage {size}{alone}"
     return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True
 
@@ -220,14 +229,13 @@ def _advice(
         inversion = 'kind = "motors-only", or ' if at_rest else ""
         tracked = "" if is_compliant else ' with kind = "tracking"'
         yield f"{inversion}patches ([[pzt]]) on the links{tracked}"
-    if "tracking" in group and asked and not group["tracking"].attrs.get("is_needed", True):
+    if asked and not attributes_of(group, "tracking").get("is_needed", True):
         yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
-    if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
-        yield text
-    if "control" in group:
-        about = group["control"].attrs
-        yield from map(str, found := about.get("advice", ()))
-        if not len(found) and about["verdict"] not in ("stable", "not settled"):
+    if text := attributes_of(group, "linear").get("advice", ""):
+        yield str(text)
+    if loop := attributes_of(group, "control"):
+        yield from map(str, texts := loop.get("advice", ()))
+        if not len(texts) and loop["verdict"] not in ("stable", "not settled"):
             yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
 
 
@@ -243,7 +251,7 @@ def _is_from_rest_to_rest(group: h5py.Group) -> bool:
 
 def _margins(group: h5py.Group) -> str:
     """Of a closed loop, by its linear model."""
-    about = group["control"].attrs if "control" in group else {}
+    about = attributes_of(group, "control")
     if "gain_margin" not in about:
         return ""
     if about["delay_margin"] == 0.0:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from xarray import Dataset
 
+from ..common.meanings import LABELS, meaning
 from .joints import joint_coordinates
-from .meanings import LABELS, meaning
 
 if TYPE_CHECKING:
     from ..common.arrays import Array

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.meanings import names_of, write_record
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
@@ -20,7 +21,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..mbs.analysis.operating_points import RobotAtRest
     from ..mbs.quantities.motion import RobotMotion
 
-MATRICES = ("A", "B", "C", "D", "mass", "transformation")
+MATRICES = names_of("LinearModel")
 NAMES = ("state_names", "input_names", "output_names")
 LISTED = 3  # natural frequencies
 
@@ -170,12 +171,11 @@ def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> N
     found, error = record.metrics, group.create_dataset("tip_error", data=record.tip_error)
     error.attrs.update(peak=found.tip_error_max, peak_time=record.tip_error_peak_time, rms=found.tip_error_rms)
     group = group.create_group("control")
-    for key in ("time", "readings", "reference", "commands", "wanted"):
-        group[key] = getattr(record, key)
+    write_record(group, record)
     group.attrs["inputs"] = list(record.inputs)
     group.attrs["outputs"] = list(record.outputs)
     group.attrs["warnings"] = list(record.warnings)
-    group.attrs.update(vars(found))
+    write_record(group, found)
     group.attrs["advice"] = list(record.advice)
     if (margins := record.margins) is not None:
         group.attrs.update(spectral_radius=margins.radius, gain_margin=margins.gain, delay_margin=margins.delay)

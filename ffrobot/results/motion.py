@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.meanings import write_record
 from ..common.peaks import largest, root_mean_square
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
@@ -17,6 +18,7 @@ from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_dis
 from ..mbs.quantities.validity import Bending
 from ..mbs.scene.trajectories import Trajectory
 from ..run.solution import AnalysisResult, Solution
+from .verdict import attributes_of
 
 if TYPE_CHECKING:
     from ..mbs.inversion.stable_inversion import Inversion
@@ -94,8 +96,7 @@ def write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> Non
     group["loads"] = recovery.sizes
     group["loads"].attrs.create("columns", list(recovery.loads), dtype=h5py.string_dtype())
     if recovery.sections is not None:
-        for key, values in vars(recovery.sections).items():
-            group[f"layers/{key}"] = values
+        write_record(group.create_group("layers"), recovery.sections)
     for name, point in stress.points.items():
         group[f"points/{name}/stress"] = point.stress[outputs]
         group[f"points/{name}/stress"].attrs["columns"] = ["xx", "yy", "zz", "yz", "xz", "xy"]
@@ -124,7 +125,7 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
 def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """How far a replay is off the paths that its actuation follows, at outputs and between: off_path/."""
     source, run, motion = str(group.attrs["actuation"]), result.histories.run, result.histories.motion
-    if source not in solution.analyses or "control" in group or not len(run.time):
+    if source not in solution.analyses or attributes_of(group, "control") or not len(run.time):
         return
     of, last = group.parent[source], solution.analyses[source].analysis.last_time
     both = (run.time >= of["time"][0]) & (run.time <= of["time"][-1] * (1.0 + SAME))

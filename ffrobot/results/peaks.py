@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array, Indices, as_floats
+from ..common.meanings import matches, meaning
 from ..common.peaks import largest, shares
-from .meanings import matches, meaning
 
 if TYPE_CHECKING:  # reading can do without the core
     from ..mbs.joints.joint import JointRecord

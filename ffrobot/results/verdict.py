@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 ROUND_OFF = 1e-9  # m, N·m, rad/s, W: numbers below it are rounding
 
 
+def attributes_of(group: h5py.Group, part: str) -> Mapping[str, Any]:
+    """Attributes of a part of an analysis; none where it has no such part."""
+    return group[part].attrs if part in group else {}
+
+
 def number(value: float) -> str:
     """Four digits; 0 of round-off."""
     return f"{value if value > ROUND_OFF else 0:.4g}"
@@ -50,8 +55,8 @@ class ToolError:
 
 def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
     """Of an analysis; `feasible` as its verdict says."""
-    if "control" in group:
-        return ToolError(controlled=float(group["control"].attrs["tip_error_max"]))
+    if loop := attributes_of(group, "control"):
+        return ToolError(controlled=float(loop["tip_error_max"]))
     if (replayed := max((most for _, most, _ in off_path(group, scene)), default=None)) is not None:
         return ToolError(open_loop=replayed)
     missed = read_unsupplied(group["feasibility"]) if "feasibility" in group else None
@@ -73,7 +78,7 @@ def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, floa
             yield str(one.attrs["point"]), float(one.attrs["distance"]), float(one.attrs["distance_rms"])
         return
     name = str(group.attrs.get("actuation", ""))  # of an analysis that takes none: empty
-    if not name or "control" in group:
+    if not name or attributes_of(group, "control"):
         return
     if (source := group.parent.get(name)) is not None:
         yield from _apart(group, source, scene)

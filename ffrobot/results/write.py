@@ -13,6 +13,7 @@ from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
+from ..common.meanings import write_record
 from ..common.version import VERSION
 from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.posture.redundancy import resolving_joints
@@ -86,20 +87,18 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if result.actuation is not None:
         write_feasibility(group, solution, result.actuation.feasibility)
     for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
-        for key, pair in vars(effect).items():
-            group[f"patch_structure/{name}/{key}"] = pair
+        write_record(group.create_group(f"patch_structure/{name}"), effect)
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
     for point, found in result.settling.items():
-        group.create_group(f"settling/{point}").attrs.update(vars(found))
+        write_record(group.create_group(f"settling/{point}"), found)
     if (left := result.deviations) is not None:
         about = group.create_group("robustness")
         about.attrs["bandwidth"] = left.bandwidth
         about.attrs.create("causes", list(left.causes), dtype=h5py.string_dtype())
         for lane, values in left.lanes.items():
             about[lane] = values
-    for key, values in vars(result.energies).items():
-        group[f"energy/{key}"] = values
+    write_record(group.create_group("energy"), result.energies)
     group["momentum/linear"] = motion.space.along(result.momentum.linear)
     group["momentum/angular"] = motion.space.about(result.momentum.angular)
     violation = group.create_dataset("constraint_violation", data=motion.violation)
@@ -157,6 +156,8 @@ def _write_judgement(group: h5py.Group, solution: Solution, result: AnalysisResu
     if solution.mode_choice is not None:
         for kind, error in solution.mode_choice.errors.get(result.analysis.name, {}).items():
             group.attrs[f"mode_error_{kind}"] = error
-    if (found := result.check) is not None:
-        check = vars(found) | {"modes": json.dumps(dict(found.modes))}
-        group.attrs.update({f"check_{key}": value for key, value in check.items() if value is not None})
+    if (check := result.check) is not None:
+        group.attrs.update(check_point=check.point, check_error=check.error, check_status=check.status)
+        group.attrs["check_modes"] = json.dumps(dict(check.modes))
+        if check.least_voltage is not None:
+            group.attrs["check_least_voltage"] = check.least_voltage

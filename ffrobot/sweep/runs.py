@@ -21,10 +21,10 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
 from ..common.locks import is_running, this_process
+from ..common.meanings import meaning
 from ..common.parallel import environment_without_mpi
 from ..common.peaks import root_mean_square
 from ..results.file import Results
-from ..results.meanings import meaning
 from ..run.inputs import changed, digest_of_file
 from .files import SCENE
 

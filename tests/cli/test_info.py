@@ -5,8 +5,8 @@ import re
 import h5py
 import pytest
 
+from ffrobot.common.meanings import MODAL_BODY, RESULTS, meaning
 from ffrobot.present.info import describe
-from ffrobot.results.meanings import MODAL_BODY, RESULTS, meaning
 
 # inverse and forward motion, patches, linear models, compliant gears, motion in 3D
 CASES = ("two_link_patched", "two_link_linear", "compliant_arm", "slider_crank_3d")
