@@ -17,11 +17,10 @@ from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labell
 from ...mbs.model.body import Body
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
+from ...mbs.model.kinematics import ZERO
 from ...mbs.model.known_motion import KnownStates, motion_forces
 from ...mbs.model.model import Model, build_model, constraint_values, modal_directions
-from ...mbs.model.nodes import Section
-from ...mbs.model.parts import ZERO
-from ...mbs.model.rows import rows_of_joint
+from ...mbs.model.nodes import Section, rows_of_joint
 from ...mbs.model.system import MultibodySystem
 from ...mbs.model.tree import KinematicTree
 from ...mbs.posture.posture import MET, mobility, posture_search

@@ -21,9 +21,8 @@ from ..inversion.servo import slopes_by_differences
 from ..linear.statics import static_shapes
 from ..model.body import Body
 from ..model.divided_link import DividedLink
-from ..model.frame_motors import turning_motors
 from ..model.gears import refuse_prescribed_motors
-from ..model.motors import driven_mechanism, fastest_mechanism
+from ..model.motors import driven_mechanism, fastest_mechanism, turning_motors
 from ..model.system import MultibodySystem
 from ..posture.posture import check_path, mobility
 from ..posture.prescribed import PrescribedMotion, prescribed_by, prescribed_motion

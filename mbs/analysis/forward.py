@@ -17,10 +17,10 @@ from ..fields.waypoints import spline
 from ..linear.statics import hanging_joints, initial_state
 from ..model.amplifiers import joined
 from ..model.drives import Command, Drives, Replayed
-from ..model.frame_motors import motor_commands
 from ..model.gears import with_compliance
 from ..model.known_motion import State
 from ..model.model import Model, modal_directions, without_paths
+from ..model.motors import motor_commands
 from ..posture.posture import mobility
 from ..posture.start import displaced_joints
 from ..run.context import Context, PatchedLink

@@ -21,7 +21,7 @@ from ..linear.linearisation import LinearEquations, LinearMechanism
 from ..linear.statics import Statics
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
-from ..model.rows import ConstraintRow, rows_of_joint
+from ..model.nodes import ConstraintRow, rows_of_joint
 from ..posture.redundancy import resolved
 from ..posture.start import undeformed_posture
 from ..run.context import Context, place_of

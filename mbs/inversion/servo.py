@@ -14,10 +14,9 @@ from ...common.errors import InputError
 from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
-from ..model.frame_motors import turning_motors
 from ..model.model import Model
-from ..model.motors import driven_mechanism, fastest_mechanism
-from ..model.rows import ConstraintRow
+from ..model.motors import driven_mechanism, fastest_mechanism, turning_motors
+from ..model.nodes import ConstraintRow
 from ..posture.posture import check_smooth, describe_posture, mobility, solve_posture, worst_posture
 from ..posture.prescribed import PrescribedMotion, following_motors
 from ..posture.reach import out_of_reach

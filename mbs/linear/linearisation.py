@@ -21,11 +21,10 @@ from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ...common.structs import struct
-from ..model.frame_motors import turning_motors
 from ..model.gears import gear_matrices
 from ..model.known_motion import KnownStates, required_forces
 from ..model.model import Model, constraint_values
-from ..model.motors import FrameShare, frame_share
+from ..model.motors import FrameShare, frame_share, turning_motors
 from ..model.nodes import Node
 from ..model.system import MultibodySystem
 from ..model.tree import CompliantGear

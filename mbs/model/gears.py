@@ -18,8 +18,7 @@ from ..joints.twist_spring import TwistSpring
 from ..scene.analysis import Analysis
 from .drives import Drive
 from .model import Model
-from .nodes import Node, Section
-from .rows import ConstraintRow
+from .nodes import ConstraintRow, Node, Section
 from .tree import CompliantGear, KinematicTree
 
 

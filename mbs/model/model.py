@@ -28,13 +28,11 @@ from ..scene.mechanism import MechanismScene
 from ..scene.topology import Edge, spanning_forest
 from ..scene.trajectories import Trajectory
 from .body import Body
-from .cut import AlongCut, CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
 from .drives import Drive
 from .kinematics import Kinematics
 from .masses import welded_payloads
-from .nodes import Node, Section
-from .rows import ConstraintRow, coordinate_row
-from .tree import KinematicTree
+from .nodes import ConstraintRow, Node, Section, coordinate_row
+from .tree import AlongCut, CutCoordinate, KinematicTree, cut_coordinates, cut_row, with_auxiliary_rotors
 
 
 @struct

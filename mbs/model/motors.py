@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,6 @@ from ...common.rotations import left_jacobian, left_jacobian_slope
 from ...common.structs import struct
 from .. import _core
 from .drives import Command
-from .frame_motors import turning_motors
 from .model import Model
 from .system import MultibodySystem
 
@@ -158,3 +157,23 @@ def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
             direction[of.p_v] -= Phi_r.T @ left_jacobian(phi) @ axis
             slope[of.p_v, of.p_v] -= Phi_r.T @ left_jacobian_slope(phi, axis) @ Phi_r
     return FrameShare(direction, slope)
+
+
+def turning_motors(model: Model) -> list[str]:
+    """Joints with one angle, that of sections, whose motors turn frames in place of these."""
+    if model.scene.motors != "frame":
+        return []
+    tree = model.tree
+    return [
+        joint.name
+        for joint in model.scene.motor_joints
+        if joint.units == ("rad",) and not tree.nodes[tree.carried[joint.name]].inner.still
+    ]
+
+
+def motor_commands(model: Model) -> Iterator[Command]:
+    """What a unit of each motor does, in the order of `Model.motors`, on the second side of its joint."""
+    turning = turning_motors(model)
+    for joint, columns in model.motors.items():
+        frame = (model.tree.carried[joint], model.sign(joint)) if joint in turning else None
+        yield from (Command(direction, frame) for direction in model.sign(joint) * np.eye(model.tree.n_v)[columns])

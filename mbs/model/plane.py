@@ -14,7 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Integers, as_floats
 from .. import _core
-from .parts import CutPlace, ModelParts
+from .kinematics import CutPlace, ModelParts
 from .projection import EXACT, AcrossError, axes_across, axes_of_triad, planar_data, planar_marker
 
 PLANAR = {

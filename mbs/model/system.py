@@ -14,13 +14,11 @@ from .. import _core
 from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
-from .frame_motors import zero_order_hold
+from .kinematics import ZERO, CutPlace, Markers, ModelParts, Placed, rows_of
 from .model import Model
-from .nodes import Section
-from .parts import ZERO, CutPlace, Markers, ModelParts, Placed
+from .nodes import ConstraintRow, Section
 from .plane import Plane, in_plane
 from .projection import EXACT
-from .rows import ConstraintRow
 
 
 class Derivatives(NamedTuple):
@@ -248,3 +246,24 @@ class MultibodySystem:
 def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
     """Of a component of a wrench: those of the core, with shares; see `Plane.shares`."""
     return [(component, 1.0)] if plane is None else plane.shares(component)
+
+
+def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrderHold:
+    """Forces of commands that are held, in their order."""
+    found = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
+    for number, command in enumerate(commands):
+        for share in _frame_shares(model, *command.frame) if command.frame is not None else ():
+            found.add_frame_motor(number, *share)
+    return found
+
+
+def _frame_shares(model: Model, body: int, sign: float) -> Iterator[tuple[int, int, Array, Array]]:
+    """Of the motor on frames along the joint that carries a body, for each side with modes.
+
+    Where the modes are in q and in v, Φ_r (3, n) of the section and the joint's axis there.
+    """
+    node = model.tree.nodes[body]
+    for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
+        if section.body >= 0 and (of := model.tree.nodes[section.body]).body.n_modes:
+            axis = sign * side * section.triad[:, 2]
+            yield of.p_q.start, of.p_v.start, rows_of(of.body, section)[0][3:], axis

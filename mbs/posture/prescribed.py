@@ -11,7 +11,7 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.model import Model
-from ..model.rows import rows_of_joint
+from ..model.nodes import rows_of_joint
 
 
 class Prescribed(NamedTuple):

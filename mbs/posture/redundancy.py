@@ -19,8 +19,7 @@ from .. import _core
 from ..fields.waypoints import spline
 from ..model.model import Model, constraint_rates, constraint_values
 from ..model.motors import driven_mechanism
-from ..model.nodes import Node
-from ..model.rows import coordinate_row
+from ..model.nodes import Node, coordinate_row
 from .posture import Mobility, joint_scales, mobility
 from .prescribed import joint_places, prescribed_motion
 from .start import undeformed_posture

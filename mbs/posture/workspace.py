@@ -17,7 +17,7 @@ from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
 from ..fields.waypoints import spline
 from ..model.model import Model, constraint_values, row_of_joint, without_paths
-from ..model.rows import ConstraintRow
+from ..model.nodes import ConstraintRow
 from .limits import limited_coordinates
 from .posture import solve_postures
 from .reach import are_regular, random_angles, turning_joints

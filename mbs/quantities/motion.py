@@ -16,7 +16,6 @@ from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ...common.structs import struct
 from ..model.body import bent_section
-from ..model.cut import CutCoordinate, CutMotion
 from ..model.drives import Drives, PointDrive
 from ..model.gears import compliance, with_compliance
 from ..model.kinematics import Motion, Places
@@ -26,6 +25,7 @@ from ..model.model import Model, constraint_rates, constraint_values
 from ..model.motors import MotorForces, path_forces
 from ..model.nodes import Node, Section
 from ..model.system import MultibodySystem
+from ..model.tree import CutCoordinate, CutMotion
 from ..posture.posture import mobility
 from ..run.gears import Supplied, supplied_through_gears, with_motors
 from ..run.outcome import GearMotion

@@ -14,11 +14,10 @@ from ...common.structs import struct
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
-from ..model.frame_motors import zero_order_hold
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.motors import integrated_mechanism
-from ..model.system import MultibodySystem
+from ..model.system import MultibodySystem, zero_order_hold
 from ..posture.limits import left_ranges, watch_limits
 from ..posture.posture import (
     NEARLY_SINGULAR,

@@ -18,11 +18,10 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, quoted
 from ..joints.twist_spring import TwistSpring
-from ..model.frame_motors import turning_motors
 from ..model.gears import compliance, elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.model import Model
-from ..model.motors import MotorForces, motor_forces
+from ..model.motors import MotorForces, motor_forces, turning_motors
 from ..model.nodes import Node, rotor
 from .outcome import GearMotion, Outcome
 from .replay import supplied_in

@@ -25,7 +25,7 @@ from ..model.motors import (
     motor_forces,
     path_forces,
 )
-from ..model.rows import ConstraintRow
+from ..model.nodes import ConstraintRow
 from ..model.system import MultibodySystem
 from ..posture.posture import row_sizes
 from ..scene.analysis import TimedAnalysis, output_times

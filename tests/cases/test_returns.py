@@ -14,8 +14,8 @@ from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.fields.steps import Steps
-from ffrobot.mbs.model.frame_motors import motor_commands
 from ffrobot.mbs.model.model import modal_directions, without_paths
+from ffrobot.mbs.model.motors import motor_commands
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.run.context import Context
 from ffrobot.mbs.run.replay import motor_forces_of

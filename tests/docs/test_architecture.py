@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from ffrobot.results.meanings import RESULTS
+from ffrobot.common.meanings import RESULTS
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs/developer/architecture.md").read_text(encoding="utf-8")

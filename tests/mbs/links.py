@@ -6,8 +6,7 @@ import numpy as np
 from mechanisms import make_model, revolute
 from numpy.polynomial import Legendre, Polynomial
 
-from ffrobot.mbs.model.body import Body, BodyPoint
-from ffrobot.mbs.model.stiffening import Stiffening
+from ffrobot.mbs.model.body import Body, BodyPoint, Stiffening
 
 CLAMPED = Polynomial([0, 0, 1])  # ξ²: deflection and slope vanish at the root
 SUPPORTED = Polynomial([0, 1, -1])  # ξ (1 − ξ): deflection vanishes at both ends

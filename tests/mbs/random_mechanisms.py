@@ -13,8 +13,7 @@ from oracle_3d import Mechanism
 from rotations import quaternion, random_rotation, rotation, rotation_about
 from triad_measures import Ground, Joint, Section
 
-from ffrobot.mbs.model.body import Body, BodyPoint, from_modal_body, rigid_body
-from ffrobot.mbs.model.stiffening import Stiffening
+from ffrobot.mbs.model.body import Body, BodyPoint, Stiffening, from_modal_body, rigid_body
 
 TYPES = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
 G = np.array([0.4, -1.1, -9.5])

@@ -20,8 +20,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.inversion.servo import Servo
 from ffrobot.mbs.model.drives import Command, Drive
-from ffrobot.mbs.model.nodes import Section
-from ffrobot.mbs.model.rows import ConstraintRow
+from ffrobot.mbs.model.nodes import ConstraintRow, Section
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.loads import Load
 

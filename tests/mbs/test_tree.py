@@ -15,8 +15,7 @@ from trees_in_a_plane import planar_model
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.mbs.model.model import constraint_rates, constraint_values
-from ffrobot.mbs.model.nodes import Section
-from ffrobot.mbs.model.rows import ConstraintRow, coordinate_row
+from ffrobot.mbs.model.nodes import ConstraintRow, Section, coordinate_row
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.posture import joint_scales, mobilities, row_sizes, solve_postures
 
