@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
 
-from .errors import InputError, SolveError
+from .errors import InputError, SolveError, either
 from .outputs import DAMAGED, check_not_an_input, check_same_kind, kind_of_file
 
 PIECE = 1 << 22  # bytes
@@ -91,6 +92,15 @@ def check_output(path: Path, file_format: str) -> None:
             pass
     except OSError as error:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
+
+
+def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
+    """Refuse an output that is a folder or an input, or whose name has none of the `endings`. Raises `InputError`."""
+    check_not_an_input(path)
+    if path.is_dir():
+        raise InputError(f"{path}: {label}: expected a file name, found a folder")
+    if path.suffix.lower() not in endings:
+        raise InputError(f'{path}: {label}: expected a name that ends in {either(endings)}, found "{path.name}"')
 
 
 def check_new_file(path: Path, *, replace: bool) -> None:

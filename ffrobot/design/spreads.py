@@ -22,7 +22,7 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.tables import shown
 from ..sweep.files import number_at
-from ..sweep.sweep import Key
+from ..sweep.sweep import Key, check_once
 from .designs import Design, Designs, Point, Runs, changes_for, in_words, parse_key
 from .readings import Goal
 
@@ -331,8 +331,5 @@ class SpreadDesigns:
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:
     """What `--spread` says of the scene file at `path`, every key once. Raises `InputError`."""
     spreads = tuple(parse_spread(text, path) for text in texts)
-    keys = [one.key for one in spreads]
-    for key in keys:
-        if keys.count(key) > 1:
-            raise InputError(f"--spread: expected every key once, found {'.'.join(key)} {keys.count(key)} times")
+    check_once([one.key for one in spreads], "--spread")
     return spreads

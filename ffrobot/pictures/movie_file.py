@@ -13,8 +13,7 @@ import numpy as np
 
 from ..common.arrays import Indices, NDArray
 from ..common.errors import InputError, SolveError, did_you_mean
-from ..common.files import write_atomically
-from ..common.outputs import check_not_an_input
+from ..common.files import check_ending, write_atomically
 from ..results.file import Results
 
 Frame = NDArray[np.uint8]  # (height, width, 3) red, green, blue
@@ -51,11 +50,7 @@ def _moving_analysis(results: Results, wanted: str | None) -> str:
 
 def check_movie(path: Path) -> None:
     """Refuse, before frames are drawn, what cannot become a movie. Raises `InputError`, `SolveError`."""
-    check_not_an_input(path)
-    if path.is_dir():
-        raise InputError(f"{path}: movie: expected a file name, found a folder")
-    if path.suffix.lower() not in (".gif", ".mp4"):
-        raise InputError(f'{path}: movie: expected a name that ends in ".gif" or ".mp4", found "{path.name}"')
+    check_ending(path, "movie", (".gif", ".mp4"))
     if path.suffix.lower() == ".mp4":
         ffmpeg()
 

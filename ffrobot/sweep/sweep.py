@@ -88,10 +88,10 @@ class Sweep:
         return hashlib.sha256(json.dumps(changes, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def check_once(keys: Sequence[Key]) -> None:
-    """Raise `InputError` for a key that `--vary` names several times."""
+def check_once(keys: Sequence[Key], option: str = "--vary") -> None:
+    """Raise `InputError` for a key that the `option` names several times."""
     if twice := next((key for key in keys if keys.count(key) > 1), None):
-        raise InputError(f"--vary: expected every key once, found {'.'.join(twice)} several times")
+        raise InputError(f"{option}: expected every key once, found {'.'.join(twice)} several times")
 
 
 def plan_sweep(

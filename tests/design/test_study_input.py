@@ -43,7 +43,7 @@ def test_sensitivity(told, of, to, message):
         ("mass", ["payload.0.mass=uniform:2:1"], [], "with positive spreads"),
         ("mass", ["payload.0.mass=±nan"], [], "with positive spreads"),
         ("mass", ["gravity.0=±1%"], [], "expected a spread in the unit of a key whose value is 0"),
-        ("mass", [GOOD, "payload.0.mass=±1%"], [], "expected every key once, found payload.0.mass 2 times"),
+        ("mass", [GOOD, "payload.0.mass=±1%"], [], "expected every key once, found payload.0.mass several times"),
         ("mass", ["body.arm.rigid.mass=±200%"], [], "with body.arm.rigid.mass = -2"),
         ("mass", ["body.arm.rigid.mass=normal:60%"], [], "expected spreads with which the scene makes sense"),
         ("mass", [GOOD], ["--samples", "0"], "expected at least 8 samples, found 0"),

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...common.errors import InputError, SolveError
-from ...common.files import write_atomically
-from ...common.outputs import check_not_an_input
+from ...common.files import check_ending, write_atomically
 from ...common.peaks import largest
 from ...common.version import VERSION
 from ...mbs.inversion.zero_dynamics import is_unstable
@@ -215,11 +214,7 @@ def write_report(paths: Sequence[Path], path: Path) -> None:
     results file and no study, or `path` would cost a file of another kind, `SolveError` where the page cannot be
     written or Plotly is not installed.
     """
-    check_not_an_input(path)
-    if path.is_dir():
-        raise InputError(f"{path}: output: expected a file name, found a folder")
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f'{path}: output: expected a name that ends in ".html", found "{path.name}"')
+    check_ending(path, "output", (".html", ".htm"))
     found = [(p, study_files(p)) for p in paths]
     studies = [(file, read_study(file)) for _, files in found for file in files]
     with ExitStack() as stack:
