@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -15,10 +16,7 @@ from ..mbs.model.nodes import Node
 from ..mbs.run.context import WholeLinks
 from ..mbs.run.outcome import Outcome
 from ..scene.pieces import places_on_pieces
-from .pieces import MotionOfLinks, divided_links
 from .solution import Solution
-
-STEP = 1e-3  # of the links' longest 1/ω, along a motion: of central differences of modal velocities
 
 
 def make_whole_links(solution: Solution) -> WholeLinks | None:
@@ -26,7 +24,9 @@ def make_whole_links(solution: Solution) -> WholeLinks | None:
     if solution.whole is None:
         return None
     divided = {name: _divided(solution, name) for name in solution.divided}
-    return WholeLinks(solution.whole, divided, places_on_pieces(solution.divided), partial(_as_links, solution))
+    return WholeLinks(
+        solution.whole, divided, places_on_pieces(solution.divided), partial(_as_links, solution, divided)
+    )
 
 
 def _divided(solution: Solution, name: str) -> DividedLink:
@@ -40,36 +40,26 @@ def _divided(solution: Solution, name: str) -> DividedLink:
     return divided_link_of(link.modal, link.spatial, pieces)
 
 
-def _as_links(solution: Solution, run: Outcome) -> Outcome:
+def _as_links(solution: Solution, divided: Mapping[str, DividedLink], run: Outcome) -> Outcome:
     """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
 
     Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.
     """
-    whole = solution.whole
+    whole, tree = solution.whole, run.model.tree
     assert whole is not None
     q = np.zeros((len(run.time), whole.tree.n_q))
     v, a = np.zeros((2, len(run.time), whole.tree.n_v))
-    step = STEP / np.sqrt(min(float(node.body.stiffness.min()) for node in whole.tree.nodes if node.body.n_modes))
-    now, *beside = (_modal(solution, run, dt) for dt in (0.0, -step, step))
     for node in whole.tree.nodes:
         if node.joint.freedoms:
             _take_joint(whole, node, run, (q, v, a))
-        name, to_own = node.body.name, np.linalg.pinv(node.body.modal_transform).T
-        if node.body.n_modes:
-            q[:, node.p_q], v[:, node.p_v] = (values @ to_own for values in now[name])
-            behind, ahead = (of[name][1] for of in beside)
-            a[:, node.p_v] = (ahead - behind) @ to_own / (2 * step)
+        link = divided.get(node.body.name)
+        names = (node.body.name,) if link is None else link.bodies
+        bodies = [tree.nodes[tree.index[name]] for name in names]
+        T = np.eye(node.body.n_modes) if link is None else link.gathered
+        for to, values, place in zip((q, v, a), (run.q, run.v, run.a), ("p_q", "p_v", "p_v"), strict=True):
+            to[:, getattr(node, place)] = np.hstack([values[:, getattr(of, place)] for of in bodies]) @ T.T
     motion = replace(run.motion, q=q, v=v, a=a, multipliers=np.zeros((len(run.time), len(whole.rows))))
     return replace(run, model=whole, motion=motion, forces=replace(run.forces, required=None), prescribed=None)
-
-
-def _modal(solution: Solution, run: Outcome, step: float) -> dict[str, tuple[Array, Array]]:
-    """By body, modal coordinates and velocities (T, n) in the modes of its file, `step` (s) later."""
-    tree, divided = run.model.tree, divided_links(solution)
-    q, v = tree.integrate(run.q, step * run.v), run.v + step * run.a
-    motion = MotionOfLinks(run.model, run.time, q, v, run.a, run.multipliers, divided=divided)
-    found = {name: motion.body(name) for name in motion.points}
-    return {name: (body.modal, body.modal_velocity) for name, body in found.items()}
 
 
 def _take_joint(whole: Model, node: Node, run: Outcome, states: tuple[Array, Array, Array]) -> None:

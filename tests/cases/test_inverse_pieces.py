@@ -8,11 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from scipy.interpolate import make_interp_spline
 from tables_3d import joint, revolute, scene
 
 import ffrobot
 from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.fe_models.pieces import cut
+from ffrobot.run.solve import solve_scene
+from ffrobot.run.watcher import Watcher
+from ffrobot.run.whole_links import make_whole_links
 
 S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"
 NAMES = "upper", "fore"
@@ -67,6 +71,17 @@ def test_motors_and_tips_are_those_of_links_cut_by_hand():
                 found, expected = (of[f"{name}/joints/{joint}/moment"].ravel() for of in (pieces, hand))
                 agree(found, expected, 1e-8)
             agree(pieces[f"{name}/points/fore.tip/position"], hand[f"{name}/points/fore1.tip/position"], 1e-8)
+
+
+def test_coordinates_of_links_made_whole_have_their_derivatives():
+    """Rates and accelerations of what controllers take for the whole links, by a spline through coordinates."""
+    shape = {"name": "shape", "kind": "fcid", "shape": "static", "end": 0.8, "output_step": 0.01}
+    solution = solve_scene(ffrobot.make_scene(**in_pieces([shape])), Watcher())
+    run = make_whole_links(solution).as_links(solution.outcomes["shape"])
+    assert len(run.model.tree.nodes) < len(solution.outcomes["shape"].model.tree.nodes)
+    for order, found in ((1, run.v), (2, run.a)):
+        expected = make_interp_spline(run.time, run.q, 7).derivative(order)(run.time)
+        agree(found, expected, 1e-5, slice(8, -8))
 
 
 @pytest.mark.parametrize(("count", "share"), [(None, 1e-13), (3, 1e-4)])
