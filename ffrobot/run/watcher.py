@@ -62,7 +62,7 @@ class Interruption:
         if self.keeps or not self.at_once:
             self.watcher.stopping(number)
         if self.at_once:
-            handler = self._previous[number]
+            handler = self._previous[signal.Signals(number)]
             if callable(handler):
                 handler(number, frame)
             raise KeyboardInterrupt
