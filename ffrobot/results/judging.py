@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
 
 FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
+STILL = 1e-9  # rad or m: what joints of a robot that does not move do
 AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
 
 
@@ -210,7 +211,8 @@ def _advice(
             yield f"motor of {name}: {text}"
     if beyond and asked:
         slower = "a slower path (fastest = true finds the smallest time-scaling factor), or "
-        moves = len(group["time"]) > 1
+        joints = (joint["coordinate"][()] for joint in group["joints"].values() if "coordinate" in joint)
+        moves = any(np.ptp(one, axis=0).max(initial=0.0) > STILL for one in joints)
         yield f"{slower if moves else 'less load, or '}another motor or gear for {', '.join(beyond)}"
     at_rest = asked and _is_from_rest_to_rest(group)
     for body, need in patches.items() if asked else ():

@@ -164,13 +164,13 @@ def test_rows_are_left_out_and_counted(count, motors, tmp_path):
         assert float(share) == pytest.approx({"%": 100, "×": 1}[sign] * motor.moment / 50.0, rel=0.01)
 
 
-def weak(limit, load=0.0, **analysis):
+def weak(limit, load=0.0, path="0", **analysis):
     """A horizontal rod whose motor carries weight and a load at the tip."""
     about = {"name": "rest", "kind": "static"} | analysis
     return make_scene(
         name="weak", gravity=[0.0, -10.0], body=[{"name": "a", "rigid": ROD}],
         joint=[{"name": "O", "type": "revolute", "between": ["ground", "a.root"], "moment_limit": limit}],
-        trajectory=[{"name": "path", "joint": "O", "value": "0"}], load=[{"point": "a.tip", "y": str(-load)}],
+        trajectory=[{"name": "path", "joint": "O", "value": path}], load=[{"point": "a.tip", "y": str(-load)}],
         analysis=[about],
     )  # fmt: skip
 
@@ -186,5 +186,8 @@ def test_robots_at_rest_are_told_no_slower_path(tmp_path):
     assert not at_rest.feasible
     assert verdict(weak(15.0, 10.0)).feasible
     assert verdict(weak(10.0, 1.0)).feasible
-    moving = verdict(weak(10.0, 10.0, kind="pcid", end=0.1, output_step=0.01))
-    assert any("slower path" in text for text in moving.advice)
+    run = {"kind": "pcid", "end": 0.1, "output_step": 0.01}
+    assert verdict(weak(10.0, 10.0, **run)).advice == at_rest.advice
+    (text,) = verdict(weak(15.0, 10.0, path="10*t**2", **run)).advice
+    assert text.startswith("a slower path")
+    assert verdict(weak(15.0, 10.0, path="0.1*t**2", **run)).feasible
