@@ -135,7 +135,7 @@ power_limit | W | of the motor
 saturation_time | s | when a limit is first exceeded
 rms_moment | N m, N | over the path
 usual_moment | N m, N | not exceeded for 99 % of the time
-moment_time | s | of the largest moment
+moment_time | s | of the largest torque
 share_beyond | | of the time, above a limit
 load_inertia | kg m², kg | largest of the robot
 jump | | of the path at a short peak

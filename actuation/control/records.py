@@ -34,7 +34,7 @@ from ...mbs.scene.loads import Load
 class Sensor(Referring):
     """A sensor of a joint coordinate, of the position x, y (z) of a point, or of patch voltages.
 
-    Noise comes before rounding to the `resolution`. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
+    Noise precedes quantization to `resolution`. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
     """
 
     joint: str | None = None

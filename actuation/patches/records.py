@@ -96,8 +96,8 @@ class Amplifier(Record):
     """Amplifier of the patches of a layout, each key with one value for all patches or a list with one for each.
 
     The largest current limits C dV/dt and the charge of the strain together. `tracking` and `feasibility` take range,
-    current and slew rate as limits; forward runs with `limits = true` and closed loops cut voltages at them. Bandwidth
-    and delay act in forward runs and closed loops.
+    current and slew rate as limits; forward runs with `limits = true` and closed-loop control cut voltages at them.
+    Bandwidth and delay act in both.
     """
 
     range: Range | Annotated[tuple[Range, ...], NotEmpty] | None = None

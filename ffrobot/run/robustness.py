@@ -62,7 +62,8 @@ def deviations(context: ActuatedContext, source: Outcome) -> Deviations:
             f'{context.model.scene.path}: analysis "{source.analysis.name}": robustness: expected rigid gears, found'
             " joints with stiffness; closed-loop analyses simulate these"
         )
-    runs, nominal, held = _Runs(context, source, asked), context.model, f"held for {1e3 * asked.sample_time:g} ms"
+    held = f"zero-order hold of {1e3 * asked.sample_time:g} ms"
+    runs, nominal = _Runs(context, source, asked), context.model
     robots: dict[str, list[Model]] = {"as computed": [nominal], held: [nominal]}
     for cause, robot in _varied(nominal, asked):
         robots.setdefault(cause, []).append(robot)

@@ -15,7 +15,7 @@ class Robustness(Record):
     """Deviations from the model, each alone, under which the torques and voltages of the result are simulated again.
 
     The summary has the largest distance of the tip from the computed motion: open loop, and with a sampled PD
-    controller of the joints on quantized encoders beside them, without rate sensors.
+    controller of the joints in addition, on quantized encoders and without rate sensors.
     """
 
     sample_time: Positive = 1e-3

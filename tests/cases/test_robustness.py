@@ -71,12 +71,12 @@ def test_lanes_side_by_side(tmp_path):
         ]
     open_loop, control = lanes["open_loop"], lanes["joint_control"]
     assert open_loop["as computed"] == pytest.approx(found[0], abs=1e-8)
-    assert open_loop["held for 1 ms"] == pytest.approx(found[1], rel=1e-3)
+    assert open_loop["zero-order hold of 1 ms"] == pytest.approx(found[1], rel=1e-3)
     for what in ("stiffness", "mass"):
         assert open_loop[f"{what} ± 1 %"] / open_loop[f"{what} ± 0.2 %"] == pytest.approx(5.0, rel=0.03)
         assert np.isfinite(control[f"{what} ± 1 %"])
     assert control["mass ± 1 %"] < open_loop["mass ± 1 %"]
-    assert control["held for 1 ms"] < 0.1 * lanes["joint_control_without_voltages"]["held for 1 ms"]
+    assert control["zero-order hold of 1 ms"] < 0.1 * lanes["joint_control_without_voltages"]["zero-order hold of 1 ms"]
     assert np.isnan(control["as computed"])
     # half of the acceleration F/m over the path's time, by a motor whose torque stays, is more than that of the tip
     assert 0.0 < control["0.001 N at the tip"] < open_loop["0.001 N at the tip"] < 0.5 * 0.001 / 0.05 * 0.6**2
