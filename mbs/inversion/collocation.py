@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.structs import struct
 
 if TYPE_CHECKING:
@@ -65,8 +65,9 @@ def bernstein_integral(scheme: Scheme) -> Array:
     s = len(scheme.c)
     m = np.arange(s)
     powers = scheme.to_powers / (m[:, None] + 1)  # of ξ, ξ² …, ξ^s
-    shares = np.array([[comb(i, k + 1) / comb(s, k + 1) for k in m] for i in range(s + 1)])
-    return as_floats(shares @ powers)
+    shares: Array = np.array([[comb(i, k + 1) / comb(s, k + 1) for k in m] for i in range(s + 1)])
+    found: Array = shares @ powers
+    return found
 
 
 GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)
