@@ -199,7 +199,7 @@ class Statics:
         at = self.balance(q, np.arange(tree.n_v))
         K = self.stiffness(q, at)
         scale = _scales(K, at.size)
-        free = null_space(at.gradient * scale, DEPENDENT) if len(at.gradient) else np.eye(tree.n_v)
+        free = null_space(at.gradient * scale, DEPENDENT)
         found, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
         if not len(found) or found.real.min() > UNSTABLE:
             return

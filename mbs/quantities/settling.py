@@ -92,7 +92,7 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
 
     statics, tree = Statics(model, t), model.tree
     at, still = statics.balance(q, np.arange(tree.n_v)), np.zeros(tree.n_v)
-    free = null_space(at.gradient, DEPENDENT) if len(at.gradient) else np.eye(tree.n_v)
+    free = null_space(at.gradient, DEPENDENT)
     if not free.shape[1]:
         return float("nan")
     mobility = without_rows(model).derivatives(t, q, still, still).a_f
