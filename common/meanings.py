@@ -267,6 +267,14 @@ saturated | | share of samples with a command at its limit
 overshoot | m | beyond the last place
 lowest_frequency | Hz | by the linear model
 vibration_window | s | before the end
+[]
+control/pole | | of the sampled linear loop, real and imaginary part
+control/controller/* | | of ξ(k+1) = A ξ + B y, u = C ξ + D y, off the reference
+control/estimate/points/*/position | m | of the tip, estimated | axis
+control/estimate/points/*/error | m | distance of the estimated tip from the tip
+control/estimate/points/*/sigma | m | standard deviation of the estimated tip | axis
+control/estimate/pole | | of the estimate's error, real and imaginary part
+control/estimate/** | | what the observer estimates
 """)
 
 MODAL_BODY = _table("""

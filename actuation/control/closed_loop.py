@@ -34,21 +34,37 @@ from .amplified_loop import AmplifiedLoop
 from .controllers import (
     ComputedTorqueControl,
     Controller,
+    LinearFeedback,
     Loop,
     PythonControl,
     Setup,
     joint_pid,
     load_function,
     modal_velocity,
+    state_feedback,
 )
 from .linear import voltages_at
-from .linear_model import LinearModel, state_space
+from .linear_model import LinearModel, is_kept, kept_modes, state_space
 from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
 from .margins import Feedback, lowest_frequency
 from .metrics import Followed, last_change, place_of_tip
-from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, SampledAnalysis, Sensor
+from .observer import Observed, Schedule, given, kalman, unseen
+from .records import (
+    ComputedTorque,
+    GainsObserver,
+    JointPid,
+    KalmanObserver,
+    KalmanRecord,
+    Lqr,
+    ModalVelocity,
+    PythonController,
+    SampledAnalysis,
+    Sensor,
+    StateFeedback,
+)
 from .records import Controller as Record
-from .robot import Robot, Sensing, Signal, input_names, make_signals, merged
+from .robot import Robot, input_names
+from .signals import Filter, Sensing, Signal, filters, make_signals, merged
 
 APART = 1e-6  # of a run, between two times of a spline
 
@@ -80,6 +96,86 @@ def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sens
                     yield Sensor(modal=body, measure="rate")
 
 
+def estimated_sensors(robot: Robot, controllers: Sequence[Record], tip: str) -> Iterator[Sensor]:
+    """Ideal ones of what an observer estimates: the tip, all coordinates and rates, and what `controllers` need."""
+    model = robot.model
+    subjects = [{"joint": one.name} for one in model.scene.joint if one.units and one.name in model.tree.carried]
+    subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]
+    yield Sensor(point=tip)
+    for subject in subjects:
+        yield Sensor.model_validate(subject)
+        yield Sensor.model_validate(subject | {"measure": "rate"})
+    yield from needed_sensors(robot, controllers)
+
+
+def make_observed(
+    analysis: ClosedLoop, context: ActuatedContext, setup: Setup, reference: Array, ranges: Array, nominal: Array
+) -> Observed:
+    """The observer with the controllers that act on its estimates.
+
+    `reference` (K, estimates) as of `Setup`, `ranges` and `nominal` as of `Observed`. Raises `InputError` where the
+    observer does not fit the robot.
+    """
+    record, robot, T = analysis.observer, setup.robot, setup.sample_time
+    tip, origin = analysis.tip or _default_tip(robot.model), setup.reference
+    warnings: list[str] = []
+    try:
+        if isinstance(record, KalmanRecord):
+            plant = with_compliance(robot.model)
+            read, more = (
+                [s for sensor in sensors for s in make_signals(plant, context, sensor)]
+                for sensors in (analysis.sensor, estimated_sensors(robot, analysis.controller, tip))
+            )
+            whole = merged(more, ())
+            columns = {signal.name: k for k, signal in enumerate(whole)}
+            source, found = setup.source, []
+            at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
+            instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
+            pushed = (name.split("/") for name in (*record.process, *record.disturbance))
+            points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
+            for row in instants:
+                mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
+                rows = zip(*Sensing(plant, (*read, *whole)).rows(mechanism), strict=True)
+                readings = dict(zip([s.name for s in (*read, *whole)], rows, strict=True))
+                model = state_space(mechanism, voltages, readings)
+                kept = [s.name for s in whole if is_kept(s.name, record.modes)]
+                found.append(kalman(record, model, read, kept, (setup.inputs, T, setup.delay)))
+                warnings += unseen(model, read)
+            schedule = Schedule(source.time[instants], tuple(found))
+            reference = reference[:, [columns[name] for name in kept]]
+        else:
+            assert isinstance(record, GainsObserver)
+            one = given(record, setup)
+            schedule = Schedule(np.zeros(1), (one,))
+            if record.about == "zero":
+                origin, nominal = np.zeros_like(origin), np.zeros_like(nominal)
+            reference = origin[:, setup.columns(*record.outputs)]
+        if (radius := schedule.radius) >= 1.0:
+            raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")
+    except InputError as error:
+        raise InputError(f"{robot.path}: observer: {error}") from None
+    names = schedule.observers[0].estimates
+    still = np.zeros((len(reference), len(names) - reference.shape[1]))
+    inner = replace(
+        setup,
+        outputs=(*setup.outputs, *(f"estimate/{name}" for name in names)),
+        reference=np.hstack([setup.reference, reference, still]),
+    )
+    acting = make_controllers(analysis.controller, inner)
+    if isinstance(record, KalmanRecord) and record.reject:
+        own = [name for name in record.disturbance if name in setup.inputs]
+        P = np.zeros((len(inner.inputs), len(inner.outputs)))
+        P[inner.places(*own), inner.columns(*(f"estimate/disturbance/{name}" for name in own))] = 1.0
+        acting.append(LinearFeedback(inner, P))
+    seen_badly = list(dict.fromkeys(warnings))
+    return Observed(schedule, inner, acting, ranges, (origin, nominal), record.settle, tip, seen_badly)
+
+
+def make_controllers(records: Sequence[Record], setup: Setup) -> list[Controller]:
+    """All controllers of an analysis."""
+    return [make_controller(record, setup, records) for record in records]
+
+
 def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
     """The controller of one table of the scene, acting with those `beside`.
 
@@ -89,6 +185,8 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
         return joint_pid(record, setup, joint_mobility(setup))
     if isinstance(record, ModalVelocity):
         return modal_velocity(record, setup)
+    if isinstance(record, StateFeedback):
+        return state_feedback(record, setup)
     if isinstance(record, ComputedTorque):
         return ComputedTorqueControl(record, setup, setup.robot.rigid())
     if isinstance(record, Lqr):
@@ -133,12 +231,10 @@ class ClosedLoop(SampledAnalysis):
         source = context.outcomes[self.actuation]
         plant = with_compliance(without_paths(context.model))
         moved, robot, whole = with_motor_coordinates(source, plant), _robot(context, source), context.whole
-        given, more = (
-            [s for sensor in sensors for s in make_signals(plant, context.patches, sensor, whole)]
-            for sensors in (self.sensor, needed_sensors(robot, self.controller))
-        )
-        read = merged(given, more)
-        sensing = Sensing(plant, read)
+        own = [s for sensor in self.sensor for s in make_signals(plant, context, sensor, whole)]
+        more = [s for sensor in self._ideal(robot) for s in make_signals(plant, context, sensor, whole)]
+        read, estimated = (merged(own, more), ()) if self.observer is None else (tuple(own), merged(more, ()))
+        sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
         outputs, tip = replay_times(source, self), place_of(whole, self.tip) or _default_tip(plant)
         models = loop_models(plant, source.time, moved, context.patches, read)
         place_at = _place_of_tip(self, plant, source, tip)
@@ -147,22 +243,37 @@ class ClosedLoop(SampledAnalysis):
         samples = sample_times(outputs, self.sample_time)
         seen = source if moved.gears else _resolved(source)  # gears that give are known at outputs
         of_seen = moved if moved.gears else with_motor_coordinates(seen, plant)
-        reference = between(samples, seen.time, sensing.read(of_seen.q, of_seen.v, of_seen.a))
+        reference, wanted = (
+            between(samples, seen.time, of.read(of_seen.q, of_seen.v, of_seen.a)) for of in (sensing, ideal)
+        )
+        filtered = Filter(read, self.sample_time)
+        reference[:] = [filtered(y) for y in reference]
         setup = Setup(
             robot, robot.model, context.patches, input_names(robot), tuple(signal.name for signal in read), samples,
-            self.sample_time, self.delay, reference, _feed_forward(context, self, source, moved, samples), robot.source,
+            self.sample_time, self.delay, reference, _feed_forward(context, self, source, moved, samples),
+            robot.source,
         )  # fmt: skip
-        acting = [make_controller(record, setup, self.controller) for record in self.controller]
         amplifiers = joined(context.patches.values())
         ranges = command_ranges(context.model, context.patches)
         if self.unlimited:
             amplifiers, ranges = amplifiers.unlimited(), np.inf * np.sign(ranges)
+        observed = None
+        if self.observer is None:
+            acting = make_controllers(self.controller, setup)
+        else:
+            nominal = _feed_forward(context, self, source, moved, samples, whole=True)
+            observed = make_observed(self, context, setup, wanted, ranges, nominal)
+            acting = [observed]
         begun = [of if isinstance(of, PythonControl) else copy(of) for of in acting]
         loop = Loop(setup, read, acting, ranges, self.seed)
-        splits = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
+        splits = n_q, rates = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
+        states: list[Array] = []
 
         def at_sample(k: int, t: float, state: Array) -> Array:
-            return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
+            q, v, a = (part[None] for part in (state[:n_q], state[n_q:rates], state[rates:]))
+            if observed is not None:
+                states.append(state.copy())
+            return loop(k, t, sensing.read(q, v, a)[0])
 
         arriving: Loop | AmplifiedLoop = loop
         if amplifiers.acts:
@@ -181,14 +292,25 @@ class ClosedLoop(SampledAnalysis):
         closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
         quiet = max((last_change(partial(_values, of, self), outputs) for of in _exciting(plant, self)), default=0.0)
         runs = _followed(run, place_at, held, tip, quiet), _followed(closer, place_at, held, tip, quiet)
-        loops = loops_about(setup, begun, loop.readings[: loop.taken], models)
+        readings = loop.readings if observed is None else observed.seen
+        loops = loops_about(setup, begun, readings[: loop.taken], models, filters(read, self.sample_time))
         record = loop_record(self, setup, loop, acting, runs, loops, lowest, gears=bool(plant.tree.gears))
+        if observed is not None:
+            true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T
+            names = [each.name for each in estimated]
+            record = replace(record, estimate=observed.record(dict(zip(names, true, strict=True))))
 
         def completed(of: Outcome) -> Outcome:
             commanded = context.model.by_motor(held(of.time))
             return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
+
+    def _ideal(self, robot: Robot) -> Iterator[Sensor]:
+        """What controllers need; what an observer estimates."""
+        if self.observer is None:
+            return needed_sensors(robot, self.controller)
+        return estimated_sensors(robot, self.controller, self.tip or _default_tip(robot.model))
 
 
 def _resolved(source: Outcome) -> Outcome:
@@ -213,27 +335,41 @@ def loop_models(
     None where it is singular, or has none yet.
     """
     rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
-    points = {signal.of.split("/")[1]: signal.point for signal in read if signal.point}
-    along = {signal.of: signal.along for signal in read if not signal.point}
+    names, sensing = [signal.name for signal in read], Sensing(model, read)
     with suppress(SolveError, InputError):
-        linearisation, found = LinearEquations(model, reference.q[0], points), []
+        linearisation, found = LinearEquations(model, reference.q[0]), []
         for k in rows:
             at = linearisation.at(float(time[k]), reference.q[k], rest, rest)
-            outputs = dict(at.outputs) | {name: of @ at.transformation for name, of in along.items()}
-            found.append(state_space(replace(at, outputs=outputs), voltages_at(model, at, patches)))
+            readings = dict(zip(names, zip(*sensing.rows(at), strict=True), strict=True))
+            found.append(state_space(at, voltages_at(model, at, patches), readings))
         return tuple(found)
     return ()
 
 
 def loops_about(
-    setup: Setup, controllers: Sequence[Controller], readings: Array, models: Sequence[LinearModel]
+    setup: Setup,
+    controllers: Sequence[Controller],
+    readings: Array,
+    models: Sequence[LinearModel],
+    filtering: tuple[Array, Array, Array, Array],
 ) -> list[tuple[LinearModel, Feedback]]:
-    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there."""
+    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there.
+
+    `filtering`: of readings before controllers get them.
+    """
     is_asked_in_order = any(isinstance(controller, PythonControl) for controller in controllers)
     latest = 0 if is_asked_in_order else max(len(setup.times) - LONGEST, 0)
-    at = cache(partial(find_feedback, setup, controllers, readings))
+    observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
+
+    @cache
+    def at(first: int) -> Feedback | None:
+        if observed is None:
+            return find_feedback(setup, controllers, readings, first)
+        inner = find_feedback(observed.setup, observed.controllers, readings, first)
+        return None if inner is None else observed.schedule.at(float(setup.times[first])).closed(inner)
+
     found = [(model, at(min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
-    known = [(model, feedback) for model, feedback in found if feedback is not None]
+    known = [(model, feedback.behind(*filtering)) for model, feedback in found if feedback is not None]
     return known if len(known) == len(found) else []
 
 
@@ -251,20 +387,30 @@ def _values(of: TimeFunction, analysis: ClosedLoop, time: Array) -> Array:
 
 
 def _feed_forward(
-    context: ActuatedContext, analysis: ClosedLoop, source: Outcome, moved: MotorCoordinates, times: Array
+    context: ActuatedContext,
+    analysis: ClosedLoop,
+    source: Outcome,
+    moved: MotorCoordinates,
+    times: Array,
+    *,
+    whole: bool = False,
 ) -> Array:
-    """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
+    """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held.
+
+    Those that are fed forward, or, `whole`, all.
+    """
     middle = held_until(times, analysis, source.time[-1])
 
     most = largest_moments(context.model, limits=False)
     values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(as_list(middle))
-    if analysis.feed_forward == "none":
+    kind = "joints+pzt" if whole else analysis.feed_forward
+    if kind == "none":
         values[:, : len(most)] = 0.0
-    if analysis.feed_forward != "joints+pzt":
+    if kind != "joints+pzt":
         values[:, len(most) :] = 0.0
     column = 0
     for joint, columns in context.model.motors.items():  # with compliant gears: known at outputs
-        if moved.gears and analysis.feed_forward != "none":
+        if moved.gears and kind != "none":
             moments = moved.moments[joint]
             values[:, column : column + len(columns)] = between(middle, source.time, moments)
         column += len(columns)

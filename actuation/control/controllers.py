@@ -32,8 +32,9 @@ from ...common.structs import struct
 from ...mbs.model.model import Model
 from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
-from .records import ComputedTorque, JointPid, ModalVelocity
-from .robot import RigidArm, Robot, Signal, estimate
+from .records import ComputedTorque, JointPid, ModalVelocity, StateFeedback
+from .robot import RigidArm, Robot, estimate
+from .signals import Filter, Signal
 
 
 class Controller(Protocol):
@@ -70,9 +71,15 @@ class Setup:
         for joint in joints:
             yield from ((joint, name) for name in self.robot.coordinates(joint))
 
+    @property
+    def has_estimates(self) -> bool:
+        """Whether an observer adds "estimate/NAME" to the readings."""
+        return any(name.startswith("estimate/") for name in self.outputs)
+
     def columns(self, *names: str) -> Indices:
-        """Where these readings are in y. Raises `InputError` for a sensor that is not there."""
-        return self._indices(names, self.outputs, "readings")
+        """Where these readings are in y, or their estimates. Raises `InputError` where there is neither."""
+        of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
+        return self._indices(of, self.outputs, "readings")
 
     def places(self, *names: str) -> Indices:
         """Where these commands are in u. Raises `InputError` for a joint without a motor."""
@@ -152,6 +159,20 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
         bandwidth = max(bandwidth, float(link.omega[m - 1]))
     P, D = (None, G) if record.sensor == "pzt" else (G, None)
     return LinearFeedback(setup, P, D, bandwidth=bandwidth)
+
+
+def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
+    """−K x̂ of an observer. Raises `InputError` for gains of another size."""
+    K = np.zeros((len(setup.inputs), len(setup.outputs)))
+    states = [k for k, name in enumerate(setup.outputs) if name.startswith("estimate/state/")]
+    gain, size = np.array(record.gain), (len(record.inputs), len(states))
+    if gain.shape != size:
+        raise InputError(
+            f"{setup.robot.path}: controller state-feedback: expected gain with {size[0]} × {size[1]} numbers (inputs,"
+            f" states of the observer), found {' × '.join(map(str, gain.shape))}"
+        )
+    K[np.ix_(setup.places(*record.inputs), np.array(states, dtype=int))] = gain
+    return LinearFeedback(setup, K)
 
 
 def modal_columns(setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:
@@ -244,17 +265,22 @@ def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[i
 
 
 class Loop:
-    """What the core asks at every sample: noise and resolution, controllers, limits."""
+    """What the core asks at every sample: errors of sensors, controllers, limits."""
 
     def __init__(
         self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], range: Array, seed: int
     ) -> None:
-        samples = (len(setup.times), len(read))
-        noise = np.array([signal.noise for signal in read])
-        self._noise = np.random.default_rng(seed).standard_normal(samples) * noise if noise.any() else None
-        resolution = np.array([signal.resolution for signal in read])
+        samples, T = (len(setup.times), len(read)), setup.sample_time
+        noise = np.array([signal.sensor.deviation(T) for signal in read])
+        self._errors = np.array([signal.sensor.bias for signal in read]) + np.zeros(samples)
+        if noise.any():
+            self._errors += np.random.default_rng(seed).standard_normal(samples) * noise
+        resolution = np.array([signal.sensor.resolution for signal in read])
         self._coarse = np.flatnonzero(resolution)
         self._resolution = resolution[self._coarse]
+        self._largest = np.array([signal.sensor.range or np.inf for signal in read])
+        self._every = np.array([round((signal.sensor.sample_time or T) / T) for signal in read])
+        self._filter = Filter(read, T)
         self._controllers, self._range, self._feed_forward = controllers, range, setup.feed_forward
         self.blur = resolution + noise  # (outputs,)
         self.readings = np.zeros(samples)
@@ -270,10 +296,11 @@ class Loop:
 
     def __call__(self, k: int, _t: float, y: Array) -> Array:
         """Commands at sample k for what the sensors are exposed to."""
-        if self._noise is not None:
-            y += self._noise[k]
+        y = np.minimum(np.maximum(self._filter(y) + self._errors[k], -self._largest), self._largest)
         if self._coarse.size:
             y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
+        if k and self._every.max(initial=1) > 1:
+            y = np.where(k % self._every == 0, y, self.readings[k - 1])
         wanted = self._feed_forward[k].copy()
         for controller in self._controllers:
             wanted += controller(k, y)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +32,7 @@ class LinearModel:
     """Equations of motion, linear about a configuration or one instant of a motion: x = (δs, δṡ), f coordinates s.
 
     Attributes:
-        A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D = 0, since inputs accelerate.
+        A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D of accelerations alone is not 0.
         state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
         input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
         output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k".
@@ -115,24 +117,61 @@ class LinearModel:
         return control.ss(self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)], **allowed)
 
 
-def state_space(mechanism: LinearMechanism, voltages: Mapping[str, Array]) -> LinearModel:
-    """The state space of a linear mechanism; `voltages`: what a unit of each does along s (f,), by name."""
+def state_space(
+    mechanism: LinearMechanism,
+    voltages: Mapping[str, Array],
+    readings: Mapping[str, tuple[Array, Array, Array]] = MappingProxyType({}),
+) -> LinearModel:
+    """The state space of a linear mechanism; `voltages`: what a unit of each does along s (f,), by name.
+
+    `readings`: changes (f,) of each sensor's by s, ṡ and s̈, which are outputs too.
+    """
     f = len(mechanism.M)
     motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
     inputs = {**motors, **voltages, **forces}
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
-    outputs = dict(mechanism.outputs) | modal
+    none = np.zeros(f)
+    outputs = {name: (row, none, none) for name, row in (*mechanism.outputs.items(), *modal.items())} | dict(readings)
     columns = np.column_stack([mechanism.K, mechanism.D, *inputs.values()])
     solved = np.linalg.solve(mechanism.M, columns)
     A = np.block([[np.zeros((f, f)), np.eye(f)], [-solved[:, : 2 * f]]])
     B = np.vstack([np.zeros((f, len(inputs))), solved[:, 2 * f :]])
-    C = np.array([np.concatenate([row, np.zeros(f)]) for row in outputs.values()])
+    by_s, by_rate, by_acceleration = np.reshape(list(outputs.values()), (-1, 3, f)).swapaxes(0, 1)
+    C, D = np.hstack([by_s, by_rate]) + by_acceleration @ A[f:], by_acceleration @ B[f:]
     names = (*mechanism.names, *(f"rate of {name}" for name in mechanism.names))
     return LinearModel(
-        A, B, C, np.zeros((len(C), B.shape[1])), names, tuple(inputs), tuple(outputs),
+        A, B, C, D, names, tuple(inputs), tuple(outputs),
         mechanism.time, mechanism.M, mechanism.transformation,
     )  # fmt: skip
+
+
+def is_kept(name: str, modes: int) -> bool:
+    """Whether a coordinate or reading is none of a mode above the lowest `modes` of its link."""
+    kind, *rest = name.split("/")
+    return kind != "modal" or int(rest[1]) <= modes
+
+
+def kept_modes(
+    mechanism: LinearMechanism, voltages: Mapping[str, Array], modes: int
+) -> tuple[LinearMechanism, Mapping[str, Array]]:
+    """With only the lowest `modes` of each link, higher ones truncated; `voltages` as in `state_space`."""
+    chosen = [j for j, name in enumerate(mechanism.names) if is_kept(name, modes)]
+    block = np.ix_(chosen, chosen)
+    kept = replace(
+        mechanism,
+        M=mechanism.M[block],
+        D=mechanism.D[block],
+        K=mechanism.K[block],
+        inputs={name: column[chosen] for name, column in mechanism.inputs.items()},
+        outputs={name: row[chosen] for name, row in mechanism.outputs.items()},
+        transformation=mechanism.transformation[:, chosen],
+        transformation_rate=mechanism.transformation_rate[:, chosen],
+        force=mechanism.force[chosen],
+        points={name: rows[:, chosen] for name, rows in mechanism.points.items()},
+        names=tuple(mechanism.names[i] for i in chosen),
+    )
+    return kept, {name: column[chosen] for name, column in voltages.items()}
 
 
 def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
@@ -151,6 +190,20 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
     else:
         raise InputError(f'{path}: expected a file name that ends in .npz or .mat, found "{path.name}"')
     write_atomically(path, content.getvalue(), "linear model")
+
+
+def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
+    """Matrices of a .npz or .mat file. Raises `InputError` where it cannot be read or lacks one."""
+    try:
+        if path.suffix == ".mat":
+            from scipy.io import loadmat
+
+            held: Mapping[str, Any] = loadmat(path)
+        else:
+            held = np.load(path)
+        return [as_floats(np.atleast_2d(np.asarray(held[name], dtype=float))) for name in names]
+    except (OSError, ValueError, KeyError, NotImplementedError) as error:
+        raise InputError(f"{path}: expected a .npz or .mat file with {quoted(names)}, found: {error}") from None
 
 
 def _some(names: tuple[str, ...]) -> str:
@@ -186,8 +239,8 @@ def sampled(A: Array, B: Array, T: float, delay: float, *, with_last: bool = Fal
     late, fraction = divmod(delay, T)
     is_whole = fraction <= 1e-9 * T
     waiting = max(int(late) + (not is_whole), int(with_last))
-    Phi, Gamma = _zero_order_hold(A, B, T)
-    early = Gamma if is_whole else _zero_order_hold(A, B, T - fraction)[1]
+    Phi, Gamma = zero_order_hold(A, B, T)
+    early = Gamma if is_whole else zero_order_hold(A, B, T - fraction)[1]
     columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
     columns[:n, :n] = Phi
     columns[n:, n + m :] = np.eye(waiting * m)
@@ -197,7 +250,7 @@ def sampled(A: Array, B: Array, T: float, delay: float, *, with_last: bool = Fal
     return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :])
 
 
-def _zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
+def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     """e^{A T} and ∫ e^{A s} ds B over T."""
     from scipy.linalg import expm
 
@@ -205,6 +258,25 @@ def _zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     scale = float(np.abs(B).max(initial=0.0)) or 1.0  # of inputs: the unit of a command must not decide on the powers
     block = expm(np.block([[A, B / scale], [np.zeros((m, n + m))]]) * T)
     return block[:n, :n], block[:n, n:] * scale
+
+
+def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
+    """X = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q, for which A − B K is stable; of filters with Aᵀ and Cᵀ in their place.
+
+    Raises `ValueError` where there is none.
+    """
+    from scipy.linalg import LinAlgError, solve_discrete_are
+
+    root = np.linalg.cholesky(R)
+    B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
+    try:
+        X = solve_discrete_are(A, B, Q, np.eye(len(R)))
+    except LinAlgError as error:
+        raise ValueError(str(error)) from None
+    K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
+    if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < 1.0:
+        raise ValueError("its solution is not stable")
+    return as_floats((X + X.T) / 2)
 
 
 STILL = 1e-10  # of the largest effect on its kind of output: less is round-off
@@ -244,9 +316,11 @@ def controllability(model: LinearModel, inputs: Names) -> Reach:
 
 
 def observability(model: LinearModel, outputs: Names) -> Reach:
-    """By mode, as `controllability` with the outputs' rows."""
-    _, _, _, C = model.second_order
-    return _reach(model, _scaled(C.T, model.output_names)[:, model.outputs(outputs)], left=False)
+    """By mode, as `controllability` with the outputs' rows, those of rates times λ."""
+    f = model.freedom
+    inverse = np.linalg.inv(np.linalg.cholesky(model.mass).T)
+    C = np.vstack([inverse.T @ model.C[:, :f].T, inverse.T @ model.C[:, f:].T])
+    return _reach(model, _scaled(C, model.output_names)[:, model.outputs(outputs)], left=False)
 
 
 def _scaled(columns: Array, names: Sequence[str]) -> Array:
@@ -278,7 +352,8 @@ def _reach(model: LinearModel, columns: Array, left: bool) -> Reach:
         U, values, V = np.linalg.svd(P)
         count = max(1, int(np.count_nonzero(values < RIGID**2 * scale)))
         vectors = U[:, -count:] if left else V[-count:].conj().T
-        reached = vectors.conj().T @ columns if left else vectors.T @ columns
+        by_rate = pole * columns[model.freedom :] if len(columns) > model.freedom else 0.0
+        reached = vectors.conj().T @ columns if left else vectors.T @ (columns[: model.freedom] + by_rate)
         padded = np.zeros((count, max(count, reached.shape[1])), dtype=complex)
         padded[:, : reached.shape[1]] = reached
         measure[k] = np.linalg.svd(padded, compute_uv=False)[-1]

@@ -6,15 +6,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, ComplexArray
 from ...common.peaks import largest
 from ...common.structs import struct
 from ...mbs.run.outcome import Details
 from ...mbs.run.samples import in_order
 from .amplified_loop import AmplifiedLoop
 from .controllers import Controller, Loop, Setup
-from .margins import Loops, Margins, advice, margins
+from .margins import Feedback, Loops, Margins, advice, loop_eigenvalues, margins
 from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched
+from .observer import Estimates
 from .records import ComputedTorque, JointPid, SampledAnalysis
 
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
@@ -38,6 +39,9 @@ class LoopRecord(Details):
     warnings: tuple[str, ...]  # one line each
     margins: Margins | None = None  # by the linear model; None where controllers, or the robot, are not linear
     advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
+    feedback: Feedback | None = None  # from readings to commands at the start, off the reference; None likewise
+    poles: ComplexArray | None = None  # of the linear loop there, from sample to sample
+    estimate: Estimates | None = None  # of an observer
 
 
 def sample_times(outputs: Array, T: float) -> Array:
@@ -106,6 +110,7 @@ def loop_record(
         setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
         loop.commands[taken], loop.wanted[taken], tip_error,
         largest(run.time, np.linalg.norm(run.error, axis=1))[1], metrics, warnings, found, tuple(texts),
+        *((loops[0][1], loop_eigenvalues(*loops[0], T, delay)) if loops else ()),
     )  # fmt: skip
 
 

@@ -9,9 +9,17 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...mbs.linear.linearisation import LinearMechanism
 from .controllers import Setup, modal_columns
-from .linear_model import LinearModel, SampledModel, controllability, observability, sampled, state_space
+from .linear_model import (
+    LinearModel,
+    SampledModel,
+    controllability,
+    kept_modes,
+    observability,
+    riccati,
+    sampled,
+    state_space,
+)
 from .records import JointPid, Lqr
 from .robot import estimate
 
@@ -24,18 +32,13 @@ def gains(model: SampledModel, Q: Array, R: Array) -> Array:
 
     Raises `ValueError` where the Riccati equation has no stabilizing solution.
     """
-    from scipy.linalg import LinAlgError, solve_discrete_are
-
     n, waiting = len(Q), (len(model.A) - len(Q)) // len(R)
     # in the unit of what is acceptable: all weights are one
     scale = np.concatenate([1 / np.sqrt(np.diag(Q)), *[1 / np.sqrt(np.diag(R))] * waiting])
     unit = 1 / np.sqrt(np.diag(R))
     A, B = model.A * scale / scale[:, None], model.B * unit / scale[:, None]
     weight = np.diag(np.concatenate([np.ones(n), np.full(len(A) - n, 1e-9)]))
-    try:
-        X = solve_discrete_are(A, B, weight, np.eye(len(R)))
-    except LinAlgError as error:
-        raise ValueError(str(error)) from None
+    X = riccati(A, B, weight, np.eye(len(R)))
     K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
     return unit[:, None] * K / scale
 
@@ -104,35 +107,13 @@ def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> Linea
     Joints that other controllers hold are held by springs and dampers, as if these neither sampled nor waited.
     """
     mechanism, voltages = setup.robot.linear(int(np.argmin(np.abs(setup.source.time - record.time))))
-    keep = [j for j, name in enumerate(mechanism.names) if _is_kept(name, record.modes)]
-    mechanism = _restricted(mechanism, keep)
+    mechanism, voltages = kept_modes(mechanism, voltages, record.modes)
     for pid in beside:
         for joint, name in setup.robot_coordinates(pid.joints):
             held = np.outer(mechanism.inputs[f"joint/{name}"], mechanism.outputs[f"{pid.side}/{name}"])
             spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
             mechanism = replace(mechanism, K=mechanism.K + spring * held, D=mechanism.D + damper * held)
-    return state_space(mechanism, {name: column[keep] for name, column in voltages.items()})
-
-
-def _is_kept(name: str, modes: int) -> bool:
-    kind, _, rest = name.partition("/")
-    return kind != "modal" or int(rest.rpartition("/")[2]) <= modes
-
-
-def _restricted(mechanism: LinearMechanism, keep: Sequence[int]) -> LinearMechanism:
-    block, chosen = np.ix_(keep, keep), list(keep)
-    return replace(
-        mechanism,
-        M=mechanism.M[block],
-        D=mechanism.D[block],
-        K=mechanism.K[block],
-        inputs={name: column[chosen] for name, column in mechanism.inputs.items()},
-        outputs={name: row[chosen] for name, row in mechanism.outputs.items()},
-        transformation=mechanism.transformation[:, chosen],
-        transformation_rate=mechanism.transformation_rate[:, chosen],
-        force=mechanism.force[chosen],
-        names=tuple(mechanism.names[i] for i in chosen),
-    )
+    return state_space(mechanism, voltages)
 
 
 def _weights(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[Array, Array]:
@@ -156,6 +137,11 @@ def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Ar
     """(f, outputs) that give coordinates, measured rates, and rates by differences (times T)."""
     values, rates, differences = np.zeros((3, model.freedom, len(setup.outputs)))
     names = list(model.state_names[: model.freedom])
+    if setup.has_estimates:
+        every = range(model.freedom)
+        values[every, setup.columns(*(f"estimate/{name}" for name in names))] = 1.0
+        rates[every, setup.columns(*(f"estimate/{name}/rate" for name in names))] = 1.0
+        return values, rates, differences
     for name in _rigid_outputs(setup):
         i = names.index(name)
         values[i, setup.columns(name)] = 1.0
@@ -177,6 +163,8 @@ def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequenc
     """Modes that no input of the design reaches, or no sensor sees."""
     lost = controllability(model, list(inputs)).lost
     lines = [f"LQR: uncontrollable: {', '.join(lost)}"] if lost else []
+    if setup.has_estimates:
+        return tuple(lines)
     seen = _rigid_outputs(setup)
     seen += [name for name in model.output_names if name.startswith("modal/") and _is_read(record, setup, name)]
     hidden = observability(model, seen).lost

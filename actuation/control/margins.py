@@ -53,6 +53,14 @@ class Feedback:
         """All commands times a factor."""
         return replace(self, C=factor * self.C, D=factor * self.D)
 
+    def behind(self, A: Array, B: Array, C: Array, D: Array) -> Feedback:
+        """Behind filters A, B, C, D of its readings, whose states come last."""
+        if not len(A):
+            return self
+        whole = np.block([[self.A, self.B @ C], [np.zeros((len(A), len(self.A))), A]])
+        into = np.vstack([self.B @ D, B])
+        return replace(self, A=whole, B=into, C=np.hstack([self.C, self.D @ C]), D=self.D @ D)
+
 
 Loops = Sequence[tuple[LinearModel, Feedback]]
 """A loop in several configurations."""
@@ -157,6 +165,10 @@ def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
     f, seen, felt = model.freedom, np.zeros((len(names), len(model.A))), np.zeros((len(names), model.B.shape[1]))
     for row, name in enumerate(names):
         of, _, order = name.rpartition("/")
+        if name in model.output_names:
+            k = model.outputs(name)[0]
+            seen[row], felt[row] = model.C[k], model.D[k]
+            continue
         along = model.C[model.outputs(of if order in ("rate", "acceleration") else name)[0], :f]
         if order == "acceleration":
             seen[row], felt[row] = along @ model.A[f:], along @ model.B[f:]

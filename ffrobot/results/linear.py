@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, ComplexArray
 from ..common.meanings import names_of, write_record
 
 if TYPE_CHECKING:  # most scenes have none of these
@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear_model import LinearModel, Zeros
     from ..actuation.control.loop_record import LoopRecord
     from ..actuation.control.metrics import Metrics
+    from ..actuation.control.observer import Estimates
     from ..mbs.analysis.operating_points import RobotAtRest
     from ..mbs.quantities.motion import RobotMotion
 
@@ -117,9 +118,7 @@ def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> No
         group.attrs[key] = list(getattr(linear.models[0], key))
     group["frequency"] = np.array([modes.frequency for modes in linear.modes])
     group["damping_ratio"] = np.array([modes.damping_ratio for modes in linear.modes])
-    poles = np.array([modes.poles.ravel() for modes in linear.modes])
-    group["pole"] = np.stack([poles.real, poles.imag], axis=-1)
-    group["pole"].attrs["columns"] = ["real", "imaginary"]
+    _write_poles(group, np.array([modes.poles.ravel() for modes in linear.modes]))
     for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
         group[kind] = np.array([reach.measure for reach in reaches])
         group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
@@ -177,8 +176,34 @@ def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> N
     group.attrs["warnings"] = list(record.warnings)
     write_record(group, found)
     group.attrs["advice"] = list(record.advice)
+    if (of := record.feedback) is not None:
+        for key in ("A", "B", "C", "D"):
+            group[f"controller/{key}"] = getattr(of, key)
+        group["controller"].attrs.update(inputs=list(of.outputs), outputs=list(of.inputs))
+    if record.poles is not None:
+        _write_poles(group, record.poles)
+    if record.estimate is not None:
+        _write_estimates(group.create_group("estimate"), record.estimate)
     if (margins := record.margins) is not None:
         group.attrs.update(spectral_radius=margins.radius, gain_margin=margins.gain, delay_margin=margins.delay)
+
+
+def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
+    group["pole"] = np.stack([poles.real, poles.imag], axis=-1)
+    group["pole"].attrs["columns"] = ["real", "imaginary"]
+
+
+def _write_estimates(group: h5py.Group, found: Estimates) -> None:
+    """By name; of the tip also its standard deviation and its distance from the truth."""
+    for name, values in zip(found.names, found.values.T, strict=True):
+        of, _, ending = name.rpartition("/")
+        if not name.startswith("point/"):
+            group[f"rate/{of}" if ending == "rate" else name] = values
+    if found.position.size:
+        for key in ("position", "error", "sigma"):
+            group[f"points/{found.tip}/{key}"] = getattr(found, key)
+    group.attrs.update(nees=found.nees, inside=found.inside)
+    _write_poles(group, found.poles)
 
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:

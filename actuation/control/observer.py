@@ -1,0 +1,308 @@
+"""Observers: estimates of what no sensor reads, by a model of the robot about its reference, sampled as the loop is.
+
+    x̂ = x̂⁻ + L (y − C x̂⁻),    x̂⁻(k+1) = A x̂ + B u + M (y − C x̂⁻)
+
+with y and u off the reference. A Kalman filter has M = 0 and, in its steady state, L = P Cᵀ (C P Cᵀ + R)⁻¹ with P from
+a Riccati equation (Anderson and Moore, Optimal Filtering, 1979, ch. 4); a published predictor has L = 0. Commands on
+their way, and the filters of sensors, are states of the model; the first are known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import fields, replace
+
+import numpy as np
+
+from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.errors import InputError, SolveError, quoted
+from ...common.structs import struct
+from .controllers import Controller, Setup
+from .linear_model import LinearModel, observability, riccati, sampled, zero_order_hold
+from .margins import Feedback
+from .records import GainsObserver, KalmanRecord
+from .signals import Signal, filters
+
+FAR = 1e9  # times the largest reading off its reference: such estimates diverge
+HIDDEN = 1e-7  # of the largest singular value
+NAMED = 0.1  # of the largest entry of a vector of states
+
+
+@struct
+class Observer:
+    """An observer with n states of a loop with p readings; see the module."""
+
+    A: Array  # (n, n)
+    B: Array  # (n, inputs)
+    C: Array  # (p, n)
+    L: Array  # (n, p)
+    M: Array  # (n, p)
+    E: Array  # (estimates, n)
+    covariance: Array  # (n, n) of x − x̂; nan where the noise is not known
+    estimates: tuple[str, ...]  # names
+
+    @property
+    def error(self) -> Array:
+        """(n, n) F of x − x̂⁻ from sample to sample."""
+        return as_floats(self.A - (self.A @ self.L + self.M) @ self.C)
+
+    @property
+    def radius(self) -> float:
+        """The spectral radius of `error`."""
+        return float(np.abs(np.linalg.eigvals(self.error)).max(initial=0.0))
+
+    def towards(self, other: Observer, part: float) -> Observer:
+        """All matrices that part of the way to those of another observer."""
+        names = [each.name for each in fields(self) if each.name != "estimates"]
+        mixed = {name: (1 - part) * getattr(self, name) + part * getattr(other, name) for name in names}
+        return replace(self, **mixed)
+
+    def closed(self, inner: Feedback) -> Feedback:
+        """Controllers that act on readings and estimates, with the observer: from readings to commands.
+
+        Limits of commands do not act.
+        """
+        p, c = len(self.C), len(inner.A)
+        unit, none = np.eye(p), np.zeros((p, len(self.A)))
+        # readings and estimates by x̂⁻ and y
+        by_x, by_y = np.vstack([none, self.E - self.E @ self.L @ self.C]), np.vstack([unit, self.E @ self.L])
+        u_x, u_y = inner.D @ by_x, inner.D @ by_y
+        A = np.block([[self.error + self.B @ u_x, self.B @ inner.C], [inner.B @ by_x, inner.A]])
+        B = np.vstack([self.A @ self.L + self.M + self.B @ u_y, inner.B @ by_y])
+        return Feedback(as_floats(A.reshape(len(A), len(self.A) + c)), B, np.hstack([u_x, inner.C]), u_y,
+                        inner.inputs, inner.outputs[:p])  # fmt: skip
+
+
+def kalman(
+    record: KalmanRecord,
+    model: LinearModel,
+    read: Sequence[Signal],
+    estimated: Sequence[str],
+    sampling: tuple[Sequence[str], float, float],
+) -> Observer:
+    """The steady-state filter of a model that has what is read and estimated among its outputs.
+
+    `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for sensors without noise,
+    for noise that acts on no input of the model, and where something that does not die out cannot be seen.
+    """
+    inputs, T, delay = sampling
+    exact = [s.name for s in read if not (s.sensor.deviation(T) or s.sensor.resolution)]
+    if exact or not read:
+        raise InputError(
+            "expected sensors with noise, noise_density or resolution, found"
+            + (f" none of these of {quoted(exact)}" if exact else " no sensor")
+        )
+    names = [signal.name for signal in read]
+    rows, columns = model.outputs(names), model.inputs(inputs)
+    added, process = model.inputs(list(record.disturbance)), model.inputs(list(record.process))
+    n, d = len(model.A), len(added)
+    A = np.zeros((n + d, n + d))
+    A[:n, :n], A[:n, n:] = model.A, model.B[:, added]
+    B = np.vstack([model.B, np.zeros((d, model.B.shape[1]))])
+    felt = model.D[rows]
+    plant = sampled(A, B[:, columns], T, delay, with_last=bool(felt.any()))
+    seen = np.zeros((len(rows), len(plant.A)))
+    seen[:, :n], seen[:, n : n + d] = model.C[rows], felt[:, added]
+    if felt.any():
+        seen[:, n + d : n + d + len(columns)] = felt[:, columns]
+    A_w, B_w, C_w, D_w = filters(read, T)
+    none = np.zeros((len(plant.A), len(A_w)))
+    A = np.block([[plant.A, none], [B_w @ seen, A_w]])
+    C = np.hstack([D_w @ seen, C_w])
+    unknown = np.r_[: n + d, len(plant.A) : len(A)]  # commands on their way are known
+    pushed = zero_order_hold(model.A, model.B[:, process], T)[1] * list(record.process.values())
+    Q = np.zeros_like(A)
+    Q[:n, :n] = pushed @ pushed.T
+    Q[range(n, n + d), range(n, n + d)] = np.square(list(record.disturbance.values())) * T
+    R = np.array([s.sensor.deviation(T) ** 2 + s.sensor.resolution**2 / 12 for s in read])
+    a, c, q = A[np.ix_(unknown, unknown)], C[:, unknown], Q[np.ix_(unknown, unknown)]
+    states = [*model.state_names, *record.disturbance, *(f"filter {k}" for k in range(1, len(A_w) + 1))]
+    try:
+        P = riccati(a.T, c.T, q, np.diag(R))
+    except ValueError as error:
+        unseen, still = hidden(a, c, states), hidden(a.T, q, states)
+        why = f"they cannot see {', '.join(unseen)}" if unseen else str(error)
+        if still and not unseen:
+            why = f"noise of `process` does not reach {', '.join(still)}"
+        raise InputError(f"expected sensors that see every motion that does not decay, found: {why}") from None
+    L = np.zeros((len(A), len(rows)))
+    L[unknown] = np.linalg.solve(c @ P @ c.T + np.diag(R), c @ P).T
+    covariance = np.zeros_like(A)
+    covariance[np.ix_(unknown, unknown)] = P - L[unknown] @ c @ P
+    E = np.zeros((len(estimated) + d, len(A)))
+    E[: len(estimated), :n] = model.C[model.outputs(estimated)]
+    E[len(estimated) :, n : n + d] = np.eye(d)
+    B = np.vstack([plant.B, np.zeros((len(A_w), len(columns)))])
+    names = [*estimated, *(f"disturbance/{name}" for name in record.disturbance)]
+    return Observer(A, B, C, L, np.zeros_like(L), E, covariance, tuple(names))
+
+
+def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
+    """States of x(k+1) = A x in motions that do not die out and that C x does not show (Popov–Belevitch–Hautus)."""
+    found: dict[str, None] = {}
+    size = np.linalg.norm(C, axis=1, keepdims=True)
+    C = C / np.where(size > 0.0, size, 1.0)
+    for value in np.linalg.eigvals(A):
+        if abs(value) >= 1.0 - HIDDEN:
+            _, sizes, V = np.linalg.svd(np.vstack([A - value * np.eye(len(A)), C]))
+            if sizes[-1] < HIDDEN * sizes[0]:
+                vector = np.abs(V[-1])
+                found |= dict.fromkeys(names[k] for k in np.flatnonzero(vector > NAMED * vector.max()))
+    return list(found)
+
+
+def given(record: GainsObserver, setup: Setup) -> Observer:
+    """The observer of matrices that the scene has. Raises `InputError` where they do not fit, or let errors grow."""
+    A, B, C, gain = (np.atleast_2d(np.array(of, dtype=float)) for of in record.matrices)
+    n, m, p = len(A), len(record.inputs), len(record.outputs)
+    for name, of, size in (("A", A, (n, n)), ("B", B, (n, m)), ("C", C, (p, n)), ("gain", gain, (n, p))):
+        if of.shape != size:
+            raise InputError(
+                f"expected {name} with {size[0]} × {size[1]} numbers ({n} states, {m} inputs, {p} outputs), found"
+                f" {of.shape[0]} × {of.shape[1]}"
+            )
+    scale = np.array(record.scale or (1.0,) * p)
+    if len(scale) != p:
+        raise InputError(f"expected {p} numbers as scale, one of each output, found {len(scale)}")
+    rows, columns = setup.columns(*record.outputs), setup.places(*record.inputs)
+    C_all, M = np.zeros((len(setup.outputs), n)), np.zeros((n, len(setup.outputs)))
+    B_all = np.zeros((n, len(setup.inputs)))
+    C_all[rows], M[:, rows], B_all[:, columns] = C / scale[:, None], gain * scale, B
+    names = (*record.outputs, *(f"state/{k}" for k in range(1, n + 1)))
+    found = Observer(
+        A, B_all, C_all, np.zeros_like(M), M, np.vstack([C / scale[:, None], np.eye(n)]), np.full((n, n), np.nan), names
+    )
+    if found.radius >= 1.0:
+        raise InputError(f"expected eigenvalues of A − gain C below 1 in size, found {found.radius:.6g}")
+    return found
+
+
+@struct
+class Schedule:
+    """Observers at times (N,) of the path, between which all matrices are straight lines."""
+
+    times: Array
+    observers: tuple[Observer, ...]
+
+    def at(self, t: float) -> Observer:
+        """At t (s); outside of the times, the nearest."""
+        if len(self.times) == 1:
+            return self.observers[0]
+        k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
+        part = (t - self.times[k]) / (self.times[k + 1] - self.times[k])
+        return self.observers[k].towards(self.observers[k + 1], float(np.clip(part, 0.0, 1.0)))
+
+    @property
+    def radius(self) -> float:
+        """The largest spectral radius of errors, at the times and half way between."""
+        halves = (self.times[1:] + self.times[:-1]) / 2
+        return max(self.at(float(t)).radius for t in np.concatenate([self.times, halves]))
+
+
+@struct
+class Estimates:
+    """What an observer found at K samples; of the tip, where it is estimated, against the truth."""
+
+    names: tuple[str, ...]
+    values: Array  # (K, names)
+    tip: str
+    position: Array  # (K, d) m, estimated of the tip
+    error: Array  # (K,) m, distance from where it was
+    sigma: Array  # (K, d) m, standard deviations by the covariance of the filter
+    nees: float  # mean of eᵀ Σ⁻¹ e over the number of axes: 1 where errors are as the filter takes them to be
+    inside: float  # part of the errors within ±2σ, 0.95 likewise
+    poles: ComplexArray  # of the estimate's error, from sample to sample, at the start
+
+
+class Observed:
+    """Controllers that act on readings and estimates: what the loop asks in their place.
+
+    `setup` is theirs, with estimates behind the readings; `origin`: readings (K, p) and commands (K, inputs) that the
+    model is about; `ranges` (2, inputs) cut what it gets.
+    """
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        setup: Setup,
+        controllers: Sequence[Controller],
+        ranges: Array,
+        origin: tuple[Array, Array],
+        settle: int = 0,
+        tip: str = "",
+        warnings: Sequence[str] = (),
+    ) -> None:
+        self.schedule, self.setup, self.controllers = schedule, setup, controllers
+        self._range, self._settle, self.tip = ranges, settle, tip
+        self._origin, self._nominal = origin
+        self.bandwidth = max((each.bandwidth for each in controllers), default=0.0)
+        self.warnings = [*warnings, *(line for each in controllers for line in getattr(each, "warnings", ()))]
+        first = schedule.observers[0]
+        self._p, self._x = len(first.C), np.zeros(len(first.A))
+        self.seen = np.zeros((len(setup.times), len(setup.outputs)))  # readings and estimates at samples
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k. Raises `SolveError` where estimates diverge."""
+        for _ in range(self._settle if k == 0 else 0):
+            self._step(k, y)
+        return self._step(k, y)
+
+    def _step(self, k: int, y: Array) -> Array:
+        setup, observer = self.setup, self.schedule.at(float(self.setup.times[k]))
+        innovation = y - self._origin[k] - observer.C @ self._x
+        x = self._x + observer.L @ innovation
+        seen = np.concatenate([y, setup.reference[k, self._p :] + observer.E @ x])
+        self.seen[k] = seen
+        u: Array = np.zeros(len(setup.inputs))
+        for controller in self.controllers:
+            u += controller(k, seen)
+        command = np.minimum(np.maximum(setup.feed_forward[k] + u, self._range[0]), self._range[1])
+        self._x = observer.A @ x + observer.B @ (command - self._nominal[k]) + observer.M @ innovation
+        if not np.abs(seen).max(initial=0.0) < FAR * (1.0 + np.abs(y).max(initial=0.0)):
+            raise SolveError(
+                f"{setup.robot.path}: observer: the estimate diverges at t = {setup.times[k]:g} s: the model about the"
+                " reference does not fit the motion; gains along the path, or sensors that see more, may"
+            )
+        return u
+
+    def __copy__(self) -> Observed:
+        """As at the start of a run."""
+        found = object.__new__(Observed)
+        vars(found).update(vars(self), controllers=[copy(each) for each in self.controllers])
+        return found
+
+    def record(self, truth: Mapping[str, Array]) -> Estimates:
+        """What was estimated at the samples taken, against the `truth` (taken,) by name."""
+        p, tip = self._p, self.tip
+        taken = len(next(iter(truth.values())))
+        first = self.schedule.observers[0]
+        values, times = self.seen[:taken, p:], self.setup.times[:taken]
+        names = [name.removeprefix("estimate/") for name in self.setup.outputs[p:]]
+        columns = [k for k, name in enumerate(names) if name.rpartition("/")[0] == f"point/{tip}"]
+        error = values[:, columns] - np.transpose([truth[names[k]] for k in columns] or np.zeros((0, taken)))
+        covariance = np.array([
+            (of.E[columns] @ of.covariance @ of.E[columns].T).ravel() for of in self.schedule.observers
+        ])  # fmt: skip
+        around = [np.interp(times, self.schedule.times, of) for of in covariance.T]
+        spread = np.reshape(np.transpose(around), (taken, len(columns), len(columns)))
+        sigma = np.sqrt(np.einsum("tii->ti", spread).clip(min=0.0))
+        moving = [k for k in range(len(columns)) if sigma[:, k].min(initial=np.inf) > 0.0]
+        nees, inside = float("nan"), float("nan")
+        if moving:
+            e = error[:, moving]
+            weighed = np.linalg.pinv(spread[:, moving][:, :, moving], rcond=HIDDEN, hermitian=True) @ e[..., None]
+            sizes = np.linalg.eigvalsh(spread[0][np.ix_(moving, moving)])
+            rank = int(np.count_nonzero(sizes > HIDDEN * sizes[-1]))
+            nees = float(np.einsum("ti,tij->t", e, weighed).mean() / rank)
+            inside = float((np.abs(e) <= 2 * sigma[:, moving]).mean())
+        return Estimates(
+            tuple(names), values, tip, values[:, columns], np.linalg.norm(error, axis=1), sigma, nees, inside,
+            np.linalg.eigvals(first.error).astype(complex),
+        )  # fmt: skip
+
+
+def unseen(model: LinearModel, read: Sequence[Signal]) -> list[str]:
+    """In words, modes of the model that sensors cannot see."""
+    lost = observability(model, [signal.name for signal in read]).lost
+    return [f"observer: sensors cannot see {', '.join(lost)}"] if lost else []

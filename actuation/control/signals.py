@@ -1,0 +1,266 @@
+"""Readings of sensors by name, as linear models name them: joints, motors, points, patches, modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import field
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from ...common.errors import InputError, quoted
+from ...common.structs import struct
+from ...mbs.linear.linearisation import LinearMechanism, labelled
+from ...mbs.model.drives import Drives, PointDrive
+from ...mbs.model.known_motion import KnownStates, motion_forces
+from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.nodes import Section
+from ...mbs.model.system import MultibodySystem
+from ...mbs.model.tree import KinematicTree
+from ...mbs.run.context import WholeLinks, place_of
+from ...mbs.scene.space import SPACES
+from ..context import ActuatedContext
+from ..patches.link_patches import LinkPatches
+from ..patches.patches import PatchArray
+from .records import Sensor
+
+ORDERS = {"value": 0, "rate": 1, "acceleration": 2, "accelerometer": 3, "gyro": 4}
+STEP = 2.0**-13  # of differences of readings of points, in rad, m, √kg·m and these per s
+
+
+@struct
+class Signal:
+    """One reading: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
+
+    `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y or z, "strain/BODY.POINT", "pzt/LAYOUT/k",
+    "modal/BODY/k" (k from 1), with "/rate", … behind it where that is what is measured.
+    """
+
+    name: str
+    sensor: Sensor
+    along: Array = field(default_factory=lambda: np.zeros(0))
+    point: str = ""
+    axis: int = 0
+
+    @property
+    def order(self) -> int:
+        """The place of what is measured in `ORDERS`."""
+        return ORDERS[self.sensor.measure]
+
+
+class Sensing:
+    """What signals read of states of a tree."""
+
+    def __init__(self, model: Model, read: Sequence[Signal]) -> None:
+        tree = model.tree
+        self._tree, self._count = tree, len(read)
+        self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
+        self._order = np.array([read[k].order for k in self._linear], dtype=int)
+        self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
+        self._where = _places_in_q(tree)
+        sections = {signal.point: tree.section(signal.point) for signal in read if signal.point}
+        self._points: list[tuple[str, Section, list[tuple[int, int, int]]]] = [
+            (point, section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
+            for point, section in sections.items()
+        ]
+        accelerated = any(signal.point and signal.order in (2, 3) for signal in read)
+        self._gravity = np.zeros(3)
+        self._gravity[: len(model.scene.gravity)] = model.scene.gravity
+        drives = Drives(at_points=tuple(PointDrive(point, {}) for point in sections))
+        self._system = MultibodySystem(model, drives) if accelerated else None
+
+    def read(self, q: Array, v: Array, a: Array) -> Array:
+        """Readings (T, signals) of q (T, n_q), v and a (T, n_v)."""
+        found = np.zeros((len(q), self._count))
+        values = q[:, self._where] @ self._along.T, v @ self._along.T
+        found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
+        if not self._points:
+            return found
+        places, forces = self._tree.places(q, v), None
+        if self._system is not None:
+            none = np.zeros((len(q), len(self._system.model.rows)))
+            forces = motion_forces(self._system, KnownStates(q, v, a), np.zeros(len(q)), none)
+        for point, section, columns in self._points:
+            at = places.at(section)
+            a = np.zeros_like(at.r) if forces is None else forces.of_point(point).a
+            orders = at.r, at.velocity, a, a - self._gravity, at.omega
+            for k, order, axis in columns:
+                of = orders[order]
+                in_axes = order >= ORDERS["accelerometer"]
+                found[:, k] = (at.F[:, :, axis] * of).sum(axis=1) if in_axes else of[:, axis]
+        return found
+
+    def rows(self, about: LinearMechanism) -> tuple[Array, Array, Array]:
+        """(signals, f) each: changes of readings by s, ṡ and s̈ of a linear mechanism of the same tree.
+
+        Exact of coordinates; of points by differences, to 1e-11. While loops move, the change of their ∂q/∂s counts
+        once, not its rate.
+        """
+        n_v = self._tree.n_v
+        H, H_dot = about.transformation[:n_v], about.transformation_rate[:n_v]
+        zero = np.zeros_like(H)
+        steps = np.concatenate([[H, H_dot, zero], [zero, H, 2 * H_dot], [zero, zero, H]], axis=2)  # of q, v and a
+        found = np.zeros((self._count, steps.shape[2]))
+        of_rates = self._order == ORDERS["rate"]
+        found[self._linear] = np.where(of_rates[:, None], self._along @ steps[1], self._along @ steps[0])
+        if self._points:
+            dq, dv, da = (STEP * np.concatenate([k * step.T for k in (1.0, -1.0, 2.0, -2.0)]) for step in steps)
+            read = self.read(self._tree.integrate(about.q, dq), about.v + dv, about.a + da)
+            ahead, behind, far, farther = read.reshape(4, -1, self._count)
+            slopes = (8 * (ahead - behind) - (far - farther)).T / (12 * STEP)
+            others = np.setdiff1d(np.arange(self._count), self._linear)
+            found[others] = slopes[others]
+        by_s, by_rate, by_acceleration = np.split(found, 3, axis=1)
+        return by_s, by_rate, by_acceleration
+
+
+def _places_in_q(tree: KinematicTree) -> Indices:
+    """(n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place."""
+    places = np.zeros(tree.n_v, dtype=np.intp)
+    for node in tree.nodes:
+        if node.joint.q_count == node.joint.freedoms:
+            places[node.v] = np.arange(node.q.start, node.q.stop)
+        places[node.p_v] = np.arange(node.p_q.start, node.p_q.stop)
+    return places
+
+
+def make_signals(
+    model: Model,
+    context: ActuatedContext,
+    sensor: Sensor,
+    whole: WholeLinks | None = None,
+) -> Iterator[Signal]:
+    """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones.
+
+    Raises `InputError` for a joint without coordinates in the tree, and for strain where the link has no such point.
+    """
+    ending = "" if sensor.measure == "value" else f"/{sensor.measure}"
+    if sensor.joint is not None:
+        check_joint(model, sensor.joint)
+        sign = model.tree.nodes[model.tree.carried[sensor.joint]].sign
+        for name, k in labelled(model, sensor.joint):
+            yield Signal(f"{name}{ending}", sensor, along=sign * np.eye(model.tree.n_v)[k])
+    elif sensor.motor is not None:
+        k = model.driven(sensor.motor).v.start
+        yield Signal(f"motor/{sensor.motor}{ending}", sensor, along=np.eye(model.tree.n_v)[k])
+    elif sensor.point is not None:
+        place, space = place_of(whole, sensor.point), SPACES[model.scene.space]
+        for axis in space.rotations if sensor.measure == "gyro" else space.translations:
+            yield Signal(f"point/{sensor.point}/{'xyz'[axis]}{ending}", sensor, point=place, axis=axis)
+    elif sensor.pzt is not None:
+        body = next(body for body, of_link in context.patches.items() if sensor.pzt in of_link.arrays)
+        volts = volts_on_file(context.patches[body], sensor.pzt, sensor.capacitance)
+        for k, along in enumerate(modal_directions(model, {name: of.T for name, of in volts.items()}), 1):
+            yield Signal(f"pzt/{sensor.pzt}/{k}", sensor, along=along)
+    elif sensor.modal is not None:
+        for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):
+            yield Signal(f"modal/{sensor.modal}/{k}{ending}", sensor, along=along)
+    elif sensor.strain is not None:
+        link, _, place = sensor.strain.partition(".")
+        points = context.links[link].stress
+        if place not in points:
+            raise InputError(
+                f'{model.scene.path}: sensor: strain: expected a point of [stress] in the link file of "{link}"'
+                f' ({quoted(points)}), found "{place}"'
+            )
+        coordinates = _modal_coordinates(model, link, whole)
+        tree = (model if whole is None else whole.model).tree
+        on_file = tree.nodes[tree.index[link]].body.modal_transform
+        along = points[place].strain[0] @ on_file @ coordinates
+        yield Signal(f"strain/{sensor.strain}", sensor, along=along)
+
+
+def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
+    """A, B, C, D from samples every T of what sensors are exposed to, to what they read: high-pass, then delay.
+
+    A high-pass filter is exact for what changes as a straight line between samples.
+    """
+    p = len(read)
+    A, B, C, D = np.zeros((0, 0)), np.zeros((0, p)), np.zeros((p, 0)), np.eye(p)
+
+    def joined(k: int, own: tuple[float, float, float, float]) -> None:  # in series behind reading k
+        nonlocal A, B, C
+        a, b, c, d = own
+        A = np.block([[A, np.zeros((len(A), 1))], [b * C[k : k + 1], np.array([[a]])]])
+        B = np.vstack([B, b * D[k]])
+        D[k] *= d
+        C = np.hstack([C, np.zeros((p, 1))])
+        C[k] *= d
+        C[k, -1] = c
+
+    for k, sensor in enumerate(signal.sensor for signal in read):
+        if sensor.high_pass is not None:
+            rate = 2 * np.pi * sensor.high_pass * T
+            a, b = np.exp(-rate), -np.expm1(-rate) / rate
+            joined(k, (float(a), float((a - 1) * b), 1.0, float(b)))
+        for _ in range(round(sensor.delay / T)):
+            joined(k, (0.0, 1.0, 1.0, 0.0))
+    return A, B, C, D
+
+
+class Filter:
+    """What `filters` make of samples, one after the other; settled at the first one."""
+
+    def __init__(self, read: Sequence[Signal], T: float) -> None:
+        self._matrices = filters(read, T)
+        self._w: Array | None = None
+
+    def __call__(self, y: Array) -> Array:
+        """Readings (signals,) of what sensors are exposed to."""
+        A, B, C, D = self._matrices
+        if not len(A):
+            return y
+        w = np.linalg.solve(np.eye(len(A)) - A, B @ y) if self._w is None else self._w
+        self._w = A @ w + B @ y
+        return C @ w + D @ y
+
+
+def merged(given: Iterable[Signal], needed: Iterable[Signal]) -> tuple[Signal, ...]:
+    """The sensors of the scene, and ideal ones for what controllers need besides."""
+    by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
+    return tuple(by_name.values())
+
+
+def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Array:
+    """(n, n_v) p of a link by v: its own coordinates, or of its pieces."""
+    if whole is None or link not in whole.divided:
+        return np.eye(model.tree.n_v)[model.tree.nodes[model.tree.index[link]].p_v]
+    bodies, rows = whole.divided[link].bodies, whole.divided[link].gathered
+    places = [model.tree.nodes[model.tree.index[body]].p_v for body in bodies]
+    columns = np.concatenate([np.arange(of_piece.start, of_piece.stop) for of_piece in places])
+    found = np.zeros((len(rows), model.tree.n_v))
+    found[:, columns] = rows
+    return found
+
+
+def volts_per_turn(patches: PatchArray, capacitance: float | None = None) -> Array:
+    """Voltage (k,) of each patch per turn: its charge c [φ'(x2) − φ'(x1)] over its capacitance.
+
+    By reciprocity the charge of a rotation is the moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The
+    free capacitance of a patch is that of its layers; one that also drives the link is read through a bridge, which
+    leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992).
+    """
+    return patches.moment_per_volt / (patches.layout.capacitance() if capacitance is None else capacitance)
+
+
+def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
+    """By body that may carry a layout: (k, n) that its patches read per unit of the modes of the body's file."""
+    volts, columns = volts_per_turn(of_link.arrays[layout], capacitance), of_link.columns(layout)
+    return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
+
+
+def check_joint(model: Model, joint: str) -> None:
+    """Raise `InputError` unless controllers can read and name the coordinates of a joint."""
+    scene = model.scene
+    record = next(each for each in scene.joint if each.name == joint)
+    if not record.units or joint not in model.tree.carried:
+        why = "at which a loop is cut" if record.units else "whose orientation is no list of coordinates"
+        raise InputError(
+            f"{scene.path}: sensor or controller: joint: expected one with coordinates, found"
+            f' "{joint}", a {record.type} joint {why}'
+        )
+    if record.type == "planar" and model.tree.nodes[model.tree.carried[joint]].backwards:
+        raise InputError(
+            f"{scene.path}: {record.label}: between: expected the side nearer to the ground first where sensors read a"
+            " planar joint, found it second"
+        )

@@ -1,0 +1,252 @@
+"""Observers and their sensors: closed forms, python-control, exact discrete models, statistics, what does not fit."""
+
+import numpy as np
+import pytest
+from beam_links import paper_link
+from scipy.linalg import expm, solve_discrete_are
+from scipy.stats import chi2
+
+import ffrobot
+from ffrobot.actuation.control.linear_model import LinearModel, riccati, sampled, zero_order_hold
+from ffrobot.actuation.control.lqr import gains
+from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
+from ffrobot.actuation.control.observer import Schedule, kalman
+from ffrobot.actuation.control.records import KalmanObserver, Sensor
+from ffrobot.actuation.control.signals import Filter, Signal
+from ffrobot.common.errors import InputError
+from ffrobot.scene.load import make_scene
+
+T, INERTIA = 0.01, 0.5
+K_SPRING, PUSH, NOISE = 40.0, (0.7, 0.3), (2e-3, 5e-3)
+PID = {"kind": "joint-pid", "proportional": {"O": 20.0}, "derivative": {"O": 4.0}}
+ENCODER = {"joint": "O", "noise": 1e-4}
+GAINS = {"kind": "gains", "inputs": ["joint/O"], "outputs": ["joint/O"]}
+GAINS |= {"A": [[0.5]], "B": [[1.0]], "C": [[1.0]], "gain": [[0.1]]}
+KALMAN = {"kind": "kalman", "process": {"joint/O": 0.5}}
+
+
+def two_masses(damping=0.0):
+    """Masses of 1 kg with a spring between; forces on both, and apart, push them; their sum and difference are read."""
+    f, spring, both = 2, np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([[1.0, 1.0], [1.0, -1.0]])
+    A = np.block([[np.zeros((f, f)), np.eye(f)], [-K_SPRING * spring, -damping * spring]])
+    B = np.vstack([np.zeros((f, f)), both])
+    C = np.vstack([np.hstack([both, 0 * both]), np.eye(4)])
+    outputs = ("sum", "difference", "joint/a", "joint/b", "joint/a/rate", "joint/b/rate")
+    states = ("joint/a", "joint/b", "rate of joint/a", "rate of joint/b")
+    return LinearModel(
+        A, B, C, np.zeros((6, 2)), states, ("joint/a", "joint/b"), outputs, 0.0, np.eye(f), np.eye(f)
+    )  # fmt: skip
+
+
+def filter_of(model, **sampling):
+    record = KalmanObserver(kind="kalman", process=dict(zip(model.input_names, PUSH, strict=True)))
+    read = [Signal(name, Sensor(joint="a", noise=s)) for name, s in zip(("sum", "difference"), NOISE, strict=True)]
+    return kalman(record, model, read, model.output_names[2:], (model.input_names, T, sampling.get("delay", 0.0)))
+
+
+def test_riccati_of_one_state_in_closed_form():
+    a, q, r = 1.1, 0.3, 0.02
+    half = ((a * a - 1) * r + q) / 2
+    found = riccati(np.array([[a]]), np.eye(1), np.array([[q]]), np.array([[r]]))
+    assert found[0, 0] == pytest.approx(half + np.sqrt(half**2 + q * r), rel=1e-12)
+
+
+def test_two_masses_by_spectral_factorization():
+    """They move as one, and against each other: two filters of two states.
+
+    With x = Φ x + γ w and y = c x + v, S p(z) p(1/z) = r a(z) a(1/z) + q b(z) b(1/z), quadratic in z + 1/z.
+    """
+    model, observer = two_masses(), filter_of(two_masses())
+    Phi, Gamma = zero_order_hold(model.A, model.B, T)
+    for k, (stiffness, push, noise) in enumerate(zip((0.0, 2 * K_SPRING), PUSH, NOISE, strict=True)):
+        one = expm(np.array([[0.0, 1.0], [-stiffness, 0.0]]) * T)
+        a0, a1 = 1.0, -np.trace(one)
+        gamma = np.array([model.C[k] @ Gamma[:, k], model.C[k, :2] @ Gamma[2:, k]])  # of the sum and its rate
+        b1, b0 = gamma[0], one[0, 1] * gamma[1] - one[1, 1] * gamma[0]
+        r, q = noise**2, push**2
+        w = np.roots([
+            r * a0,
+            r * a1 * (1 + a0) + q * b1 * b0,
+            r * (1 + a1**2 + a0**2 - 2 * a0) + q * (b1**2 + b0**2),
+        ]).astype(complex)  # fmt: skip
+        z = (w - np.sqrt(w - 2) * np.sqrt(w + 2)) / 2
+        z = np.where(np.abs(z) > 1, 1 / z, z)
+        S = r * a0 / np.prod(z).real
+        # L = P cᵀ/S and c P⁺ cᵀ = r (S − r)/S
+        c = model.C[k]
+        assert c @ observer.covariance @ c == pytest.approx(r * (S - r) / S, rel=1e-12)
+        assert c @ observer.L[:, k] == pytest.approx((S - r) / S, rel=1e-12)
+    assert np.allclose(observer.A, Phi, atol=1e-14)
+
+
+def test_gains_are_those_of_python_control():
+    """Of models that are exported to it: dlqe, and dlqr with the identity as weights."""
+    control = pytest.importorskip("control")
+    model = two_masses(damping=0.3)
+    system = model.to_control().sample(T)
+    G = zero_order_hold(model.A, model.B, T)[1]
+    L, _, _ = control.dlqe(system.A, G, system.C[:2], np.diag(np.square(PUSH)), np.diag(np.square(NOISE)))
+    observer = filter_of(model)
+    np.testing.assert_allclose(observer.A @ observer.L, L, atol=1e-10 * np.abs(L).max())
+    K, _, _ = control.dlqr(system.A, system.B, np.eye(4), np.eye(2))
+    np.testing.assert_allclose(gains(sampled(model.A, model.B, T, 0.0), np.eye(4), np.eye(2)), K, atol=1e-10)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.023])
+def test_poles_of_the_loop_are_those_of_controller_and_observer(delay):
+    model, observer = two_masses(damping=0.3), filter_of(two_masses(damping=0.3), delay=delay)
+    plain = sampled(model.A, model.B, T, 0.0)
+    K = gains(plain, np.eye(4), np.eye(2))
+    D = np.hstack([np.zeros((2, 2)), -K])  # readings, then estimates of all states
+    inner = Feedback(np.zeros((0, 0)), np.zeros((0, 6)), np.zeros((2, 0)), D, model.input_names, model.output_names)
+    found = loop_eigenvalues(model, observer.closed(inner), T, delay)
+    late = sampled(model.A, model.B, T, delay)
+    by_state = late.A - late.B @ np.hstack([K, np.zeros((2, len(late.A) - 4))])
+    expected = np.concatenate([np.linalg.eigvals(by_state), np.linalg.eigvals(observer.error)])
+    assert len(found) == len(expected)
+    large = expected[np.abs(expected) > 1e-3]  # commands on their way are defective zeros
+    assert np.abs(large[:, None] - found).min(axis=1).max() < 1e-9
+
+
+def test_errors_are_as_large_as_their_covariance_says():
+    """NEES of 500 runs: chi-square, by the state after 300 samples; with every bound that one in 500 misses."""
+    model, observer, rng, runs = two_masses(0.3), filter_of(two_masses(0.3)), np.random.default_rng(5), 500
+    Phi, Gamma = zero_order_hold(model.A, model.B, T)
+    x = ahead = np.zeros((runs, 4))
+    for _ in range(300):
+        y = x @ model.C[:2].T + rng.standard_normal((runs, 2)) * NOISE
+        estimate = ahead + (y - ahead @ observer.C.T) @ observer.L.T
+        error, ahead = x - estimate, estimate @ observer.A.T
+        x = x @ Phi.T + rng.standard_normal((runs, 2)) * PUSH @ Gamma.T
+    nees = np.einsum("ri,ij,rj->", error, np.linalg.inv(observer.covariance), error)
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], 4 * runs)
+    assert low < nees < high
+
+
+def test_between_two_instants_gains_are_straight_lines():
+    one, other = filter_of(two_masses(0.3)), filter_of(two_masses(3.0))
+    schedule = Schedule(np.array([0.0, 2.0]), (one, other))
+    np.testing.assert_allclose(schedule.at(0.5).L, 0.75 * one.L + 0.25 * other.L, atol=1e-15)
+    assert pytest.approx(other.L) == schedule.at(9.0).L
+    assert max(one.radius, other.radius) <= schedule.radius < 1.0
+
+
+def test_high_pass_and_delay_of_a_sensor():
+    """A ramp c t behind a corner 1/τ gives c τ (1 − e^{−t/τ}), three samples late; before the first sample it rests."""
+    tau, c, t = 0.05, 3.0, T * np.arange(100)
+    read = [
+        Signal("a", Sensor(joint="a", high_pass=1 / (2 * np.pi * tau), delay=3 * T)),
+        Signal("b", Sensor(joint="b")),
+    ]
+    through = Filter(read, T)
+    found = np.array([through(np.array([7.0 + c * now, now])) for now in t])
+    expected = c * tau * -np.expm1(-(t - 3 * T).clip(min=0.0) / tau)
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-13)
+    np.testing.assert_array_equal(found[:, 1], t)
+
+
+def wheel(joint=None, **keys):
+    """A wheel about O that is to stand still, I γ̈ = u, under a closed loop."""
+    body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "rim": [0.3, 0.0]}}
+    loop = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": T, "tip": "w.rim"} | keys
+    return make_scene(
+        name="wheel", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "w.root"]} | (joint or {})],
+        trajectory=[{"name": "stand", "joint": "O", "value": "0"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T}, loop],
+    )  # fmt: skip
+
+
+def test_a_loop_with_an_observer_is_its_exact_discrete_model():
+    """Angle by encoder, rate and a constant moment estimated, which is rejected; a command acts 4 ms late."""
+    moment, drift, delay, seed = 0.3, 2.0, 0.004, 7
+    push = [{"point": "w.rim", "y": f"{moment / 0.3!r}"}]  # at r = 0.3 m
+    observer = KALMAN | {"disturbance": {"joint/O": drift}, "reject": True}
+    results = ffrobot.solve(
+        wheel(sensor=[ENCODER], controller=[PID], observer=observer, disturbance=push, delay=delay, seed=seed)
+    )
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1 / INERTIA], [0.0, 0.0, 0.0]])
+    B = np.array([[0.0], [1 / INERTIA], [0.0]])
+    plant, c = sampled(A, B, T, delay), np.array([[1.0, 0.0, 0.0, 0.0]])
+    Phi, Gamma = zero_order_hold(A, B, T)
+    Q = 0.25 * Gamma @ Gamma.T + np.diag([0.0, 0.0, drift**2 * T])
+    P = solve_discrete_are(Phi.T, c[:, :3].T, Q, np.array([[ENCODER["noise"] ** 2]]))
+    L = np.append(P[:, 0] / (P[0, 0] + ENCODER["noise"] ** 2), 0.0)
+    noise = ENCODER["noise"] * np.random.default_rng(seed).standard_normal(50)
+    x, ahead, found = np.array([0.0, 0.0, moment, 0.0]), np.zeros(4), []
+    for k in range(50):
+        y = x[0] + noise[k]
+        estimate = ahead + L * (y - ahead[0])
+        found.append([y, *estimate[:3]])
+        u = -20.0 * y - 4.0 * estimate[1] - estimate[2]  # measured where it is measured
+        x, ahead = plant.A @ x + plant.B[:, 0] * u, plant.A @ estimate + plant.B[:, 0] * u
+    group = "loop/control"
+    seen = [results[f"{group}/readings"][:, 0]]
+    seen += [results[f"{group}/estimate/{name}"][()] for name in ("joint/O", "rate/joint/O", "disturbance/joint/O")]
+    np.testing.assert_allclose(np.transpose(seen), found, atol=1e-5)  # the rim turns by 8 mrad
+    assert results.attributes(group)["verdict"] == "stable"
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"sensor": [{"joint": "O"}], "observer": KALMAN}, "expected sensors with noise.*joint/O"),
+        ({"observer": KALMAN}, "expected sensors with noise.*no sensor"),
+        ({"sensor": [ENCODER | {"measure": "rate"}], "observer": KALMAN}, "they cannot see joint/O"),
+        ({"sensor": [ENCODER], "observer": KALMAN | {"process": {"joint/P": 1.0}}}, 'expected an input .*"joint/P"'),
+        ({"sensor": [ENCODER | {"delay": 0.4 * T}]}, "expected a multiple of the loop's sample_time"),
+        ({"sensor": [ENCODER | {"sample_time": 2 * T}], "observer": KALMAN}, "read at every sample"),
+        ({"observer": {"kind": "gains", "inputs": [], "outputs": ["joint/O"], "A": [[0.5]]}}, "B.*missing"),
+        ({"sensor": [ENCODER], "observer": GAINS | {"B": [[1.0, 2.0]]}}, "expected B with 1 × 1"),
+        ({"sensor": [ENCODER], "observer": GAINS | {"A": [[1.5]]}}, "below 1 in size, found 1.4"),
+    ],
+)  # fmt: skip
+def test_what_an_observer_cannot_be_made_of(keys, said):
+    with pytest.raises(InputError, match=said):
+        ffrobot.solve(wheel(controller=[{"kind": "lqr"}] if "sensor" in keys else [], **keys))
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_accelerometer_and_gyro_against_differences_of_the_motion(space):
+    """A rod that swings about O under gravity: in its axes, r̈ − g by differences of its tip's place, and γ̇."""
+    rod = {"mass": 2.0, "points": {"root": [0.0] * 3, "tip": [1.0, 0.0, 0.0]}, "center": [0.5, 0.0, 0.0]}
+    rod |= {"inertia": [0.01, 2.0 / 12, 2.0 / 12]}
+    gravity, axis = [0.0, -9.81, 0.0], {"axis": [0.0, 0.0, 1.0]}
+    if space == "planar":
+        rod |= {"inertia": 2.0 / 12, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
+        gravity, axis = gravity[:2], {}
+    sensors = [{"point": "rod.tip", "measure": measure} for measure in ("accelerometer", "gyro")]
+    results = ffrobot.solve(make_scene(
+        name="swing", space=space, gravity=gravity, body=[{"name": "rod", "rigid": rod}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]} | axis],
+        trajectory=[{"name": "swing", "joint": "O", "value": "0.9*sin(2*t)"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T, "tolerance": 1e-9},
+                  {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": T, "sensor": sensors}],
+    ))  # fmt: skip
+    t, h = results["loop/control/time"][()], 1e-3
+    angle = lambda t: 0.9 * np.sin(2 * t)  # noqa: E731
+    place = lambda t: np.exp(1j * angle(t))  # noqa: E731
+    second = sum(c * place(t + k * h) for k, c in zip(range(-2, 3), (-1, 16, -30, 16, -1), strict=True)) / (12 * h * h)
+    force = (second + 9.81j) / place(t)
+    names = list(results.attributes("loop/control")["outputs"])
+    read = {name: results["loop/control/reference"][:, k] for k, name in enumerate(names)}
+    np.testing.assert_allclose(read["point/rod.tip/x/accelerometer"], force.real, atol=1e-6)
+    np.testing.assert_allclose(read["point/rod.tip/y/accelerometer"], force.imag, atol=1e-6)
+    np.testing.assert_allclose(read["point/rod.tip/z/gyro"], 1.8 * np.cos(2 * t), atol=1e-6)
+
+
+def test_strain_is_stress_over_modulus():
+    """On the lower side of a beam under a force at its tip, which its attachment modes carry exactly."""
+    link = paper_link(attachment_modes=True, count=3, stress={"points": {"gauge": [0.2, -0.0075, 0.0]}})
+    results = ffrobot.solve(make_scene(
+        name="held", gravity=[0.0, 0.0], body=[{"name": "link", "link": link}],
+        joint=[{"name": "O", "type": "weld", "between": ["ground", "link.root"]}],
+        load=[{"point": "link.tip", "y": "10"}], initial={"state": "static"},
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.01},
+                  {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.01,
+                   "sensor": [{"strain": "link.gauge"}]}],
+    ))  # fmt: skip
+    stress = results["loop/stress/link/points/gauge/stress"][0, 0]
+    by_hand = 10.0 * (1.0 - 0.2) * 0.0075 / (0.025 * 0.015**3 / 12)
+    assert abs(stress) == pytest.approx(by_hand, rel=1e-6)
+    assert results["loop/control/readings"][0, 0] == pytest.approx(stress / 2.068427e11, rel=1e-6)
