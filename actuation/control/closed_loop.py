@@ -44,7 +44,7 @@ from .controllers import (
     state_feedback,
 )
 from .linear import voltages_at
-from .linear_model import LinearModel, is_kept, kept_modes, state_space
+from .linear_model import LinearModel, kept_modes, state_space
 from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
 from .margins import Feedback, lowest_frequency
 from .metrics import Followed, last_change, place_of_tip
@@ -127,7 +127,7 @@ def make_observed(
                 for sensors in (analysis.sensor, estimated_sensors(robot, analysis.controller, tip))
             )
             whole = merged(more, ())
-            columns = {signal.name: k for k, signal in enumerate(whole)}
+            names = [signal.name for signal in whole]
             source, found = setup.source, []
             at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
             instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
@@ -138,11 +138,9 @@ def make_observed(
                 rows = zip(*Sensing(plant, (*read, *whole)).rows(mechanism), strict=True)
                 readings = dict(zip([s.name for s in (*read, *whole)], rows, strict=True))
                 model = state_space(mechanism, voltages, readings)
-                kept = [s.name for s in whole if is_kept(s.name, record.modes)]
-                found.append(kalman(record, model, read, kept, (setup.inputs, T, setup.delay)))
+                found.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
                 warnings += unseen(model, read)
             schedule = Schedule(source.time[instants], tuple(found))
-            reference = reference[:, [columns[name] for name in kept]]
         else:
             assert isinstance(record, GainsObserver)
             one = given(record, setup)
@@ -154,11 +152,11 @@ def make_observed(
             raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")
     except InputError as error:
         raise InputError(f"{robot.path}: observer: {error}") from None
-    names = schedule.observers[0].estimates
-    still = np.zeros((len(reference), len(names) - reference.shape[1]))
+    every = schedule.observers[0].estimates
+    still = np.zeros((len(reference), len(every) - reference.shape[1]))
     inner = replace(
         setup,
-        outputs=(*setup.outputs, *(f"estimate/{name}" for name in names)),
+        outputs=(*setup.outputs, *(f"estimate/{name}" for name in every)),
         reference=np.hstack([setup.reference, reference, still]),
     )
     acting = make_controllers(analysis.controller, inner)
