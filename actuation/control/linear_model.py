@@ -364,6 +364,8 @@ def _reach(model: LinearModel, columns: Array, left: bool) -> Reach:
 
 INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not
 MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are rounding
+ROUNDING = 1e-13  # of a pencil, relative: what its entries and QZ leave of double precision
+RESOLVED = 1e-3  # relative error of zeros: those that round-off moves by more may as well be infinite
 
 
 @struct
@@ -401,7 +403,9 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
 
     While C z = 0 the inputs act as constraint forces: with bases N of C z = 0 and N_B of Bᵀ z = 0, zeros are the
     eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Of the square pencil [A − λI, B; C, 0], all but its infinite eigenvalues of
-    relative degree two, which QZ would scatter. Raises `InputError` unless both have the same number.
+    relative degree two. QZ scatters those of higher degree: an eigenvalue whose distance from infinity is within the
+    error that round-off makes of it (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2) is infinite.
+    Raises `InputError` unless both have the same number.
     """
     K, D, B, C = model.second_order
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
@@ -410,10 +414,11 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     scale = max(float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0))), 1.0)
     N, N_B = _null_space(c), _null_space(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
-    values = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
-    values = scale * values[np.argsort(np.abs(values))]
-    positive = values.real > np.maximum(MARGIN * np.abs(values), MARGIN * scale)
-    return Zeros(values, values[positive])
+    values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
+    order = np.argsort(np.abs(values))
+    values, errors = values[order], errors[order]
+    positive = values.real > np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
+    return Zeros(scale * values, scale * values[positive])
 
 
 def _null_space(rows: Array) -> Array:
@@ -421,23 +426,30 @@ def _null_space(rows: Array) -> Array:
     return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
 
 
-def _eigenvalues(M: Array, D: Array, K: Array) -> ComplexArray:
-    """The finite λ of λ² M + λ D + K; M may be singular."""
-    from scipy.linalg import eigvals
-
+def _eigenvalues(M: Array, D: Array, K: Array) -> tuple[ComplexArray, Array]:
+    """The finite λ of λ² M + λ D + K, and their errors by round-off; M may be singular."""
     n, unit = len(M), np.eye(len(M))
     if not n:
-        return np.zeros(0, dtype=complex)
+        return np.zeros(0, dtype=complex), np.zeros(0)
     if not np.any(D):
-        squares = _finite(eigvals(-K, M, homogeneous_eigvals=True), INFINITE**2)
-        roots = np.sqrt(squares.astype(complex))
-        return np.concatenate([roots, -roots])
+        squares, errors = _finite(-K, M, INFINITE**2)
+        roots = np.sqrt(squares)
+        errors /= np.maximum(np.abs(roots), np.sqrt(errors))
+        return np.concatenate([roots, -roots]), np.tile(errors, 2)
     A = np.block([[np.zeros((n, n)), unit], [-K, -D]])
     E = np.block([[unit, np.zeros((n, n))], [np.zeros((n, n)), M]])
-    return _finite(eigvals(A, E, homogeneous_eigvals=True), INFINITE)
+    return _finite(A, E, INFINITE)
 
 
-def _finite(homogeneous: ComplexArray, largest: float) -> ComplexArray:
-    alpha, beta = homogeneous
+def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
+    """Eigenvalues of A − λ E that round-off tells from infinity, and their errors: chordal ones, times 1 + |λ|²."""
+    from scipy.linalg import eig
+
+    (alpha, beta), left, right = eig(A, E, left=True, homogeneous_eigvals=True)
     finite = np.abs(alpha) < largest * np.abs(beta)
-    return np.asarray(alpha[finite] / beta[finite])
+    values, left, right = alpha[finite] / beta[finite], left[:, finite].conj(), right[:, finite]
+    of_A, of_E = (np.abs((left * (X @ right)).sum(axis=0)) for X in (A, E))
+    chordal = ROUNDING * np.hypot(np.linalg.norm(A), np.linalg.norm(E)) / np.maximum(np.hypot(of_A, of_E), 1e-300)
+    size = np.hypot(1.0, np.abs(values))
+    resolved = chordal * size < RESOLVED
+    return values[resolved].astype(complex), (chordal * size**2)[resolved]

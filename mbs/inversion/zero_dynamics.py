@@ -89,11 +89,13 @@ def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
 
 
 def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
-    """Zeros (N, 2n) from motors to path, 1/s, frozen at each node: the slowest first, then by their real part."""
+    """Zeros (N, 2n) from motors to path, 1/s, frozen at each node: those on the left first, the slowest of each side.
+
+    Sizes of pairs ± s differ by round-off alone: sides do not.
+    """
     s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
-    with np.errstate(divide="ignore"):
-        size = np.log(np.abs(s)).round(8)  # as far as rounding lets it be known: pairs ± s have one
-    return np.take_along_axis(s, np.lexsort((s.imag, s.real, size), axis=1), axis=1)
+    side = is_unstable(s).astype(int) - is_unstable(-s)
+    return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
 
 
 def is_unstable(s: ComplexArray) -> Booleans:

@@ -8,7 +8,14 @@ from oracle_runs import energies, evaluated
 from scipy.io import loadmat
 from scipy.optimize import brentq
 
-from ffrobot.actuation.control.linear_model import controllability, observability, robot_modes, state_space, zeros
+from ffrobot.actuation.control.linear_model import (
+    LinearModel,
+    controllability,
+    observability,
+    robot_modes,
+    state_space,
+    zeros,
+)
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.masses import with_payload
@@ -74,6 +81,26 @@ def test_zeros_at_the_tip_are_real_pairs():
         assert errors[0] > 4 * errors[1] > 16 * errors[2]
         assert errors[2] < 1e-3
         assert "non-minimum phase" in found.describe()
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(4))
+def test_zeros_at_infinity_are_left_out_however_coordinates_are_chosen(seed, damping):
+    """Of masses in a row from the first to number 5: s² + c s are those of masses 6 to 8, clamped at number 5."""
+    n, at = 8, 5
+    K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    Q, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((n, n)))
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-Q.T @ K @ Q, -damping * np.eye(n)]])
+    B, C = np.r_[np.zeros(n), Q[0]][:, None], np.r_[Q[at - 1], np.zeros(n)][None]
+    states = tuple(f"joint/{k}" for k in range(2 * n))
+    model = LinearModel(A, B, C, np.zeros((1, 1)), states, ("u",), ("y",), 0.0, np.eye(n), np.eye(n))
+    found = zeros(model, "u", "y")
+    squares = np.linalg.eigvalsh(K[at:, at:])
+    expected = np.concatenate([np.roots([1.0, damping, square]) for square in squares])
+    assert len(found.values) == len(expected) == 2 * (n - at)
+    assert found.minimum_phase
+    found, expected = (values[np.argsort(values.imag)] for values in (found.values, expected))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_damping_ratios_of_a_clamped_link_are_those_of_its_modes():
