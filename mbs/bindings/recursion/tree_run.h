@@ -171,7 +171,7 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
                    TreeCheckpoint *checkpoint, Samples *samples, const Replay *replay = nullptr) {
   TreeRun run(model, times.size());
   run.last << q, v;
-  motion.plan(times.back() - times.front());
+  motion.plan(times.front(), times.back());
   std::optional<LimitWatch> limits; // the reader is free while a step is looked at
   if (!scene.limits.empty())
     limits.emplace(scene.limits, motion, reader);

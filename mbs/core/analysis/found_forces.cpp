@@ -17,7 +17,7 @@ RecordedForces<Space>::RecordedForces(const Mechanism<Space> &mechanism, const S
     : ForceSource(reader->count()), motion_(mechanism, scene, recording.times.front(), recording.states.data(),
                                             recording.states.data() + mechanism.n_q),
       recorded_(motion_, recording), reader_(std::move(reader)) {
-  motion_.plan(recording.times.back() - recording.times.front());
+  motion_.plan(recording.times.front(), recording.times.back());
 }
 
 template <class Space> bool RecordedForces<Space>::find(double t) {

@@ -78,7 +78,7 @@ ForwardMotion::ForwardMotion(ForwardModel model)
       scene_(scene_of(model_)), y_(joined(model_.q, model_.v)), inputs_(model_.inputs.size(), 0.0),
       outputs_(output_count(), 0.0) {
   motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
-  motion_->plan(model_.duration);
+  motion_->plan(0, model_.duration);
 }
 
 // Checked before anything reads the state.
@@ -132,7 +132,7 @@ IntegrationStatus ForwardMotion::step(double t, double h) {
 // Begun anew, since implicit methods keep matrices of the steps after it.
 void ForwardMotion::bring_back(const ForwardState &state) {
   motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
-  motion_->plan(model_.duration);
+  motion_->plan(0, model_.duration);
   motion_->go_on(state.motion);
   y_ = state.y, history_ = state.steps, inputs_ = state.inputs;
   outputs_are_old_ = true;

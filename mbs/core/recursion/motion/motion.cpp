@@ -17,6 +17,7 @@ namespace {
 constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
 constexpr double near = 0.01;           // likewise: above, …
 constexpr double brief = 1. / 4000;     // … postures hardly change within this part of a run
+constexpr int instants = 100;           // of a run, at which accelerations on paths are looked at
 constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
 constexpr double is_on = 1e-11;         // residuals of a state on its constraint equations
 
@@ -61,9 +62,17 @@ template <class Space> void RecursiveMotion<Space>::bear_loads() {
         borne_.push_back({mechanism_.nodes[static_cast<std::size_t>(of.node)].v + of.freedom, r, 0});
 }
 
-template <class Space> void RecursiveMotion<Space>::plan(double duration) {
-  norm_.plan(duration);
-  between_postures_ = brief * duration;
+template <class Space> void RecursiveMotion<Space>::plan(double begin, double end) {
+  double acceleration = 0;
+  for (int i = 0; i <= instants && !scene_.targets.empty(); ++i) {
+    const auto targets = targets_at(scene_, begin + (end - begin) * i / instants);
+    for (std::size_t r = 0; r < targets.size(); ++r)
+      if (const double a = std::abs(targets[r].acceleration); std::isfinite(a))
+        acceleration =
+            std::max(acceleration, is_moment(mechanism_, mechanism_.constraints[r]) ? norm_.sizes().length() * a : a);
+  }
+  norm_.plan(end - begin, acceleration);
+  between_postures_ = brief * (end - begin);
 }
 
 template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {

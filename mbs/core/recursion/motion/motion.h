@@ -30,7 +30,7 @@ public:
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const ZeroOrderHold *held = nullptr, ExternalForces *external = nullptr);
 
-  void plan(double duration);             // s, of the run to come
+  void plan(double begin, double end);    // s, of the run to come
   void judge(MotorForces<Space> &motors); // their errors, too; must outlive this
 
   void slope(double t, const double *z, double *z_dot) override;

@@ -21,6 +21,7 @@ constexpr double leverage = 2;       // of multipliers: motors' moments follow f
 constexpr double small_motor = 0.1;  // of the largest: what motors do is judged below
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 0.01;        // of the natural pace: rates of joints below, times the peak of what they are of
+constexpr double early = 0.1;        // of the largest acceleration on a path: smaller ones count like this part
 constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
 constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = std::numeric_limits<double>::min(); // of groups without members
@@ -119,14 +120,15 @@ template <class Space> void MotionNorm<Space>::add_motors(const std::vector<bool
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
 
-template <class Space> void MotionNorm<Space>::plan(double duration) {
+template <class Space> void MotionNorm<Space>::plan(double duration, double acceleration) {
   sizes_.plan(duration);
+  of_paths_ = acceleration;
   find_pace();
 }
 
 template <class Space> void MotionNorm<Space>::find_pace() {
   pace_[0] = slow * sizes_.pace(), pace_[1] = std::max(pace_[0], pace_of_springs_);
-  slow_acceleration_ = slow * sizes_.acceleration();
+  slow_acceleration_ = std::max(slow * sizes_.acceleration(), early * of_paths_);
 }
 
 template <class Space> void MotionNorm<Space>::add_spring(double stiffness, double inertia) {

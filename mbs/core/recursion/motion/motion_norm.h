@@ -19,8 +19,9 @@ template <class Space> class MotionNorm {
 public:
   explicit MotionNorm(const Mechanism<Space> &mechanism);
 
-  // The run will last `duration` s. Rates are slow, and accelerations small, beside the natural pace.
-  void plan(double duration);
+  // The run will last `duration` s. Rates are slow, and accelerations small, beside the natural pace; these beside the
+  // largest `acceleration` (m/s^2) on a path to come, too: where a run starts smoothly all is small at first.
+  void plan(double duration, double acceleration);
   const NaturalSizes<Space> &sizes() const { return sizes_; }
 
   // Of a spring in front of which an inertia swings (N m/rad, kg m^2): moments and rates of a small twist are small,
@@ -63,10 +64,10 @@ private:
 
   const Mechanism<Space> &mechanism_;
   NaturalSizes<Space> sizes_;
-  double pace_of_springs_ = 0;   // 1/s, what a small twist makes
-  double slow_acceleration_ = 0; // m/s^2: smaller ones count like this one
-  std::vector<int> group_;       // of each of 2 n_v entries of z; those of rates follow those of what they are of
-  struct Run {                   // entries of v side by side of one group
+  double pace_of_springs_ = 0;                  // 1/s, what a small twist makes
+  double of_paths_ = 0, slow_acceleration_ = 0; // m/s^2: of paths; smaller ones count like this one
+  std::vector<int> group_; // of each of 2 n_v entries of z; those of rates follow those of what they are of
+  struct Run {             // entries of v side by side of one group
     Eigen::Index first, count;
     std::size_t group;
   };
