@@ -19,7 +19,7 @@ from .motors import MotorFeasibility, first_time
 if TYPE_CHECKING:
     from .patches.patches import PatchArray, Voltages
 
-ROWS = 50  # of a run, about, at which mass matrices are made, and at twice as many around the largest shift
+ROWS = 50  # of a run at which mass matrices are made, and at twice as many around the largest shift
 KEPT = 1.0 + 1e-6  # times limits of rates: more is beyond them
 RINGING = 2.0  # times the static shift, of a force that is missing all at once
 
@@ -99,7 +99,8 @@ def seen_at_points(
     shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(motion, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
     kept, step = shift[point], max(1, len(motion.time) // ROWS)
-    coarse = np.arange(0, len(motion.time), step)
+    parts = np.array_split(np.arange(len(kept)), min(ROWS, len(kept)))
+    coarse = np.array([rows[kept[rows].argmax()] for rows in parts])  # what rings peaks between evenly spaced rows
     top = coarse[np.linalg.norm(freed_shift(motion, modal, point, coarse), axis=1).argmax()]
     near_top = np.unique(np.linspace(max(0, top - step), min(len(motion.time) - 1, top + step), 2 * ROWS).astype(int))
     freed = np.linalg.norm(freed_shift(motion, modal, point, near_top), axis=1)
