@@ -74,7 +74,7 @@ def commanded_rest(commanding: Outcome) -> Rest | None:
         return None
     q = commanding.q[-1]
     if analysis.is_algebraic:
-        return Rest(model, q, since, _lowest_frequency(model, q, end))
+        return Rest(model, q, since, _lowest_frequency(model, q, end) or float("nan"))
     try:
         q = Statics(model, end).equilibrium(q)
     except (SolveError, InputError):
