@@ -32,7 +32,7 @@ def random_scenes(seed, number):
         "geometry": {"kind": "beam", "length": float(rng.uniform(0.3, 0.8)),
                      "section": {"shape": "tube", "outer": outer, "inner": 0.8 * outer}},
         "mesh": {"elements": 6}, "reference": {"condition": "cantilever"},
-        "modes": {"count": 3, "family": ["in-plane-bending", "out-of-plane-bending"] if in_space else "in-plane-bending"},
+        "modes": {"count": 3, "family": ["in-plane-bending", "out-of-plane-bending"][: 1 + in_space]},
         "damping": {"ratio": float(rng.choice([0.0, 0.01]))},
     }  # fmt: skip
     built = {"none": {}, "rigid": {"gear_ratio": 50.0, "rotor_inertia": 1e-4, "motor": True},
@@ -55,8 +55,8 @@ def random_scenes(seed, number):
         "analysis": [{"name": "a", "kind": "pcid", "end": end, "output_step": end / 10, "max_steps": LIMIT}],
     }  # fmt: skip
     loads = [{"joint": f"j{k}", "moment": f"{size!r}*{shape}"} for k in range(links)]
-    words = f"{links} links, {'3D' if in_space else 'plane'}, gear {gear}, g {gravity:.3g}, {rate:g} rad/s, {size:.3g} N m"
-    words += f", {'pulse' if pulse else 'sine'}, {scene['initial']['state']}, {'line' if 'cos' not in path else 'cosine'}"
+    words = f"{links} links, {scene['space']}, gear {gear}, g {gravity:.3g}, {rate:g} rad/s, {size:.3g} N m"
+    words += f", {'pulse' if pulse else 'sine'}, {scene['initial']['state']}"
     return words, 30 if pulse else 12, scene, scene | {"load": loads}
 
 
@@ -91,7 +91,7 @@ def main():
     if asked.record:
         record(
             "borne_loads",
-            tried=f"steps of {asked.count} runs whose motors bear loads of 1 to 1e5 N m, against the runs without",
+            tried=f"steps of {len(ratios)} runs whose motors bear loads of 1 to 1e5 N m, against the runs without",
             found=f"{failed} ended early; ratio median {np.median(ratios):.2f}, most {max(ratios):.2f}, {beyond} above"
             f" {AIM:g}",
         )
