@@ -71,9 +71,8 @@ class Tracking(TimedAnalysis):
 
     Limits are those of [[pzt]] (`limit`, `amplifier`) and [[joint]] (`moment_limit`). Without pre- and post-actuation
     nothing acts before the path begins and after it ends. `least-voltage` finds the smallest share of the limits with
-    which patches can do it, `least-current` the smallest currents, `least-torque` (`least-moment` is another spelling)
-    the smallest torques, and `effort` makes torques
-    beyond the quasi-static ones, voltages and their rates small.
+    which patches can do it. `least-current` finds the smallest currents, and `least-torque` (`least-moment` is another
+    spelling) the smallest torques. `effort` makes torques beyond the quasi-static ones, voltages and their rates small.
     """
 
     kind: Literal["tracking"]
