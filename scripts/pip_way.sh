@@ -41,7 +41,7 @@ cp -r cases/two_link cases/lightened_arm "$folder"
 rm -f "$folder"/*/*.h5
 cd "$folder"
 # Not the command ffrobot link, whose remarks need the core.
-make='import sys; from ffrobot.fe_models.link import make_link; make_link(*sys.argv[1:], force=True)'
+make='import sys; from ffrobot.fe_models.link import make_link; make_link(*sys.argv[1:])'
 for link in two_link/link1 lightened_arm/forearm; do
   "$new/python" -c "$make" $link.toml one.h5
   PATH=$new:$PATH "$new/mpirun" -n 2 "$new/python" -c "$make" $link.toml two.h5
