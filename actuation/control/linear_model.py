@@ -137,7 +137,7 @@ def state_space(
     solved = np.linalg.solve(mechanism.M, columns)
     A = np.block([[np.zeros((f, f)), np.eye(f)], [-solved[:, : 2 * f]]])
     B = np.vstack([np.zeros((f, len(inputs))), solved[:, 2 * f :]])
-    by_s, by_rate, by_acceleration = np.reshape(list(outputs.values()), (-1, 3, f)).swapaxes(0, 1)
+    by_s, by_rate, by_acceleration = np.reshape(list(outputs.values()), (len(outputs), 3, f)).swapaxes(0, 1)
     C, D = np.hstack([by_s, by_rate]) + by_acceleration @ A[f:], by_acceleration @ B[f:]
     names = (*mechanism.names, *(f"rate of {name}" for name in mechanism.names))
     return LinearModel(
