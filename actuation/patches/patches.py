@@ -217,8 +217,8 @@ def voltage_gain(patches: Reach) -> Array:
 
 def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
     """What turns modal forces into voltages, with the limits of the patches or without."""
-    range = (patches.amplifiers if limited else patches.amplifiers.unlimited()).range
-    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), *range, voltage_scale(patches))
+    lower, upper = (patches.amplifiers if limited else patches.amplifiers.unlimited()).range
+    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), lower, upper, voltage_scale(patches))
 
 
 def solve_voltages(patches: Reach, F_p: Array) -> Voltages:

@@ -94,7 +94,7 @@ def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
     Sizes of pairs ± s differ by round-off alone: sides do not.
     """
     s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
-    side = is_unstable(s).astype(int) - is_unstable(-s)
+    side: Array = is_unstable(s).astype(int) - is_unstable(-s)
     return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
 
 
