@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tree_oracle
+from patch_sets import amplifiers
 from scipy.optimize import lsq_linear
 from test_replays_3d import beam
 
@@ -32,12 +33,12 @@ class Patches:
     def __init__(self, body, Phi_V, limit=np.inf):
         self.Phi_V = Phi_V
         self.per_volt, self.to_reached = {body: Phi_V}, {body: np.eye(len(Phi_V))}
-        self._limit = np.broadcast_to(limit, Phi_V.shape[1]).astype(float)
+        self.amplifiers = amplifiers(np.broadcast_to(limit, Phi_V.shape[1]).astype(float))
 
     def allocation(self, *, limited):
         n, k = self.Phi_V.shape
-        limit = self._limit if limited else np.full(k, np.inf)
-        return _core.Allocation(self.Phi_V, np.eye(n), np.linalg.pinv(self.Phi_V), -limit, limit, np.ones(k))
+        lower, upper = (self.amplifiers if limited else self.amplifiers.unlimited()).range
+        return _core.Allocation(self.Phi_V, np.eye(n), np.linalg.pinv(self.Phi_V), lower, upper, np.ones(k))
 
 
 @pytest.fixture(scope="module")

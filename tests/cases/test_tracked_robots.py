@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from beam_links import link_keys, rectangle
+from patch_sets import amplifiers
 
 import ffrobot
 from ffrobot.mbs.inversion.motors_only import decay_times
@@ -198,7 +199,7 @@ def test_without_voltage_motors_alone_carry(robot, tolerance):
     assert inverted.status == "completed"
     breaks = inverted.curve.x
     rest = tuple(equilibrium(servo, t) for t in (breaks[0], breaks[-1]))
-    limits = Limits(np.full(Phi_V.shape[1], 1e-3), np.full(len(servo.model.motors), np.inf))
+    limits = Limits(amplifiers(np.full(Phi_V.shape[1], 1e-3)), np.full(len(servo.model.motors), np.inf))
     found = track(Transition(servo, Phi_V, limits, Weights(0.4, 1e-3, 0.005), rest), breaks)
     assert found.converged
     times = np.linspace(0.0, end, 71)

@@ -5,9 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffrobot.mbs import _core
+from ffrobot.mbs.model.amplifiers import Amplifiers
 
 N = 3  # modes of a link
 UNLIMITED = np.full(N, np.inf)
+
+
+def amplifiers(limit):
+    """Those that limit voltages alone, between -limit and limit (k,)."""
+    none = np.full_like(limit, np.inf)
+    return Amplifiers(np.stack([-limit, limit]), none, none, np.ones_like(limit), none, np.zeros_like(limit))
 
 
 @dataclass(frozen=True)
@@ -25,6 +32,10 @@ class Patches:
     @property
     def to_reached(self):
         return {self.body: np.eye(len(self.Phi))}
+
+    @property
+    def amplifiers(self):
+        return amplifiers(self.limit)
 
     def allocation(self, *, limited):
         n, k = self.Phi.shape

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from patch_sets import amplifiers
 
 import ffrobot
 from ffrobot.common.arrays import as_list
@@ -54,7 +55,7 @@ def strip(modes, T, pairs=4):
 
 
 def asked(servo, Phi_V, span, objective, limit, *, is_free=False, V_ref=200.0):
-    limits = Limits(np.full(Phi_V.shape[1], limit), np.full(1, np.inf))
+    limits = Limits(amplifiers(np.full(Phi_V.shape[1], float(limit))), np.full(1, np.inf))
     rest = tuple(equilibrium(servo, t) for t in span)
     return Transition(servo, Phi_V, limits, Weights(0.4, V_ref, 0.005), rest, objective, is_free)
 
@@ -82,7 +83,7 @@ def test_closed_form_of_one_mode():
     """Checkpoint 1: least ∫V², V free at both ends, from the matrix exponential of its Hamiltonian; order 2."""
     times = np.array([0.0, 0.01, 0.02, 0.05, 0.08, 0.1])
     expected = np.array([1.288481, 0.726347, 0.402254, -0.005867, -0.416134, -1.287267])
-    limits, rest = Limits(np.full(1, np.inf), np.full(1, np.inf)), (np.zeros(1), np.zeros(1))
+    limits, rest = Limits(amplifiers(np.full(1, np.inf)), np.full(1, np.inf)), (np.zeros(1), np.zeros(1))
     asked = Transition(OneMode(), np.array([[OneMode.b]]), limits, Weights(1.0, 1.0, 0.0), rest, is_free=True)
     found = [track(asked, np.linspace(0.0, 0.1, N + 1)) for N in (40, 80)]
     assert all(one.converged for one in found)
@@ -116,10 +117,9 @@ def arm(modes, patches, T):
 
 
 def asked_of_arm(servo, Phi_V, objective, limit, *, is_free):
-    return Transition(
-        servo, Phi_V, Limits(np.full(Phi_V.shape[1], limit), np.full(2, np.inf)), Weights(50.0, 200.0, 0.005),
-        tuple(equilibrium(servo, t) for t in (0.0, servo.end)), objective, is_free,
-    )  # fmt: skip
+    limits = Limits(amplifiers(np.full(Phi_V.shape[1], float(limit))), np.full(2, np.inf))
+    rest = tuple(equilibrium(servo, t) for t in (0.0, servo.end))
+    return Transition(servo, Phi_V, limits, Weights(50.0, 200.0, 0.005), rest, objective, is_free)
 
 
 @pytest.mark.parametrize(
@@ -189,13 +189,13 @@ def test_prices_of_limits():
     breaks, tracked = graded(0.0, 0.7, 40), []
     for V_max, tau_max in ((120.0, 0.825), (120.5, 0.825), (119.5, 0.825), (120.0, 0.826), (120.0, 0.824)):
         problem = asked(servo, Phi_V, (0.0, 0.7), "effort", V_max)
-        found = track(replace(problem, limits=Limits(problem.limits.voltage, np.array([tau_max]))), breaks)
+        found = track(replace(problem, limits=Limits(problem.limits.patches, np.array([tau_max]))), breaks)
         assert found.converged
         tracked.append(found)
     prices, costs = tracked[0].prices, [found.cost for found in tracked]
-    assert prices[0].sum() == pytest.approx(costs[2] - costs[1], rel=1e-3)
-    assert prices[1][0] == pytest.approx((costs[4] - costs[3]) / 2e-3, rel=1e-3)
-    assert min(prices[0].min(), costs[2] - costs[1], costs[4] - costs[3]) >= 0
+    assert prices["voltage"].sum() == pytest.approx(costs[2] - costs[1], rel=1e-3)
+    assert prices["torque"][0] == pytest.approx((costs[4] - costs[3]) / 2e-3, rel=1e-3)
+    assert min(prices["voltage"].min(), costs[2] - costs[1], costs[4] - costs[3]) >= 0
 
 
 SLOWEST = 65.0  # 1/s, of the strip's zeros: −64.405 and 67.248
