@@ -118,8 +118,8 @@ MISTAKES = {
     ),
     "function in a file": (
         lambda data: data.update(load=[{"point": "hand.tip", "force": "f"}]),
-        "load no. 1: force: expected a function of t, position and velocity, in scenes made in Python (expressions in t"
-        " are the keys x, y and their like), found 'f'",
+        "load no. 1: force: expected a function of t, position and velocity, in scenes made in Python"
+        " \\(expressions in t are the keys x, y and their like\\), found 'f'",
     ),
     "axis of an angle without direction": (
         put("trajectory", point=None, x=None, y=None, angle="hand.tip", axis=[0.0, 0.0, 0.0], value="t"),
