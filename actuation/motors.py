@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from ..common.arrays import Array, Booleans, as_floats
-from ..common.errors import InputError
+from ..common.errors import InputError, SolveError
 from ..common.keys import NotNegative, Positive
 from ..common.peaks import largest, root_mean_square, shares
 from ..common.structs import struct
@@ -21,6 +21,7 @@ from ..common.toml_files import load_toml, read_text
 from ..common.validation import Record, validate
 from ..mbs._core import TimeFunction
 from ..mbs.joints.joint import MotorLimits
+from ..mbs.linear.statics import Statics
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.nodes import rotor
 from ..mbs.quantities.motion import RobotMotion
@@ -30,7 +31,7 @@ SHORT = 0.01  # of the time: a peak that lasts less is one of its own
 APART = 1.1  # times the moment of the other 99 % of the time: likewise
 NEARBY = 1e-3  # of the path's duration: a jump of the path this near to a peak may have made it
 INSTANT = 1e-4  # of the path's duration: over which one-sided derivatives are taken
-ROWS = 50  # of a run, at most, at which inertias are computed
+ROWS = 50  # of a run, at most, at which inertias and torques at rest are computed
 JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 
@@ -56,6 +57,8 @@ class MotorFeasibility:
     load_inertia: float = np.nan
     # "acceleration" or "jerk" of the path where that jumps at a short peak which follows from it; else ""
     jump: str = ""
+    # largest at rest along the path, which no slower path makes smaller; NaN where the limit is enough, or not known
+    static_moment: float = np.nan
 
     @property
     def factor(self) -> float:
@@ -92,6 +95,7 @@ def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeas
     forces, found = motion.motor_forces, {}
     assert forces is not None
     inertias = _load_inertias(motion)
+    at_rest: Mapping[str, Array] = {}
     for joint in motion.model.scene.motor_joints:
         of_joint = motion.joint(joint.name)
         assert of_joint is not None
@@ -102,7 +106,35 @@ def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeas
             judged = judge_motion(motion.time, moments[:, k], rates[:, k], limits, analysis.last_time)
             jump = path_jump(motion, analysis, judged.moment_time) if judged.has_spike else ""
             found[name] = replace(judged, jump=jump, load_inertia=inertias.get(joint.name, (np.nan,) * (k + 1))[k])
+            if judged.moment > judged.moment_limit:
+                at_rest = at_rest or static_moments(motion, analysis.last_time)
+                if joint.name in at_rest:
+                    found[name] = replace(found[name], static_moment=float(np.abs(at_rest[joint.name][:, k]).max()))
     return found
+
+
+def static_moments(motion: RobotMotion, end: float) -> Mapping[str, Array]:
+    """Torques (T, k) by joint, N·m or N, in the equilibria at instants of a path from t = 0 to `end` (s).
+
+    Empty where no equilibrium is found, or motors do not fit the path.
+    """
+    on_path = np.flatnonzero((motion.time >= 0.0) & (motion.time <= end))
+    if not len(on_path):
+        return {}
+    rows = on_path[np.unique(np.linspace(0, len(on_path) - 1, ROWS).astype(int))]
+    time, still = motion.time[rows], np.zeros((len(rows), motion.model.tree.n_v))
+    statics, states, multipliers = Statics(motion.model), [], []
+    try:
+        for t, q in zip(time, motion.q[rows], strict=True):
+            statics.t = float(t)
+            states.append(statics.equilibrium(q))
+            multipliers.append(statics.holding_multipliers(states[-1]))
+    except SolveError:
+        return {}
+    forces = RobotMotion(
+        motion.model, time, np.array(states), still, still, np.array(multipliers), is_at_rest=True
+    ).motor_forces
+    return {} if forces is None else forces.moments
 
 
 def _load_inertias(motion: RobotMotion) -> dict[str, tuple[float, ...]]:

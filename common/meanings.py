@@ -139,6 +139,7 @@ moment_time | s | of the largest torque
 share_beyond | | of the time, above a limit
 load_inertia | kg m², kg | largest of the robot
 jump | | of the path at a short peak
+static_moment | N m, N | largest at rest along the path, where the limit is exceeded
 factor | | largest ratio of a peak to its limit
 [Unsupplied feasibility/unsupplied/@]
 bodies | | whose modal forces nothing supplies

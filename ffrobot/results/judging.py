@@ -210,11 +210,16 @@ def _advice(
         if (motor.jump or motor.moment > motor.moment_limit) and (text := motor.spike_in_words(units[name])):
             yield f"motor of {name}: {text}"
     if beyond and asked:
-        slower = "a slower path (fastest = true finds the smallest time-scaling factor), or "
         joints = (joint["coordinate"][()] for joint in group["joints"].values() if "coordinate" in joint)
         moves = any(np.ptp(one, axis=0).max(initial=0.0) > STILL for one in joints)
-        yield f"{slower if moves else 'less load, or '}another motor or gear for {', '.join(beyond)}"
-    at_rest = asked and _is_from_rest_to_rest(group)
+        at_rest = [name for name in beyond if not moves or motors[name].static_moment > motors[name].moment_limit]
+        if at_rest:
+            why = ", whose torques at rest along the path exceed their limits" if moves else ""
+            yield f"less load, or another motor or gear for {', '.join(at_rest)}{why}"
+        if others := [name for name in beyond if name not in at_rest]:
+            slower = "a slower path (fastest = true finds the smallest time-scaling factor)"
+            yield f"{slower}, or another motor or gear for {', '.join(others)}"
+    from_rest = asked and _is_from_rest_to_rest(group)
     for body, need in patches.items() if asked else ():
         if 1.0 < need.factor <= FAR_BEYOND:
             yield (
@@ -224,11 +229,11 @@ def _advice(
     is_compliant = any("gear_moment" in joint for joint in group.get("joints", {}).values())
     far = [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]
     if far and group.attrs["kind"] != "tracking":
-        carried = "" if is_compliant else f'kind = "tracking"{"" if at_rest else " on a path from rest to rest"}, or '
+        carried = "" if is_compliant else f'kind = "tracking"{"" if from_rest else " on a path from rest to rest"}, or '
         other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'
         yield f"{carried}{other}: no realistic patch can supply the voltages of {', '.join(far)}"
     if asked and "trajectories" in group and read_unsupplied(group["feasibility"]) is not None:
-        inversion = 'kind = "motors-only", or ' if at_rest else ""
+        inversion = 'kind = "motors-only", or ' if from_rest else ""
         tracked = "" if is_compliant else ' with kind = "tracking"'
         yield f"{inversion}patches ([[pzt]]) on the links{tracked}"
     if asked and not attributes_of(group, "tracking").get("is_needed", True):

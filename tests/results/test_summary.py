@@ -191,3 +191,24 @@ def test_robots_at_rest_are_told_no_slower_path(tmp_path):
     (text,) = verdict(weak(15.0, 10.0, path="10*t**2", **run)).advice
     assert text.startswith("a slower path")
     assert verdict(weak(15.0, 10.0, path="0.1*t**2", **run)).feasible
+
+
+def test_torques_at_rest_along_the_path_decide_whether_a_slower_path_helps(tmp_path):
+    """The same rod, lifted from hanging to horizontal, where it takes m g L/2 + F L = 14 N·m at rest."""
+
+    def verdict(limit, load, duration):
+        rise = f"-pi/2*(1 - (10*(t/{duration})**3 - 15*(t/{duration})**4 + 6*(t/{duration})**5))"
+        run = {"kind": "pcid", "end": duration, "output_step": duration / 100}
+        scene = weak(limit, load, rise, **run)
+        return Results.from_image(results_image(solve_scene(scene, Watcher())), tmp_path / "x.h5").verdict.analyses[0]
+
+    heavy = verdict(13.9, 10.0, 0.5)
+    assert heavy.motors["O"].static_moment == pytest.approx(14.0, rel=1e-9)
+    assert heavy.advice[-1].startswith("less load, or another motor or gear for O, whose torques at rest")
+    assert not any("slower" in text for text in heavy.advice)
+    assert not verdict(13.9, 10.0, 20.0).feasible
+    assert verdict(13.9, 9.8, 20.0).feasible
+    fast = verdict(14.1, 10.0, 0.5)
+    assert fast.motors["O"].static_moment == pytest.approx(14.0, rel=1e-9)
+    assert fast.advice[-1].startswith("a slower path")
+    assert verdict(14.1, 10.0, 20.0).feasible
