@@ -30,6 +30,7 @@ TOLERANCE = 1e-9  # of the motion with rigid links
 INTERVALS = 4  # of the splines among which that of least moments is
 STRIDE = 20  # of these nodes at which moments count
 OUT_OF_REACH = 1e3
+MOST_STEPS = 60  # to the least moments: most motions take 10 to 25
 RANK = 1e-6  # of the largest singular value
 TELLS = 0.02  # share of a motion left free that joints must have at all times to tell it
 
@@ -148,12 +149,12 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
     size = 1.0
     size = float(np.linalg.norm(moments(np.zeros((count - 2) * len(places))))) or 1.0
     found = least_squares(
-        moments, np.zeros((count - 2) * len(places)), diff_step=1e-6, ftol=1e-8, xtol=1e-6, max_nfev=20
+        moments, np.zeros((count - 2) * len(places)), diff_step=1e-6, ftol=1e-8, xtol=1e-6, max_nfev=MOST_STEPS
     )
     if not found.success:
         raise SolveError(
-            f'{model.scene.path}: redundancy = "least-torque": expected the least within 20 iterations, found none:'
-            ' "least-motion" needs none, or prescribe a joint by a trajectory'
+            f'{model.scene.path}: redundancy = "least-torque": expected the least within {MOST_STEPS} steps, found'
+            ' none: "least-motion" needs none, or prescribe a joint by a trajectory'
         )
     return moved(found.x, 0)
 
