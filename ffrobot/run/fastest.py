@@ -40,6 +40,7 @@ class Search:
     analysis: TimedAnalysis
     judge: Judge
     tried: dict[float, tuple[float, str]] = field(default_factory=dict)
+    too_weak: tuple[str, ...] = ()  # motors whose torques at rest along the last motion exceed their limits
 
     def keeps_limits(self, stretch: float) -> bool:
         """Whether the motion at this stretch does."""
@@ -47,6 +48,8 @@ class Search:
             found = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
             factors = {"no motion along the path": inf} if found is None else found.factors
             self.tried[stretch] = max((factor, name) for name, factor in factors.items())
+            motors = {} if found is None else found.motors
+            self.too_weak = tuple(name for name, one in motors.items() if one.static_moment > one.moment_limit)
         return self.tried[stretch][0] <= KEPT
 
 
@@ -60,10 +63,16 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
     found = least_stretch(search.keeps_limits, least, most)
     if found is None:
         factor, name = search.tried[most]
+        helps = (
+            "No slower path helps, as torques at rest exceed limits: less load, or another motor or gear for"
+            f" {', '.join(search.too_weak)}"
+            if search.too_weak
+            else "A later end helps"
+        )
         raise InputError(
             f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within"
             f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, with required/available ='
-            f" {factor:.3g} at stretch = {most:.4g}. A later end helps, unless torques at rest exceed the limits"
+            f" {factor:.3g} at stretch = {most:.4g}. {helps}"
         )
     factor, name = search.tried[found]
     at = f"{name} is at {100 * factor:.3g} % of its limit"

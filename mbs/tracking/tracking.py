@@ -264,7 +264,7 @@ def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
         if track(free, posed.breaks).converged:
             raise SolveError(
                 f"{posed.servo.where}: no motion follows the path within the motors' limits, whatever the voltages:"
-                " slow the path down, or raise moment_limit"
+                " slow the path down, if torques at rest are within them, or raise moment_limit"
             )
     raise SolveError(
         f"{posed.servo.where}: no motion of motors and patches was found: "
