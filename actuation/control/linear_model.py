@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.arrays import Array, ComplexArray, NDArray, as_floats
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
@@ -370,7 +370,7 @@ RESOLVED = 1e-3  # relative error of zeros: those that round-off moves by more m
 
 @struct
 class Zeros:
-    """The finite zeros (k,) rad/s from inputs to outputs, slowest first.
+    """The finite zeros (k,) rad/s from inputs to outputs: those on the left first, the slowest of each side.
 
     `unstable`: those with positive real part. Without any the transfer is minimum phase (undamped ones on the imaginary
     axis are allowed); with them, an output that is held to a path needs inputs that grow or begin before the path does.
@@ -405,20 +405,38 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Of the square pencil [A − λI, B; C, 0], all but its infinite eigenvalues of
     relative degree two. QZ scatters those of higher degree: an eigenvalue whose distance from infinity is within the
     error that round-off makes of it (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2) is infinite.
-    Raises `InputError` unless both have the same number.
+    A transfer that is nothing, or singular at all s, has none. Raises `InputError` unless both have the same number.
     """
     K, D, B, C = model.second_order
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
     if b.shape[1] != len(c):
         raise InputError(f"zeros: expected as many inputs as outputs, found {b.shape[1]} and {len(c)}")
     scale = max(float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0))), 1.0)
+    s = scale * (0.1 + 0.1j)  # any that is no pole
+    passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)
+    weakest = np.linalg.svd(passed, compute_uv=False).min(initial=np.inf)
+    if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(c) * np.linalg.norm(b):
+        return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
     N, N_B = _null_space(c), _null_space(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
     values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
-    order = np.argsort(np.abs(values))
-    values, errors = values[order], errors[order]
-    positive = values.real > np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
-    return Zeros(scale * values, scale * values[positive])
+    margins = np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
+    side = np.where(np.abs(values.real) > margins, np.sign(values.real), 0.0)
+    order = _by_side(values, side)
+    return Zeros(scale * values[order], scale * values[order][side[order] > 0])
+
+
+def _by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
+    """The order (k,) of `values` by their `side` of the imaginary axis, by size, and by imaginary part.
+
+    Sizes within `MARGIN` of each other count as one: those of conjugates, and of ± s, differ by round-off alone.
+    """
+    size = np.abs(values)
+    order = np.lexsort((size, side))
+    apart = np.diff(size[order]) > MARGIN * np.maximum(size[order][1:], 1.0)
+    group = np.zeros(len(values))
+    group[order[1:]] = np.cumsum(apart | (np.diff(side[order]) > 0))
+    return np.lexsort((values.imag, group))
 
 
 def _null_space(rows: Array) -> Array:
@@ -442,7 +460,10 @@ def _eigenvalues(M: Array, D: Array, K: Array) -> tuple[ComplexArray, Array]:
 
 
 def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
-    """Eigenvalues of A − λ E that round-off tells from infinity, and their errors: chordal ones, times 1 + |λ|²."""
+    """Eigenvalues of A − λ E that round-off tells from infinity, and their errors: chordal ones, times 1 + |λ|².
+
+    Those below 1 are far from infinity, though errors of double ones (a free body's, at 0) are estimated without bound.
+    """
     from scipy.linalg import eig
 
     (alpha, beta), left, right = eig(A, E, left=True, homogeneous_eigvals=True)
@@ -451,5 +472,5 @@ def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
     of_A, of_E = (np.abs((left * (X @ right)).sum(axis=0)) for X in (A, E))
     chordal = ROUNDING * np.hypot(np.linalg.norm(A), np.linalg.norm(E)) / np.maximum(np.hypot(of_A, of_E), 1e-300)
     size = np.hypot(1.0, np.abs(values))
-    resolved = chordal * size < RESOLVED
+    resolved = (chordal * size < RESOLVED) | (np.abs(values) < 1.0)
     return values[resolved].astype(complex), (chordal * size**2)[resolved]

@@ -103,6 +103,21 @@ def test_zeros_at_infinity_are_left_out_however_coordinates_are_chosen(seed, dam
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
+def test_zeros_of_a_free_mass_and_of_a_damped_spring():
+    """u moves a mass, y is where it is; zeros are motions of what else there is: λ² = 0, and λ² + 2 λ + 9 = 0."""
+    K, D = np.diag([1.0, 0.0, 9.0]), np.diag([0.1, 0.0, 2.0])
+    K[0, 2] = K[2, 0] = -0.5
+    A = np.block([[np.zeros((3, 3)), np.eye(3)], [-K, -D]])
+    B, C = np.eye(6)[:, 3:5], np.eye(6)[:2]
+    states = tuple(f"x{k}" for k in range(6))
+    model = LinearModel(A, B, C, np.zeros((2, 2)), states, ("u", "v"), ("y", "z"), 0.0, np.eye(3), np.eye(3))
+    found = zeros(model, "u", "y")
+    expected = [complex(-1.0, -np.sqrt(8.0)), complex(-1.0, np.sqrt(8.0)), 0.0, 0.0]
+    np.testing.assert_allclose(found.values, expected, atol=1e-6)
+    assert found.minimum_phase
+    assert not zeros(model, "u", "z").values.size  # which u does not move
+
+
 def test_damping_ratios_of_a_clamped_link_are_those_of_its_modes():
     """A hub as heavy as the ground."""
     modes = robot_modes(hub_and_beam(1e7, damping_ratio=0.03))

@@ -55,10 +55,10 @@ SENSITIVE = {
 """Analyses by reference, most of unstable motions, in which rounding errors grow: without numbers of attributes, and"""
 OF_SENSITIVE = 1e-3
 """with this as the allowed difference of their datasets."""
-LEFT_OUT = ("/linear/zeros/", "saturation_time", "@position_error", "@relative_error", "redefined/bodies/link1/modal_f",
+LEFT_OUT = ("saturation_time", "@position_error", "@relative_error", "redefined/bodies/link1/modal_f",
             "redefined/bodies/link2/modal_f")  # fmt: skip
-"""Parts of names: invariant zeros at infinity are any large number, times are between outputs, the rule that estimates
-errors of far bent links is judged by campaigns, and modal forces of an inversion are what its iteration leaves."""
+"""Parts of names: times are between outputs, the rule that estimates errors of far bent links is judged by campaigns,
+and modal forces of an inversion are what its iteration leaves."""
 
 
 NEW = "not in the reference"
