@@ -31,7 +31,8 @@ SHORT = 0.01  # of the time: a peak that lasts less is one of its own
 APART = 1.1  # times the moment of the other 99 % of the time: likewise
 NEARBY = 1e-3  # of the path's duration: a jump of the path this near to a peak may have made it
 INSTANT = 1e-4  # of the path's duration: over which one-sided derivatives are taken
-ROWS = 50  # of a run, at most, at which inertias and torques at rest are computed
+ROWS = 50  # of a run, at most, at which inertias are computed
+AT_REST = 21  # of a run, at most, at which torques at rest are: equilibria take longer
 JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 
@@ -121,7 +122,7 @@ def static_moments(motion: RobotMotion, end: float) -> Mapping[str, Array]:
     on_path = np.flatnonzero((motion.time >= 0.0) & (motion.time <= end))
     if not len(on_path):
         return {}
-    rows = on_path[np.unique(np.linspace(0, len(on_path) - 1, ROWS).astype(int))]
+    rows = on_path[np.unique(np.linspace(0, len(on_path) - 1, AT_REST).astype(int))]
     time, still = motion.time[rows], np.zeros((len(rows), motion.model.tree.n_v))
     statics, states, multipliers = Statics(motion.model), [], []
     try:
