@@ -422,11 +422,11 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
     margins = np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
     side = np.where(np.abs(values.real) > margins, np.sign(values.real), 0.0)
-    order = _by_side(values, side)
+    order = by_side(values, side)
     return Zeros(scale * values[order], scale * values[order][side[order] > 0])
 
 
-def _by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
+def by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
     """The order (k,) of `values` by their `side` of the imaginary axis, by size, and by imaginary part.
 
     Sizes within `MARGIN` of each other count as one: those of conjugates, and of ± s, differ by round-off alone.

@@ -181,11 +181,18 @@ def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> N
             group[f"controller/{key}"] = getattr(of, key)
         group["controller"].attrs.update(inputs=list(of.outputs), outputs=list(of.inputs))
     if record.poles is not None:
-        _write_poles(group, record.poles)
+        _write_poles(group, _by_size(record.poles))
     if record.estimate is not None:
         _write_estimates(group.create_group("estimate"), record.estimate)
     if (margins := record.margins) is not None:
         group.attrs.update(spectral_radius=margins.radius, gain_margin=margins.gain, delay_margin=margins.delay)
+
+
+def _by_size(poles: ComplexArray) -> ComplexArray:
+    """Those (k,) of a sampled loop, the smallest first, in an order that round-off does not change."""
+    from ..actuation.control.linear_model import by_side
+
+    return poles[by_side(poles, np.zeros(len(poles)))]
 
 
 def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
@@ -203,7 +210,7 @@ def _write_estimates(group: h5py.Group, found: Estimates) -> None:
         for key in ("position", "error", "sigma"):
             group[f"points/{found.tip}/{key}"] = getattr(found, key)
     group.attrs.update(nees=found.nees, inside=found.inside)
-    _write_poles(group, found.poles)
+    _write_poles(group, _by_size(found.poles))
 
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
