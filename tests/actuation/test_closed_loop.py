@@ -317,14 +317,17 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
         ("return np.full(3, np.nan)", r"expected 1 finite commands, shape \(1,\)"),
         ("return y[99]", r"IndexError: .* \(line \d+ of \w+\.py, in \w+\)"),
         ("return 10**400", r"OverflowError: int too large to convert to float"),
-        ("return setup.columns('none')", r'InputError: .*expected readings, "joint/O", found "none" \(line \d+ of \w+\.py, in \w+\)'),
+        (
+            "return setup.columns('none')",
+            r'InputError: .*expected readings, "joint/O", found "none" \(line \d+ of \w+\.py, in \w+\)',
+        ),
     ],
 )
 def test_what_a_users_function_does_wrong_is_said(tmp_path, body, expected):
     file = tmp_path / "mine.py"
     file.write_text(f"import numpy as np\ndef controller(setup):\n    def act(k, y):\n        {body}\n    return act\n")
+    mine = {"kind": "python", "python": f"{file}:controller"}
     with python_allowed([tmp_path]), pytest.raises(SolveError, match=f"sample 0, t = 0 s: {expected}"):
-        mine = {"kind": "python", "python": f"{file}:controller"}
         solve_scene(wheel(loop(controller=[mine], sensor=[{"joint": "O"}])))
 
 
