@@ -39,8 +39,9 @@ MEASURES = {
 """What numbers may be small against, until only rounding errors of them are left."""
 FLOORS = dict.fromkeys(
     ("constraint_violation", "start_jolt", "off_rest", "rotation", "voltage", "required_voltage", "limit"), 1e-3
-) | {"field": 1.0, "limited_field": 1.0, "required_moment": 1e-7}
-"""Likewise, of numbers without a unit, and V; fields (V/m) and moments (N·m) of patches as of so small voltages."""
+) | {"field": 1.0, "limited_field": 1.0, "required_moment": 1e-7, "slew": 1.0}
+"""Likewise, of numbers without a unit, and V; fields (V/m) and moments (N·m) of patches as of so small voltages, slew
+rates (V/s) as of such a voltage within a millisecond."""
 SENSITIVE = {
     "arm_under_control": ("patches",),
     "compliant_arm": ("firm_joint",),
