@@ -23,6 +23,7 @@ from ...common.errors import InputError, SolveError
 from ...common.keys import MOST_OUTPUTS
 from ...common.structs import struct
 from ..fields.field_types import NotNegative
+from ..fields.functions import check_domain
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, path_errors, without_paths
@@ -30,6 +31,7 @@ from ..run.context import Context
 from ..run.integrators import Choice
 from ..run.outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
 from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
+from ..scene.mechanism import MechanismScene
 from ..scene.robustness import Robustness
 from .servo import Servo, Stopped, make_servo
 from .stable_inversion import Inversion, invert, shape_of
@@ -201,10 +203,11 @@ class MotorsOnly(TimedAnalysis):
             check_rest(servo, self, rests(self, needs_future))
             given = self.pre_actuation, self.post_actuation
             pre, post = durations(linear, given, self.output_step, needs_future=needs_future)
+            times = output_times(self.end, self.output_step, pre, post)
+            _check_loads(model.scene, times)
             inversion = invert(servo, linear, pre, post, self.tolerance, progress)
         except Stopped:
             raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
-        times = output_times(self.end, self.output_step, pre, post)
         times = times[times <= inversion.curve.x[-1] + 1e-9 * self.end]  # what an integration reached
         run = _run(self, model, inversion, times)
         if not len(run.time):
@@ -215,6 +218,13 @@ class MotorsOnly(TimedAnalysis):
         statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
         run = replace(run, details=around, statistics=statistics)
         return run.with_look(lambda between: replace(_run(self, model, inversion, between), details=around))
+
+
+def _check_loads(scene: MechanismScene, times: Array) -> None:
+    """Raise `InputError` for a load without a value at `times` (T,), s: a scene does not know its pre-actuation."""
+    for k, load in enumerate(scene.load, 1):
+        for component, function in load.components.items():
+            check_domain(function, times, f"{scene.path}: load no. {k}: {component}", 0)
 
 
 def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Outcome:

@@ -239,9 +239,13 @@ def test_joint_trajectories_need_no_future():
             lambda: arm(trajectory=[{"name": "tip", "point": "link2.tip", "y": "0.5+0*t"}]),
             r"trajectory components .* \(2\), found 1",
         ),
+        (
+            lambda: single_link(quintic(0, 0.1), load=[{"point": "link.tip", "y": "0.1*sqrt(t)"}]),
+            r"load no. 1: y: expected a finite value during the whole run, found none at t = -0\.\d+ s",
+        ),
         (lambda: single_link(quintic(0, 0.1), modes=0), r'at least one flexible body.*kind = "pcid"'),
     ],
-    ids=["start", "end", "motors", "components", "rigid"],
+    ids=["start", "end", "motors", "components", "load", "rigid"],
 )
 def test_what_motors_alone_cannot_do_is_refused(robot, message):
     with pytest.raises(InputError, match=message):
