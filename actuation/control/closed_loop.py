@@ -117,7 +117,7 @@ def make_observed(
     observer does not fit the robot.
     """
     record, robot, T = analysis.observer, setup.robot, setup.sample_time
-    tip, origin = analysis.tip or _default_tip(robot.model), setup.reference
+    tip, origin = analysis.tip or default_tip(robot.model), setup.reference
     warnings: list[str] = []
     try:
         if isinstance(record, KalmanRecord):
@@ -233,7 +233,7 @@ class ClosedLoop(SampledAnalysis):
         more = [s for sensor in self._ideal(robot) for s in make_signals(plant, context, sensor, whole)]
         read, estimated = (merged(own, more), ()) if self.observer is None else (tuple(own), merged(more, ()))
         sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
-        outputs, tip = replay_times(source, self), place_of(whole, self.tip) or _default_tip(plant)
+        outputs, tip = replay_times(source, self), place_of(whole, self.tip) or default_tip(plant)
         models = loop_models(plant, source.time, moved, context.patches, read)
         place_at = _place_of_tip(self, plant, source, tip)
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
@@ -308,7 +308,7 @@ class ClosedLoop(SampledAnalysis):
         """What controllers need; what an observer estimates."""
         if self.observer is None:
             return needed_sensors(robot, self.controller)
-        return estimated_sensors(robot, self.controller, self.tip or _default_tip(robot.model))
+        return estimated_sensors(robot, self.controller, self.tip or default_tip(robot.model))
 
 
 def _resolved(source: Outcome) -> Outcome:
@@ -455,7 +455,8 @@ def _position(model: Model, q: Array, point: str) -> Array:
     return model.tree.places(q).at(model.tree.section(point)).r
 
 
-def _default_tip(model: Model) -> str:
+def default_tip(model: Model) -> str:
+    """The tool of the scene, or the tip of the last link."""
     if (tool := model.scene.tool_point) is not None:
         return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)

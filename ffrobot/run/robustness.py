@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..actuation.context import ActuatedContext
-from ..actuation.control.closed_loop import ClosedLoop
+from ..actuation.control.closed_loop import ClosedLoop, default_tip
 from ..actuation.control.records import JointPid, Sensor
 from ..actuation.control.robot import Robot
 from ..common.arrays import Array
@@ -112,11 +112,9 @@ class _Runs:
         self.context = replace(context, outcomes={**context.outcomes, given.name: source}, earlier=None)
         self.source, self.asked = source, asked
         self.applied = "joints+pzt" if "joints+pzt" in given.applicable else "joints"
-        nodes = [node for node in source.model.tree.nodes if node.body.points]
-        tip = f"{nodes[-1].body.name}.{'tip' if 'tip' in nodes[-1].body.points else next(iter(nodes[-1].body.points))}"
         followed = dict.fromkeys(path.point for path in scene.trajectory if path.point is not None)
-        self.points = [place_of(context.whole, point) for point in followed] or [scene.tool_point or tip]
-        lowest = [float(node.body.stiffness.min()) ** 0.5 for node in nodes if node.body.n_modes]
+        self.points = [place_of(context.whole, point) for point in followed] or [default_tip(source.model)]
+        lowest = [float(node.body.stiffness.min()) ** 0.5 for node in source.model.tree.nodes if node.body.n_modes]
         self.bandwidth = asked.bandwidth or 0.5 * min(lowest, default=2.0 / asked.sample_time)
         self.keys = {
             "name": "robustness", "actuation": given.name, "end": given.last_time,
