@@ -1,4 +1,4 @@
-"""Datasets of results and modal body files with unit, meaning and columns: THE table, by which records are written.
+"""Datasets of results and modal body files with unit, meaning and columns: the table, by which records are written.
 
 docs/reference/files.md says more of them; a test compares both with files as they are written.
 """
