@@ -1,0 +1,98 @@
+"""Numbers that others have published: beams that bend far, twist and spin, masses beside a beam, a bimorph."""
+
+import numpy as np
+import pytest
+from beam_links import beam_link, circle, modal_body, rectangle
+from patches_on_links import bent, on_link, planar_body
+from tables_3d import joint, rigid, scene
+
+import ffrobot
+from ffrobot.actuation.patches.composite import Placed, patched_body
+
+ALL = ["in-plane-bending", "out-of-plane-bending", "torsion", "axial"]
+AT_REST = [0.0, 0.0, 0.0]
+
+
+def on_a_wall(beam, *others, analysis="static", joints=(), **keys):
+    """Results of a beam that is clamped at its root, without gravity."""
+    joints = [joint("wall", "weld", "ground", "beam.root"), *joints]
+    tables = scene([{"name": "beam"} | beam, *others], joints, {"name": "rest", "kind": analysis}, gravity=AT_REST)
+    return ffrobot.solve(ffrobot.make_scene(**tables | keys))
+
+
+@pytest.mark.parametrize(
+    ("angle", "y", "z"),
+    [
+        (0, 1.071417630e-2, 0.0),
+        (15, 1.061328706e-2, 4.208232124e-2),
+        (45, 8.837226265e-3, 0.108987937),
+        (75, 3.538889001e-3, 0.142194370),
+        (90, 0.0, 0.146245978),
+    ],
+)
+def test_princeton_beam(angle, y, z):
+    """Tip of a strip under 8.896 N at an angle to its stiff side, in four pieces, against ANSYS' beams.
+
+    Published by Obrezkov, Matikainen and Mikkola, Nonlinear Dynamics 109 (2022), after Dowell and Traybar (1975).
+    """
+    section = rectangle(12.3777e-3, 3.2024e-3)
+    link = beam_link(0.508, section, 16, E=71.7e9, nu=0.31, modes={"count": 8, "family": ALL})
+    turn = np.deg2rad(angle)
+    force = {"y": repr(float(-8.896 * np.cos(turn))), "z": repr(float(8.896 * np.sin(turn)))}
+    with on_a_wall({"link": link, "pieces": 4}, load=[{"point": "beam.tip"} | force]) as results:
+        tip = results["rest/points/beam.tip/position"][0]
+    np.testing.assert_allclose(-tip[1], y, rtol=0.01, atol=1e-9)
+    np.testing.assert_allclose(tip[2], z, rtol=1e-3, atol=1e-9)
+
+
+def test_nafems_fv4():
+    """Cantilever with masses beside its tip: bending and twist together, two frequencies that nearly coincide.
+
+    NAFEMS, The Standard NAFEMS Benchmarks, TNSB rev. 3 (1990).
+    """
+    link = beam_link(10.0, circle(0.5), 20, E=200e9, nu=0.3, rho=8000.0, modes={"count": 24, "family": ALL})
+    point = np.diag([1e-6, 1e-6, 1e-6]).tolist()
+    masses = [rigid("left", 1e4, point, [0.0, 2.0, 0.0]), rigid("right", 1e3, point, [0.0, -2.0, 0.0])]
+    welds = [joint(f"to {mass['name']}", "weld", "beam.tip", f"{mass['name']}.root") for mass in masses]
+    with on_a_wall({"link": link}, *masses, analysis="linear", joints=welds) as results:
+        frequency = results["rest/linear/frequency"][0, :6]
+    np.testing.assert_allclose(frequency, [1.723, 1.727, 7.413, 9.972, 18.155, 26.957], rtol=2e-3)
+
+
+def test_polymer_bimorph():
+    """Two layers of PVDF of one thickness, 1 V: the patch is as thick as its link, and shifts the neutral axis.
+
+    Tip 3 e31 V L²/(2 E t²) = 3.45e-7 m of Tzou's bimorph (Piezoelectric Shells, 1993).
+    """
+    L, width, half, E, e31 = 0.1, 5e-3, 0.5e-3, 2e9, 0.046
+    link = beam_link(L, rectangle(half, width), 20, E=E, nu=0.0, rho=1780.0, modes={"count": 20})
+    body = modal_body(link)
+    keys = {"width": width, "thickness": half, "modulus": E, "d31": e31 / E, "length": L, "structural": ("stiffness",)}
+    bare, layer = planar_body(body), on_link(body, centers=(L / 2,), **keys)
+    layered = patched_body(bare, body, [Placed(layer.arrays["link"].layout, layer.arrays["link"].edges)])
+    tip = layered.points["tip"].translation[1] @ bent(layered, on_link(body, layered, centers=(L / 2,), **keys), [1.0])
+    assert tip == pytest.approx(3 * e31 * L**2 / (2 * E * (2 * half) ** 2), rel=1e-3)
+    assert tip == pytest.approx(3.45e-7, rel=1e-3)
+
+
+def test_extension_of_a_spinning_beam():
+    """Steady extension ρA ω² L³/(3 EA) = 5.14e-4 m after the spin-up of Simo and Vu-Quoc (J. Appl. Mech. 53, 1986)."""
+    height, width = np.sqrt(12 * 5e-4), 0.02
+    EA, line_mass, area = 2.8e7, 1.2, height * width
+    modes = {"count": 6, "family": ["in-plane-bending", "axial"], "attachment_modes": True}
+    section = rectangle(float(height), width)
+    link = beam_link(10.0, section, 20, E=EA / area, nu=0.3, rho=line_mass / area, modes=modes, damping={"ratio": 0.02})
+    spin = "where(t < 15, 6/15*(t**2/2 + (15/(2*pi))**2*(cos(2*pi*t/15) - 1)), 6*(t - 7.5))"
+    tables = {
+        "name": "spin_up",
+        "space": "planar",
+        "gravity": [0.0, 0.0],
+        "geometric_stiffening": "auto",
+        "body": [{"name": "beam", "link": link}],
+        "joint": [joint("hub", "revolute", "ground", "beam.root")],
+        "trajectory": [{"name": "spin", "joint": "hub", "value": spin}],
+        "analysis": [{"name": "turn", "kind": "pcid", "end": 30.0, "output_step": 0.01}],
+    }
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        extension = results["turn/points/beam.tip/deflection"][results["turn/time"] > 25.0, 0].mean()
+    assert extension == pytest.approx(line_mass * 6.0**2 * 10.0**3 / (3 * EA), rel=1e-3)
