@@ -91,8 +91,25 @@ def test_first_screen_states_bounds_that_runs_keep(solved):
     assert off_path(solved("two_link_tracking"), "replay") < 1e-8
 
 
+@pytest.mark.nightly
+def test_table_of_robustness_is_that_of_the_run(solved):
+    """Of the case on the first screen: held commands and other links, in all three lanes."""
+    case = solved("two_link_tracking", lambda text: text.replace('"carried"\n', '"carried"\nrobustness = {}\n', 1))
+    lanes = case.file["carried/robustness"]
+    causes = list(lanes.attrs["causes"])
+    table = (ROOT / "cases/two_link_tracking/README.md").read_text(encoding="utf-8").partition(f"| {ROBUST} |")[2]
+    for row, cause in (("zero-order hold of 1 ms", "zero-order hold of 1 ms"), ("links 1 %", "stiffness ± 1 %")):
+        cells = next(line.split("|") for line in table.splitlines() if line.startswith(f"| {row}"))[2:5]
+        for cell, lane in zip(cells, ("open_loop", "joint_control", "joint_control_without_voltages"), strict=True):
+            assert float(cell) == pytest.approx(1e3 * lanes[lane][causes.index(cause)], rel=0.05)
+
+
 # text of the README with a number, and the cell of a case's table, with a unit, that its own tests compare with runs
+ROBUST = "largest distance of the tip from its path (mm)"
 CELLS = {
+    r"remains \([^)]*\)\): ([\d.]+) µm": ("two_link_tracking", ROBUST, "zero-order hold of 1 ms", 0, 1e3),
+    r"ms, and ([\d.]+) mm, with patches": ("two_link_tracking", ROBUST, "links 1 % stiffer", 1, 1.0),
+    r"([\d.]+) mm, with patches as without": ("two_link_tracking", ROBUST, "links 1 % stiffer", 2, 1.0),
     r"leave (\d+) µm": ("two_link_tracking", "run", "`without_patches`", 1, 1e6),
     r"at most \*\*(\d+) V\*\*": ("two_link_tracking", "run", "`replay`", 0, 1.0),
     r"leaves ([\d.]+) mm RMS": ("two_link_rest_to_rest", "run", "`pd`", 0, 1.0),
