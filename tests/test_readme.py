@@ -159,8 +159,10 @@ def benchmark():
     return row["error_force"], row["seconds"]
 
 
+HOLD = r"zero-order hold of (\d+) ms"
 FACTS = {  # text of the README, and its numbers by their source
     r"along a ([\d.]+) m line in ([\d.]+) s": of_line,
+    HOLD: lambda: printed("two_link_tracking", HOLD),
     r"sample time of (\d+) ms": lambda: (1e3 * scene("two_link_rest_to_rest")["analysis"][-1]["sample_time"],),
     r"arm\]\S+ carries (\d+) kg": lambda: (scene("arm_6r")["payload"][0]["mass"],),
     r"load of (\d+) kg; deflections are drawn (\d+) times": lambda: (
