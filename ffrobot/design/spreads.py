@@ -1,4 +1,4 @@
-"""How keys are spread (`KEY=±2%`, `KEY=normal:SIGMA`, …), designs of spreads, statistics of what is linear in them.
+"""How keys are spread (`KEY=±2%`, `KEY=normal:SIGMA`, …), and statistics of what is linear in them.
 
 Mean, standard deviation and quantiles of samples with their own errors, and what shares of a variance keys have.
 
@@ -23,8 +23,7 @@ from ..common.errors import InputError
 from ..common.tables import shown
 from ..sweep.files import number_at
 from ..sweep.sweep import Key, check_once
-from .designs import Design, Designs, Point, Runs, changes_for, in_words, parse_key
-from .readings import Goal
+from .designs import parse_key
 
 LEVELS = (0.05, 0.5, 0.95)
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
@@ -216,7 +215,7 @@ DRAWS = 4096  # of the model, for quantiles: no runs
 
 
 @dataclass(frozen=True)
-class LinearModel:
+class LinearSpread:
     """f = f₀ + Σ d_k δ_k + ½ Σ c_k δ_k² with δ_k in standard deviations of key k.
 
     `middle` (…), `slopes` (k, …) and `curvatures` (k, …); the last are for errors alone.
@@ -228,10 +227,10 @@ class LinearModel:
     curvatures: Array
 
     @staticmethod
-    def through(spreads: Sequence[Spread], middle: Array, sides: Array) -> LinearModel:
+    def through(spreads: Sequence[Spread], middle: Array, sides: Array) -> LinearSpread:
         """By values `sides` (k, 2, …) one standard deviation above and below the middle."""
         above, below = sides[:, 0], sides[:, 1]
-        return LinearModel(tuple(spreads), middle, 0.5 * (above - below), above - 2.0 * middle + below)
+        return LinearSpread(tuple(spreads), middle, 0.5 * (above - below), above - 2.0 * middle + below)
 
     @property
     def shares(self) -> Array:
@@ -263,69 +262,6 @@ class LinearModel:
             as_floats(quantiles), as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),
             as_floats(self.middle - reach), as_floats(self.middle + reach),
         )  # fmt: skip
-
-
-class SpreadDesigns:
-    """Designs by the values of keys that are spread.
-
-    Attributes:
-        path: of the scene file; `spreads` (k,) of its keys; `goals` (g,).
-        middle: the design with all parameters at nominal values, which completed; `readings` (g,) of it.
-        failures: runs that failed, in words.
-    """
-
-    def __init__(
-        self,
-        runs: Runs,
-        spreads: Sequence[Spread],
-        goals: Sequence[Goal],
-        *,
-        others: Sequence[Goal] = (),
-        tolerance: float | None = None,
-    ) -> None:
-        """Run the middle. `others`: what else is read off the runs; `tolerance`: of the runs, at most.
-
-        Raises:
-            InputError: goals or spreads that mean nothing, or that make scenes impossible.
-            SolveError: the scene with all parameters at nominal values cannot be solved.
-        """
-        self.path, self.spreads, self.goals = runs.path, tuple(spreads), tuple(goals)
-        keys, own = [one.key for one in spreads], tuple(one.own for one in spreads)
-        self._designs = Designs(runs, keys, own, changes_for(runs.path, (*goals, *others), tolerance))
-        self.failures: list[str] = []
-        centre = tuple(one.mean for one in self.spreads)
-        for k, one in enumerate(self.spreads):
-            for end in one.ends:
-                if problem := self._designs.problem((*centre[:k], end, *centre[k + 1 :])):
-                    raise InputError(
-                        f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
-                    )
-        self.middle = self._designs.run_first(centre)
-        self.readings = self.middle.read(goals)
-
-    @property
-    def table(self) -> Path | None:
-        """The file with a row for every run; None where they are not kept."""
-        return self._designs.table
-
-    def run(self, points: Sequence[Point]) -> list[Design]:
-        """The designs there, failed ones too."""
-        return self._designs.run(points)
-
-    def read(self, design: Design) -> list[float]:
-        """The goals, NaN where the design failed or does not have them."""
-        failure = design.failure
-        try:
-            if not failure:
-                return [one.value for one in design.read(self.goals)]
-        except InputError as error:
-            failure = str(error)
-        self.failures.append(f"{self.where(design)}: {failure}")
-        return [float("nan")] * len(self.goals)
-
-    def where(self, design: Design) -> str:
-        """Its keys in words."""
-        return in_words((one.key for one in self.spreads), design.point)
 
 
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:

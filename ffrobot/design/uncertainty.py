@@ -7,27 +7,26 @@ standard deviation to both sides; what these say of curvature is the estimate of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Band as BandDiagram
 from ..pictures.studies.study import Bars, Diagram, Series, StudyTable
-from .designs import Design, Point, Runs
+from .designs import Design, Designs, Point, Runs, changes_for, in_words
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, numbers, with_unit
 from .goals import parse_goal
 from .readings import Goal, History, Reading, read_history
 from .spreads import (
     NAMES,
     Indices,
-    LinearModel,
+    LinearSpread,
     Spread,
-    SpreadDesigns,
     Statistics,
     read_spreads,
     regression_shares,
@@ -280,8 +279,7 @@ def find_uncertainty(
     spreads = read_spreads(runs.path, spread)
     if not names or not spreads:
         raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
-    tolerance = TOLERANCE if by == "gradients" else None
-    study = _Study(SpreadDesigns(runs, spreads, goals, others=curves, tolerance=tolerance), curves)
+    study = _Study(runs, spreads, goals, curves, TOLERANCE if by == "gradients" else None)
     return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
 
 
@@ -290,11 +288,30 @@ def _is_history(text: str) -> bool:
 
 
 class _Study:
-    def __init__(self, designs: SpreadDesigns, curves: tuple[Curve, ...]) -> None:
-        self._designs, self._curves = designs, curves
-        self._spreads, self._goals, self._readings = designs.spreads, designs.goals, designs.readings
-        self._nominal = tuple(curve.history(designs.middle) for curve in curves)
-        pairs = zip(self._goals, self._readings, strict=True)
+    """Designs by the values of keys that are spread, and what responses and histories are with nominal values.
+
+    Making it raises `InputError` for spreads that make scenes impossible, `SolveError` where the nominal scene fails.
+    """
+
+    def __init__(
+        self, runs: Runs, spreads: tuple[Spread, ...], goals: tuple[Goal, ...], curves: tuple[Curve, ...],
+        tolerance: float | None,
+    ) -> None:  # fmt: skip
+        self._path, self._spreads, self._goals, self._curves = runs.path, spreads, goals, curves
+        self._point: Point = tuple(one.mean for one in spreads)
+        fixed = changes_for(runs.path, (*goals, *curves), tolerance)
+        self._designs = Designs(runs, [one.key for one in spreads], tuple(one.own for one in spreads), fixed)
+        for k, one in enumerate(spreads):
+            for end in one.ends:
+                if problem := self._designs.problem(self._moved(k, end)):
+                    raise InputError(
+                        f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
+                    )
+        middle = self._designs.run_first(self._point)
+        self._readings = middle.read(goals)
+        self._nominal = tuple(curve.history(middle) for curve in curves)
+        self._failures: list[str] = []
+        pairs = zip(goals, self._readings, strict=True)
         self._notes = {f"peak of {g.text}": f"{g.text}: {one.remark}" for g, one in pairs if one.remark}
 
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
@@ -311,82 +328,102 @@ class _Study:
             u = LatinHypercube(k, optimization="random-cd", seed=seed).random(count)
         points = spread_points(self._spreads, u)
         designs = self._designs.run(points)
-        values = np.array([self._designs.read(design) for design in designs])
+        values = np.array([self._read(design) for design in designs])
         n = 2 * (count // 2) if indices else count  # those of the mixed points are no Latin hypercube
         whole = np.isfinite(values[:n]).all(axis=1) & [design.completed for design in designs[:n]]
         if whole.sum() < FEWEST:
-            raise SolveError(
-                f"{self._designs.path}: {n - whole.sum()} of {n} samples failed: {self._designs.failures[0]}"
-            )
-        x = np.array(points[:n])[whole]
-        shares, explained = regression_shares(x, values[:n][whole])
+            raise SolveError(f"{self._path}: {n - whole.sum()} of {n} samples failed: {self._failures[0]}")
+        shares, explained = regression_shares(np.array(points[:n])[whole], values[:n][whole])
         complete = [design for design, is_whole in zip(designs[:n], whole, strict=True) if is_whole]
-        histories = (np.array([self._values(m, design) for design in complete]) for m in self._all())
-        bands = tuple(self._band(m, statistics(of)) for m, of in enumerate(histories))
+        bands = self._bands(complete, lambda nominal, of_designs: statistics(of_designs))
         blocks = values.reshape(-1, count // 2, len(self._goals)) if indices else None
-        found = sobol_indices(blocks[0], blocks[1], blocks[2:], seed) if blocks is not None else None
-        found_of_all = statistics(values[:n][whole])
-        return self._found("samples", found_of_all, bands, shares, explained, found, values[:n], 1 + len(points))
+        return Uncertainty(
+            method="samples",
+            statistics=statistics(values[:n][whole]),
+            bands=bands,
+            shares=shares,
+            explained=explained,
+            indices=sobol_indices(blocks[0], blocks[1], blocks[2:], seed) if blocks is not None else None,
+            samples=values[:n],
+            runs=1 + len(points),
+            **self._common(),
+        )
 
     def by_gradients(self) -> Uncertainty:
         """Of the linear model, whose errors a quadratic one without products of keys tells."""
-        points = [self._beside(k, sign) for k in range(len(self._spreads)) for sign in (1.0, -1.0)]
-        designs = self._designs.run(points)
-        centre = as_floats(np.array([one.value for one in self._readings]))
-        pairs = np.array([self._follow(design) for design in designs]).reshape(len(self._spreads), 2, -1)
-        self._check_sides(designs)
-        model = LinearModel.through(self._spreads, centre, pairs)
-        bands = []
-        for m in self._all():
-            sides = np.array([self._values(m, design) for design in designs])
-            nominal = self._nominal[m].values[:, 0]
-            curve = LinearModel.through(self._spreads, nominal, sides.reshape(len(self._spreads), 2, -1))
-            bands.append(self._band(m, curve.statistics()))
-        none = np.zeros((0, len(self._goals)))
-        return self._found(
-            "gradients", model.statistics(), tuple(bands), model.shares, np.full(len(self._goals), np.nan), None, none,
-            1 + len(points),
-        )  # fmt: skip
-
-    def _all(self) -> range:
-        return range(len(self._curves))
-
-    def _beside(self, k: int, sign: float) -> Point:
-        middle = self._designs.middle.point
-        return (*middle[:k], middle[k] + sign * self._spreads[k].deviation, *middle[k + 1 :])
-
-    def _check_sides(self, designs: Sequence[Design]) -> None:
+        sides = [(k, sign * one.deviation) for k, one in enumerate(self._spreads) for sign in (1.0, -1.0)]
+        designs = self._designs.run([self._moved(k, self._point[k] + offset) for k, offset in sides])
+        pairs = np.array([self._follow(design) for design in designs])
         if failed := next((one for one in designs if not one.completed), None):
-            where = f"{self._designs.path}: {self._designs.where(failed)}"
-            raise SolveError(f"{where}: {failed.failure}; gradients need all runs, samples do without some")
+            raise SolveError(
+                f"{self._path}: {self._where(failed)}: {failed.failure}; gradients need all runs, samples do without"
+                " some"
+            )
+        model = self._linear(np.array([one.value for one in self._readings]), pairs)
+        return Uncertainty(
+            method="gradients",
+            statistics=model.statistics(),
+            bands=self._bands(designs, lambda nominal, of_designs: self._linear(nominal, of_designs).statistics()),
+            shares=model.shares,
+            explained=np.full(len(self._goals), np.nan),
+            indices=None,
+            samples=np.zeros((0, len(self._goals))),
+            runs=1 + len(sides),
+            **self._common(),
+        )
+
+    def _common(self) -> dict[str, Any]:
+        return {
+            "scene": self._path,
+            "spreads": self._spreads,
+            "goals": tuple(goal.text for goal in self._goals),
+            "readings": self._readings,
+            "failures": tuple(self._failures),
+            "notes": tuple(self._notes.values()),
+            "table": self._designs.table,
+        }
+
+    def _linear(self, middle: Array, sides: Array) -> LinearSpread:
+        return LinearSpread.through(self._spreads, middle, sides.reshape(len(self._spreads), 2, -1))
+
+    def _moved(self, k: int, value: float) -> Point:
+        return (*self._point[:k], value, *self._point[k + 1 :])
+
+    def _read(self, design: Design) -> list[float]:
+        """The responses, NaN where the design failed or does not have them."""
+        failure = design.failure
+        try:
+            if not failure:
+                return [one.value for one in design.read(self._goals)]
+        except InputError as error:
+            failure = str(error)
+        self._failures.append(f"{self._where(design)}: {failure}")
+        return [float("nan")] * len(self._goals)
 
     def _follow(self, design: Design) -> list[float]:
-        """The goals beside the middle, peaks at their own times."""
-        found = design.follow(self._goals, self._readings)
-        for goal, one in zip(self._goals, found, strict=False):
+        """The responses beside the middle, peaks at their own times."""
+        followed = design.follow(self._goals, self._readings)
+        for goal, one in zip(self._goals, followed, strict=False):
             if one.elsewhere:
-                kink = f"{goal.text}: a kink: with {self._designs.where(design)} the largest value is {one.elsewhere}"
+                kink = f"{goal.text}: a kink: with {self._where(design)} the largest value is {one.elsewhere}"
                 self._notes.setdefault(goal.text, f"{kink}; samples take it into account")
-        return [one.value for one in found] or [float("nan")] * len(self._goals)
+        return [one.value for one in followed] or [float("nan")] * len(self._goals)
 
-    def _values(self, m: int, design: Design) -> Array:
-        found = self._curves[m].history(design)
-        time = self._nominal[m].time
-        if found.time.shape != time.shape or not np.allclose(found.time, time, rtol=1e-9, atol=1e-12):
-            where = self._designs.where(design)
-            raise InputError(f'--of: expected the same times of "{found.name}" in all runs, found others: {where}')
-        return found.values[:, 0]
+    def _bands(self, designs: Sequence[Design], of: Callable[[Array, Array], Statistics]) -> tuple[Band, ...]:
+        """Statistics `of` each history: with nominal values (T,), and of the designs (n, T)."""
+        bands = []
+        for curve, nominal in zip(self._curves, self._nominal, strict=True):
+            values, middle = np.array([self._values(curve, nominal, one) for one in designs]), nominal.values[:, 0]
+            bands.append(Band(nominal.name, nominal.unit, nominal.time, middle, of(middle, values)))
+        return tuple(bands)
 
-    def _band(self, m: int, found: Statistics) -> Band:
-        nominal = self._nominal[m]
-        return Band(nominal.name, nominal.unit, nominal.time, nominal.values[:, 0], found)
+    def _values(self, curve: Curve, nominal: History, design: Design) -> Array:
+        history, time = curve.history(design), nominal.time
+        if history.time.shape != time.shape or not np.allclose(history.time, time, rtol=1e-9, atol=1e-12):
+            raise InputError(
+                f'--of: expected the same times of "{history.name}" in all runs, found others: {self._where(design)}'
+            )
+        return history.values[:, 0]
 
-    def _found(
-        self, method: LinearOrSampled, found: Statistics, bands: tuple[Band, ...], shares: Array, explained: Array,
-        indices: Indices | None, samples: Array, runs: int,
-    ) -> Uncertainty:  # fmt: skip
-        return Uncertainty(
-            self._designs.path, self._spreads, method, tuple(goal.text for goal in self._goals), self._readings, found,
-            bands, shares, explained, indices, samples, tuple(self._designs.failures),
-            tuple(self._notes.values()), runs, self._designs.table,
-        )  # fmt: skip
+    def _where(self, design: Design) -> str:
+        return in_words((one.key for one in self._spreads), design.point)

@@ -11,7 +11,7 @@ from small_robots import ARM, MASS, PAYLOAD
 import ffrobot
 from ffrobot.design.spreads import (
     LEVELS,
-    LinearModel,
+    LinearSpread,
     Spread,
     parse_spread,
     sobol_indices,
@@ -91,7 +91,7 @@ def test_gradients_of_a_quadratic_tell_how_far_they_are_off():
     """f = x + x²/10, x normal: the mean is 1/10, the variance 1 + 2/100."""
     one = spread("normal", 1.0)
     middle, sides = np.array(0.0), np.array([[1.1, -0.9]])
-    found = LinearModel.through((one,), middle, sides).statistics()
+    found = LinearSpread.through((one,), middle, sides).statistics()
     assert found.mean == 0.0
     assert found.mean_error == pytest.approx(0.1, rel=1e-2)
     assert found.deviation == pytest.approx(1.0, rel=1e-14)
