@@ -11,6 +11,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath, check_folder
 from ..common.outputs import protected
@@ -173,18 +175,24 @@ class Design:
             return tuple(goal.follow(results, one) for goal, one in zip(goals, readings, strict=True))
 
 
+class SpentError(Exception):
+    """As many designs have been run as may be."""
+
+
 class Designs:
     """All designs so far of the scene of `runs`, by the values of `keys`, which the scene has `own` ones of.
 
-    `fixed` are changes that they share.
+    `fixed` are changes that they share; there may be `most` designs.
     """
 
-    def __init__(self, runs: Runs, keys: Sequence[Key], own: Point, fixed: Mapping[Key, Any]) -> None:
+    def __init__(
+        self, runs: Runs, keys: Sequence[Key], own: Point, fixed: Mapping[Key, Any], most: float = np.inf
+    ) -> None:
         check_folder(runs.folder)
         allowed = (runs.path.absolute().parent, *allowed_python())
         variations = tuple(Variation((key,), ()) for key in keys)
         self._sweep = Sweep(runs.path, variations, (), runs.folder, (), allowed, fixed, own, growing=True)
-        self._runs, self._workers = runs, Workers()
+        self._runs, self._workers, self.most = runs, Workers(), most
         self._designs: dict[Path, Design] = {}
         self._inputs = _digests(runs.path)
 
@@ -198,12 +206,10 @@ class Designs:
         """How many there are."""
         return len(self._designs)
 
-    def folders(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Path]:
-        """Of the designs at `points`, with these `changes` beside."""
-        return [run.folder for run in self._lot(points, changes).runs]
-
-    def _lot(self, points: Sequence[Point], changes: Mapping[Key, Any] | None) -> Sweep:
-        return replace(self._sweep, points=tuple(points), fixed={**self._sweep.fixed, **(changes or {})})
+    @property
+    def failures(self) -> dict[Point, str]:
+        """Why designs failed, by their points."""
+        return {one.point: one.failure for one in self._designs.values() if not one.completed}
 
     def problem(self, *points: Point) -> str:
         """What is wrong with the scene or a link file at all of the points, before any run; empty where nothing is."""
@@ -228,15 +234,19 @@ class Designs:
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
         """The designs at `points`, failed ones too, with these `changes` beside; none is run twice in one folder.
 
-        Raises `InputError` where the scene or its files are others than at first.
+        Raises `InputError` where the scene or its files are others than at first, `SpentError` where designs would be
+        too many.
         """
         claim_folder(self._sweep)
         imported = {name: one.row.inputs[name] for one in self._designs.values() for name in one.row.imported}
         now = _digests(self._sweep.scene) | {name: digest_of_file(Path(name)) for name in imported}
         if what := changed(self._inputs | imported, now):
             raise InputError(f"{self._sweep.folder}: {' and '.join(what)} changed while designs were run")
-        wanted, folders = self._lot(points, changes), self.folders(points, changes)
+        wanted = replace(self._sweep, points=tuple(points), fixed={**self._sweep.fixed, **(changes or {})})
+        folders = [run.folder for run in wanted.runs]
         new = {folder: point for folder, point in zip(folders, points, strict=True) if folder not in self._designs}
+        if len(new) > self.most - self.count:
+            raise SpentError
         if new:
             earlier = tuple(design.row for design in self._designs.values())
             lot = replace(wanted, points=tuple(new.values()), earlier=earlier)

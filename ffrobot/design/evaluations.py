@@ -38,10 +38,6 @@ from .readings import Followed, Reading
 from .variables import Place, Space
 
 
-class SpentError(Exception):
-    """As many designs have been run as may be."""
-
-
 @dataclass(frozen=True)
 class Evaluated:
     """A design at a place: the `readings` of all goals, none where it failed, for which `failure` says why.
@@ -67,23 +63,12 @@ class Evaluated:
 
 
 class Evaluations:
-    """All designs that a search has asked for, `most` at most. The first that completes gives the objective's size."""
+    """All designs that a search has asked for. The first that completes gives the objective's size."""
 
-    def __init__(self, designs: Designs, space: Space, problem: Problem, most: int) -> None:
-        self.designs, self.space, self.problem, self.most = designs, space, problem, most
+    def __init__(self, designs: Designs, space: Space, problem: Problem) -> None:
+        self.designs, self.space, self.problem = designs, space, problem
         self._searched: dict[Point, Evaluated] = {}
-        self._designs: dict[Path, Design] = {}
         self._followed: dict[tuple[Place, Path], tuple[Followed, ...]] = {}
-
-    @property
-    def runs(self) -> int:
-        """How many designs there are."""
-        return len(self._designs)
-
-    @property
-    def folders(self) -> set[Path]:
-        """Of all runs."""
-        return set(self._designs)
 
     @property
     def searched(self) -> list[Evaluated]:
@@ -94,14 +79,14 @@ class Evaluations:
     def failures(self) -> list[str]:
         """Designs that failed, in words."""
         unread = {one.design.point: one.failure for one in self.searched if not one.completed}
-        unrun = {d.point: d.failure for d in self._designs.values() if not d.completed}
-        return [f"{in_words(self.space.keys, point)}: {why}" for point, why in (unread | unrun).items()]
+        failures = unread | self.designs.failures
+        return [f"{in_words(self.space.keys, point)}: {why}" for point, why in failures.items()]
 
     def at(self, places: Sequence[Place]) -> list[Evaluated]:
         """The designs there. Raises `SpentError` where that would be too many."""
         points = [self.space.point(place) for place in places]
         new = {point: place for place, point in zip(places, points, strict=True) if point not in self._searched}
-        for (point, place), design in zip(new.items(), self._run(list(new)), strict=True):
+        for (point, place), design in zip(new.items(), self.designs.run(list(new)), strict=True):
             self._searched[point] = self._read(place, design)
         return [self._searched[point] for point in points]
 
@@ -113,15 +98,7 @@ class Evaluations:
         `again`: changes with which runs take the steps of the base.
         """
         points = [self.space.point(place) for place in places]
-        return [self._follow(base, design) for design in self._run(points, again)]
-
-    def _run(self, points: Sequence[Point], again: Mapping[Key, Any] | None = None) -> list[Design]:
-        folders = self.designs.folders(points, again)
-        if len(set(folders) - set(self._designs)) > self.most - self.runs:
-            raise SpentError
-        found = self.designs.run(points, again)
-        self._designs |= {design.folder: design for design in found}
-        return found
+        return [self._follow(base, design) for design in self.designs.run(points, again)]
 
     def _read(self, place: Place, design: Design) -> Evaluated:
         if not design.completed:

@@ -17,7 +17,8 @@ import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
 from ..common.arrays import Array, as_floats
-from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, SpentError, optimality
+from .designs import SpentError
+from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, optimality
 from .goals import KEPT
 from .variables import Place, Space
 
@@ -181,7 +182,9 @@ class Steps:
         problem = self._evaluations.problem
         violation = problem.violation(one.readings)
         beyond = f", {100 * violation:.3g} % beyond a limit" if violation > KEPT else ""
-        self._tell(f"{problem.objective.text} {one.readings[0].value:.6g}{beyond}, {self._evaluations.runs} runs")
+        self._tell(
+            f"{problem.objective.text} {one.readings[0].value:.6g}{beyond}, {self._evaluations.designs.count} runs"
+        )
 
 
 def _slsqp(steps: Steps) -> str:
@@ -255,7 +258,7 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
         message = KINK if found is not None and found.kinks else message
     except (SpentError, StuckError) as error:
         spent = isinstance(error, SpentError)
-        message = f"ended after {evaluations.runs} runs, as many as were allowed" if spent else str(error)
+        message = f"ended after {evaluations.designs.count} runs, as many as were allowed" if spent else str(error)
         last = best_of(evaluations, [best, *evaluations.searched[begun:]])
         return Local(first, last, found if last is best else None, message, spent=spent)
     return Local(first, best, found, message)
@@ -307,7 +310,7 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
         ).T  # fmt: skip
 
     def on_improvement(x: Array, convergence: float) -> None:
-        tell(f"differential evolution, {evaluations.runs} runs")
+        tell(f"differential evolution, {evaluations.designs.count} runs")
 
     limits = (NonlinearConstraint(lambda places: values(places)[1:], -np.inf, 0.0),) if problem.limits else ()
     with suppress(SpentError), np.errstate(invalid="ignore"):
@@ -318,4 +321,4 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
             integrality=[variable.is_catalogue for variable in space.variables],
         )  # fmt: skip
         return "" if done.success else f"differential evolution: {done.message}"
-    return f"ended after {evaluations.runs} runs, as many as were allowed"
+    return f"ended after {evaluations.designs.count} runs, as many as were allowed"

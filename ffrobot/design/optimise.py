@@ -26,8 +26,8 @@ from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs, Runs, changes_for, may_repeat, number
-from .evaluations import Differentiation, Evaluated, Evaluations, SpentError, write_designs
+from .designs import Designs, Runs, SpentError, changes_for, may_repeat, number
+from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
 from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
 from .goals import KEPT, Limit, Problem, parse_goal, read_problem, with_motors
 from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
@@ -49,10 +49,7 @@ def find_optimum(
     problem = with_motors(problem, space)
     chosen = _method(space, method, runs)
     check_start(path, space, chosen)
-    fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))
-    designs = Designs(runner, space.keys, space.own, fixed)
-    check_bounds(designs, space)
-    evaluations = Evaluations(designs, space, problem, runs)
+    evaluations = Evaluations(_designs(runner, space, problem.goals, tolerance, runs), space, problem)
     differentiation = Differentiation(evaluations, tolerance)
     try:
         searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
@@ -91,8 +88,10 @@ def check_start(path: Path, space: Space, method: str) -> None:
             )
 
 
-def check_bounds(designs: Designs, space: Space) -> None:
-    """Raise `InputError` for a bound that is impossible wherever the others are, before any run."""
+def _designs(runner: Runs, space: Space, goals: Sequence[Goal], tolerance: float, most: int) -> Designs:
+    """Designs in `space`. Raises `InputError` for a bound that is impossible wherever the others are."""
+    fixed = changes_for(runner.path, goals, tolerance, keep_steps=may_repeat(space.keys))
+    designs = Designs(runner, space.keys, space.own, fixed, most)
     others = [] if space.start_place is None else [space.start_place]
     others += [(0.0,) * len(space.variables), tuple(variable.top for variable in space.variables)]
     for j, variable in enumerate(space.variables):
@@ -103,6 +102,7 @@ def check_bounds(designs: Designs, space: Space) -> None:
                 raise InputError(
                     f"--vary: expected bounds that designs can have, found {variable.name} = {bound:g}:\n{problem}"
                 )
+    return designs
 
 
 def _starts(space: Space, count: int, seed: int) -> list[Place]:
@@ -161,7 +161,7 @@ def _optimum(
     scene = run_files(runs.path, changes, folder).write(folder)
     return Optimum(
         runs.path, problem, space, method, best.start, best.best, best.optimality, best.message,
-        tuple(searches), evaluations.runs, tuple(evaluations.failures), tolerance, verdict,
+        tuple(searches), evaluations.designs.count, tuple(evaluations.failures), tolerance, verdict,
         scene if runs.kept else None, designs=runs.folder / "designs.csv" if runs.kept else None,
         tried=tuple(evaluations.searched),
     )  # fmt: skip
@@ -294,25 +294,20 @@ def find_front(
     if catalogue := next((v for v in space.variables if v.is_catalogue), None):
         raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
     check_start(path, space, "slsqp")
-    fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
-    designs = Designs(runner, space.keys, space.own, fixed)
-    check_bounds(designs, space)
-    return _Searches(path, space, designs, problem, other, runs, tolerance, runner.watcher).front(points)
+    designs = _designs(runner, space, (*problem.goals, other), tolerance, runs)
+    return _Searches(runner, space, designs, problem, other, tolerance).front(points)
 
 
 @dataclass
 class _Searches:
-    """What the searches of a front share; `ran`: the folders of all their runs."""
+    """What the searches of a front share."""
 
-    path: Path
+    runner: Runs
     space: Space
     designs: Designs
     problem: Problem
     against: Goal
-    most: int
     tolerance: float
-    watcher: Watcher
-    ran: set[Path] = field(default_factory=set)
     tried: dict[Path, Evaluated] = field(default_factory=dict)
 
     def front(self, count: int) -> Front:
@@ -331,25 +326,22 @@ class _Searches:
             found.append(self._least(replace(self.problem, limits=limits), found[-1].design.place, f"{k} of {count}"))
         unit, other = (one.unit for one in self._both(first.design))
         return Front(
-            self.path, (self.problem.objective.text, self.against.text), (unit, other),
-            tuple(map(".".join, self.space.keys)), (*found, last), len(self.ran), self.tolerance, self.space,
+            self.runner.path, (self.problem.objective.text, self.against.text), (unit, other),
+            tuple(map(".".join, self.space.keys)), (*found, last), self.designs.count, self.tolerance, self.space,
             self.problem, tuple(map(self._with_both, self.tried.values())),
         )  # fmt: skip
 
     def _least(self, problem: Problem, start: Place, title: str) -> FrontPoint:
-        evaluations = Evaluations(self.designs, self.space, problem, self.most - len(self.ran))
-        differentiation = Differentiation(evaluations, self.tolerance)
-        try:
-            found = search_from(start, "slsqp", differentiation, lambda text: self.watcher.stage(f"{title}: {text}"))
-            spent = found.spent
-        except SpentError:
-            spent = True
-        if spent:
-            raise SolveError(f"{self.path}: ended before {title} points after {self.most} runs, as many as allowed")
-        self.ran |= evaluations.folders
+        evaluations, runner = Evaluations(self.designs, self.space, problem), self.runner
+        differentiation, found = Differentiation(evaluations, self.tolerance), None
+        with suppress(SpentError):
+            found = search_from(start, "slsqp", differentiation, partial(_tell, runner.watcher, f"{title}: "))
+        if found is None or found.spent:
+            most = self.designs.most
+            raise SolveError(f"{runner.path}: ended before {title} points after {most} runs, as many as allowed")
         self.tried |= {one.design.folder: one for one in evaluations.searched}
         if not found.best.completed:
-            raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
+            raise SolveError(f"{runner.path}: no design could be run to its end: {found.message}")
         goal, against = (one.value for one in self._both(found.best))
         return FrontPoint(
             self.space.point(found.best.place), goal, against, self._price(found, evaluations.problem),

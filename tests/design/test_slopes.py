@@ -25,7 +25,7 @@ def differentiation(tmp_path, scene):
     space = read_space(path, [f"{OUTER}=0.018:0.03", f"{LOAD}=0.1:1:log"])
     fixed = changes_for(path, problem.goals, 1e-7, keep_steps=True)
     designs = Designs(Runs(path, tmp_path / "runs", processes=2), space.keys, space.own, fixed)
-    evaluations = Evaluations(designs, space, problem, 100)
+    evaluations = Evaluations(designs, space, problem)
     (first,) = evaluations.at([space.start_place])
     found = Differentiation(evaluations, 1e-7)
     return found, first
@@ -41,7 +41,7 @@ def test_one_run_for_each_number(tmp_path):
     """Steps of 6e-6 of a number: truncation is 1e-5 of the derivative or so, and the estimate says so."""
     found, first = differentiation(tmp_path, SWING)
     slopes = found.slopes(first)
-    assert found.evaluations.runs == 1 + 2 + 1
+    assert found.evaluations.designs.count == 1 + 2 + 1
     expected = ffrobot.sensitivity(tmp_path / "scene.toml", GOALS, [OUTER, LOAD], processes=2)
     scale = np.abs(expected.derivative * by_keys(found, first))
     difference = np.abs(slopes.gradient - expected.derivative * by_keys(found, first))
@@ -49,7 +49,7 @@ def test_one_run_for_each_number(tmp_path):
     assert np.all(difference <= slopes.error + 1e-6 * scale)
     assert np.all(slopes.error <= 1e-3 * scale)
     assert found.slopes(first).gradient == pytest.approx(slopes.gradient, rel=0, abs=0)
-    assert found.evaluations.runs == 4
+    assert found.evaluations.designs.count == 4
 
 
 def test_integrators_that_cannot_repeat_steps(tmp_path):
@@ -58,6 +58,6 @@ def test_integrators_that_cannot_repeat_steps(tmp_path):
     scene["analysis"][0]["integrator"] = "radau"
     found, first = differentiation(tmp_path, scene)
     slopes = found.slopes(first)
-    assert found.evaluations.runs == 1 + 4
+    assert found.evaluations.designs.count == 1 + 4
     assert np.isfinite(slopes.gradient).all()
     assert np.isfinite(found.curvature).all()
