@@ -1,4 +1,4 @@
-"""Forward dynamics under sampled controllers: their choice, sensors, delay, saturation, feed-forward, disturbances."""
+"""Forward dynamics under sampled controllers: sensors, delay, saturation, feed-forward, disturbances."""
 
 from __future__ import annotations
 
@@ -29,182 +29,28 @@ from ...mbs.run.outcome import Outcome
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
-from .amplified_loop import AmplifiedLoop
-from .controllers import (
-    ComputedTorqueControl,
-    Controller,
-    LinearFeedback,
-    Loop,
-    PythonControl,
-    Setup,
-    joint_pid,
-    load_function,
-    modal_velocity,
-    state_feedback,
-)
+from .controllers import Controller, PythonControl, Setup, make_controllers
 from .linear import voltages_at
-from .linear_model import LinearModel, kept_modes, state_space
-from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
+from .linear_model import LinearModel, state_space
+from .loop import (
+    AmplifiedLoop,
+    Loop,
+    between,
+    held_commands,
+    held_until,
+    loop_record,
+    sample_times,
+    times_of_run,
+)
 from .margins import Feedback, lowest_frequency
 from .metrics import Followed, last_change, place_of_tip
-from .observer import Observed, Schedule, given, kalman, unseen
+from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
-from .records import (
-    ComputedTorque,
-    GainsObserver,
-    JointPid,
-    KalmanObserver,
-    KalmanRecord,
-    Lqr,
-    ModalVelocity,
-    PythonController,
-    SampledAnalysis,
-    Sensor,
-    StateFeedback,
-)
-from .records import Controller as Record
-from .robot import Robot, input_names
+from .records import SampledAnalysis
+from .robot import Robot, default_tip, estimated_sensors, input_names, needed_sensors
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged
 
 APART = 1e-6  # of a run, between two times of a spline
-
-
-def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sensor]:
-    """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
-    for record in controllers:
-        if isinstance(record, JointPid):
-            for joint in record.joints:
-                yield Sensor.model_validate({record.side: joint})
-                if joint in record.derivative and record.rate == "measured":
-                    yield Sensor.model_validate({record.side: joint, "measure": "rate"})
-        elif not isinstance(record, PythonController | ModalVelocity):
-            for joint in robot.motor_joints:
-                yield Sensor(joint=joint)
-                yield Sensor(joint=joint, measure="rate")
-        if isinstance(record, Lqr):
-            for joint in robot.elastic_joints:
-                yield Sensor(motor=joint)
-                yield Sensor(motor=joint, measure="rate")
-        if isinstance(record, ModalVelocity | Lqr):
-            bending = robot.patches if record.sensor == "pzt" else robot.links
-            bodies = record.bodies if isinstance(record, ModalVelocity) else tuple(bending)
-            for body in bodies:
-                if record.sensor == "pzt":
-                    yield from (Sensor(pzt=layout) for layout in robot.patches[body].layouts)
-                else:
-                    yield Sensor(modal=body)
-                    yield Sensor(modal=body, measure="rate")
-
-
-def estimated_sensors(robot: Robot, controllers: Sequence[Record], tip: str) -> Iterator[Sensor]:
-    """Ideal ones of what an observer estimates: the tip, all coordinates and rates, and what `controllers` need."""
-    model = robot.model
-    subjects = [{"joint": one.name} for one in model.scene.joint if one.units and one.name in model.tree.carried]
-    subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]
-    yield Sensor(point=tip)
-    for subject in subjects:
-        yield Sensor.model_validate(subject)
-        yield Sensor.model_validate(subject | {"measure": "rate"})
-    yield from needed_sensors(robot, controllers)
-
-
-def make_observed(
-    analysis: ClosedLoop, context: ActuatedContext, setup: Setup, reference: Array, ranges: Array, nominal: Array
-) -> Observed:
-    """The observer with the controllers that act on its estimates.
-
-    `reference` (K, estimates) as of `Setup`, `ranges` and `nominal` as of `Observed`. Raises `InputError` where the
-    observer does not fit the robot.
-    """
-    record, robot, T = analysis.observer, setup.robot, setup.sample_time
-    tip, origin = analysis.tip or default_tip(robot.model), setup.reference
-    warnings: list[str] = []
-    try:
-        if isinstance(record, KalmanRecord):
-            plant = with_compliance(robot.model)
-            read, more = (
-                [s for sensor in sensors for s in make_signals(plant, context, sensor)]
-                for sensors in (analysis.sensor, estimated_sensors(robot, analysis.controller, tip))
-            )
-            whole = merged(more, ())
-            names = [signal.name for signal in whole]
-            source, found = setup.source, []
-            at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
-            instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
-            pushed = (name.split("/") for name in (*record.process, *record.disturbance))
-            points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
-            for row in instants:
-                mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
-                rows = zip(*Sensing(plant, (*read, *whole)).rows(mechanism), strict=True)
-                readings = dict(zip([s.name for s in (*read, *whole)], rows, strict=True))
-                model = state_space(mechanism, voltages, readings)
-                found.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
-                warnings += unseen(model, read)
-            schedule = Schedule(source.time[instants], tuple(found))
-        else:
-            assert isinstance(record, GainsObserver)
-            one = given(record, setup)
-            schedule = Schedule(np.zeros(1), (one,))
-            if record.about == "zero":
-                origin, nominal = np.zeros_like(origin), np.zeros_like(nominal)
-            reference = origin[:, setup.columns(*record.outputs)]
-        if (radius := schedule.radius) >= 1.0:
-            raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")
-    except InputError as error:
-        raise InputError(f"{robot.path}: observer: {error}") from None
-    every = schedule.observers[0].estimates
-    still = np.zeros((len(reference), len(every) - reference.shape[1]))
-    inner = replace(
-        setup,
-        outputs=(*setup.outputs, *(f"estimate/{name}" for name in every)),
-        reference=np.hstack([setup.reference, reference, still]),
-    )
-    acting = make_controllers(analysis.controller, inner)
-    if isinstance(record, KalmanRecord) and record.reject:
-        own = [name for name in record.disturbance if name in setup.inputs]
-        P = np.zeros((len(inner.inputs), len(inner.outputs)))
-        P[inner.places(*own), inner.columns(*(f"estimate/disturbance/{name}" for name in own))] = 1.0
-        acting.append(LinearFeedback(inner, P))
-    seen_badly = list(dict.fromkeys(warnings))
-    return Observed(schedule, inner, acting, ranges, (origin, nominal), record.settle, tip, seen_badly)
-
-
-def make_controllers(records: Sequence[Record], setup: Setup) -> list[Controller]:
-    """All controllers of an analysis."""
-    return [make_controller(record, setup, records) for record in records]
-
-
-def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
-    """The controller of one table of the scene, acting with those `beside`.
-
-    Raises `InputError` where it does not fit the robot.
-    """
-    if isinstance(record, JointPid):
-        return joint_pid(record, setup, joint_mobility(setup))
-    if isinstance(record, ModalVelocity):
-        return modal_velocity(record, setup)
-    if isinstance(record, StateFeedback):
-        return state_feedback(record, setup)
-    if isinstance(record, ComputedTorque):
-        return ComputedTorqueControl(record, setup, setup.robot.rigid())
-    if isinstance(record, Lqr):
-        from .lqr import LqrControl
-
-        return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
-    label = f"{setup.robot.path}: controller: {record.python}"
-    folder = setup.robot.path.parent
-    function = load_function(record.python, folder) if isinstance(record.python, str) else record.python
-    return PythonControl(function, setup, label)
-
-
-def joint_mobility(setup: Setup) -> Array:
-    """(motors,) acceleration of each joint per moment on it at the start, links rigid, the other joints free."""
-    rest = np.zeros(len(setup.robot.motors))
-    if not setup.robot.motors_fit:
-        return rest
-    arm = setup.robot.rigid()
-    M, _ = arm.terms(arm.angles(), rest)
-    return np.diag(np.linalg.inv(M))
 
 
 class ClosedLoop(SampledAnalysis):
@@ -230,7 +76,12 @@ class ClosedLoop(SampledAnalysis):
         plant = with_compliance(without_paths(context.model))
         moved, robot, whole = with_motor_coordinates(source, plant), _robot(context, source), context.whole
         own = [s for sensor in self.sensor for s in make_signals(plant, context, sensor, whole)]
-        more = [s for sensor in self._ideal(robot) for s in make_signals(plant, context, sensor, whole)]
+        needed = (
+            needed_sensors(robot, self.controller)
+            if self.observer is None
+            else estimated_sensors(robot, self.controller, self.tip or default_tip(robot.model))
+        )
+        more = [s for sensor in needed for s in make_signals(plant, context, sensor, whole)]
         read, estimated = (merged(own, more), ()) if self.observer is None else (tuple(own), merged(more, ()))
         sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
         outputs, tip = replay_times(source, self), place_of(whole, self.tip) or default_tip(plant)
@@ -303,12 +154,6 @@ class ClosedLoop(SampledAnalysis):
             return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
-
-    def _ideal(self, robot: Robot) -> Iterator[Sensor]:
-        """What controllers need; what an observer estimates."""
-        if self.observer is None:
-            return needed_sensors(robot, self.controller)
-        return estimated_sensors(robot, self.controller, self.tip or default_tip(robot.model))
 
 
 def _resolved(source: Outcome) -> Outcome:
@@ -453,11 +298,3 @@ def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str)
 
 def _position(model: Model, q: Array, point: str) -> Array:
     return model.tree.places(q).at(model.tree.section(point)).r
-
-
-def default_tip(model: Model) -> str:
-    """The tool of the scene, or the tip of the last link."""
-    if (tool := model.scene.tool_point) is not None:
-        return tool
-    body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
-    return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"

@@ -1,4 +1,4 @@
-"""Controllers: their protocol, joint PID, modal velocity feedback, computed torque, functions of Python.
+"""Controllers: their protocol and choice, joint PID, modal velocity, computed torque, functions of Python.
 
 A user's own controller: a function in a Python file that is given the setup and returns what is asked at samples.
 
@@ -25,16 +25,16 @@ from typing import Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError, quoted
 from ...common.python_files import count_failed, count_imports, imported_files
 from ...common.structs import struct
 from ...mbs.model.model import Model
 from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
-from .records import ComputedTorque, JointPid, ModalVelocity, StateFeedback
+from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
+from .records import Controller as Record
 from .robot import RigidArm, Robot, estimate
-from .signals import Filter, Signal
 
 
 class Controller(Protocol):
@@ -264,46 +264,39 @@ def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[i
     return found[name]
 
 
-class Loop:
-    """What the core asks at every sample: errors of sensors, controllers, limits."""
+def make_controllers(records: Sequence[Record], setup: Setup) -> list[Controller]:
+    """All controllers of an analysis."""
+    return [make_controller(record, setup, records) for record in records]
 
-    def __init__(
-        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], range: Array, seed: int
-    ) -> None:
-        samples, T = (len(setup.times), len(read)), setup.sample_time
-        noise = np.array([signal.sensor.deviation(T) for signal in read])
-        self._errors = np.array([signal.sensor.bias for signal in read]) + np.zeros(samples)
-        if noise.any():
-            self._errors += np.random.default_rng(seed).standard_normal(samples) * noise
-        resolution = np.array([signal.sensor.resolution for signal in read])
-        self._coarse = np.flatnonzero(resolution)
-        self._resolution = resolution[self._coarse]
-        self._largest = np.array([signal.sensor.range or np.inf for signal in read])
-        self._every = np.array([round((signal.sensor.sample_time or T) / T) for signal in read])
-        self._filter = Filter(read, T)
-        self._controllers, self._range, self._feed_forward = controllers, range, setup.feed_forward
-        self.blur = resolution + noise  # (outputs,)
-        self.readings = np.zeros(samples)
-        self.commands, self.wanted = np.zeros_like(setup.feed_forward), np.zeros_like(setup.feed_forward)
-        self.first: Array = np.clip(setup.feed_forward[0], *range)
-        self.taken = 0
 
-    @property
-    def at_limits(self) -> Booleans:
-        """(K, inputs) at the samples taken, also where a controller has cut its commands itself."""
-        lowest, highest = self._range * (1.0 - 1e-9)
-        return (self.commands[: self.taken] <= lowest) | (self.commands[: self.taken] >= highest)
+def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
+    """The controller of one table of the scene, acting with those `beside`.
 
-    def __call__(self, k: int, _t: float, y: Array) -> Array:
-        """Commands at sample k for what the sensors are exposed to."""
-        y = np.minimum(np.maximum(self._filter(y) + self._errors[k], -self._largest), self._largest)
-        if self._coarse.size:
-            y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
-        if k and self._every.max(initial=1) > 1:
-            y = np.where(k % self._every == 0, y, self.readings[k - 1])
-        wanted = self._feed_forward[k].copy()
-        for controller in self._controllers:
-            wanted += controller(k, y)
-        command: Array = np.minimum(np.maximum(wanted, self._range[0]), self._range[1])
-        self.readings[k], self.wanted[k], self.commands[k], self.taken = y, wanted, command, k + 1
-        return command
+    Raises `InputError` where it does not fit the robot.
+    """
+    if isinstance(record, JointPid):
+        return joint_pid(record, setup, joint_mobility(setup))
+    if isinstance(record, ModalVelocity):
+        return modal_velocity(record, setup)
+    if isinstance(record, StateFeedback):
+        return state_feedback(record, setup)
+    if isinstance(record, ComputedTorque):
+        return ComputedTorqueControl(record, setup, setup.robot.rigid())
+    if isinstance(record, Lqr):
+        from .lqr import LqrControl
+
+        return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
+    label = f"{setup.robot.path}: controller: {record.python}"
+    folder = setup.robot.path.parent
+    function = load_function(record.python, folder) if isinstance(record.python, str) else record.python
+    return PythonControl(function, setup, label)
+
+
+def joint_mobility(setup: Setup) -> Array:
+    """(motors,) acceleration of each joint per moment on it at the start, links rigid, the other joints free."""
+    rest = np.zeros(len(setup.robot.motors))
+    if not setup.robot.motors_fit:
+        return rest
+    arm = setup.robot.rigid()
+    M, _ = arm.terms(arm.angles(), rest)
+    return np.diag(np.linalg.inv(M))

@@ -6,19 +6,116 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray
+from ...common.arrays import Array, Booleans, ComplexArray
 from ...common.peaks import largest
 from ...common.structs import struct
+from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.run.outcome import Details
 from ...mbs.run.samples import in_order
-from .amplified_loop import AmplifiedLoop
-from .controllers import Controller, Loop, Setup
+from .controllers import Controller, Setup
 from .margins import Feedback, Loops, Margins, advice, loop_eigenvalues, margins
 from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched
 from .observer import Estimates
 from .records import ComputedTorque, JointPid, SampledAnalysis
+from .signals import Filter, Signal
 
+OF_LAG = 2  # steps of the shortest time constant of an amplifier
+OF_RATES = 4  # steps of a sample, at least, where amplifiers limit rates or currents
+MOST = 20  # steps of a sample
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
+
+
+class Loop:
+    """What the core asks at every sample: errors of sensors, controllers, limits."""
+
+    def __init__(
+        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], range: Array, seed: int
+    ) -> None:
+        samples, T = (len(setup.times), len(read)), setup.sample_time
+        noise = np.array([signal.sensor.deviation(T) for signal in read])
+        self._errors = np.array([signal.sensor.bias for signal in read]) + np.zeros(samples)
+        if noise.any():
+            self._errors += np.random.default_rng(seed).standard_normal(samples) * noise
+        resolution = np.array([signal.sensor.resolution for signal in read])
+        self._coarse = np.flatnonzero(resolution)
+        self._resolution = resolution[self._coarse]
+        self._largest = np.array([signal.sensor.range or np.inf for signal in read])
+        self._every = np.array([round((signal.sensor.sample_time or T) / T) for signal in read])
+        self._filter = Filter(read, T)
+        self._controllers, self._range, self._feed_forward = controllers, range, setup.feed_forward
+        self.blur = resolution + noise  # (outputs,)
+        self.readings = np.zeros(samples)
+        self.commands, self.wanted = np.zeros_like(setup.feed_forward), np.zeros_like(setup.feed_forward)
+        self.first: Array = np.clip(setup.feed_forward[0], *range)
+        self.taken = 0
+
+    @property
+    def at_limits(self) -> Booleans:
+        """(K, inputs) at the samples taken, also where a controller has cut its commands itself."""
+        lowest, highest = self._range * (1.0 - 1e-9)
+        return (self.commands[: self.taken] <= lowest) | (self.commands[: self.taken] >= highest)
+
+    def __call__(self, k: int, _t: float, y: Array) -> Array:
+        """Commands at sample k for what the sensors are exposed to."""
+        y = np.minimum(np.maximum(self._filter(y) + self._errors[k], -self._largest), self._largest)
+        if self._coarse.size:
+            y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
+        if k and self._every.max(initial=1) > 1:
+            y = np.where(k % self._every == 0, y, self.readings[k - 1])
+        wanted = self._feed_forward[k].copy()
+        for controller in self._controllers:
+            wanted += controller(k, y)
+        command: Array = np.minimum(np.maximum(wanted, self._range[0]), self._range[1])
+        self.readings[k], self.wanted[k], self.commands[k], self.taken = y, wanted, command, k + 1
+        return command
+
+
+class AmplifiedLoop:
+    """What the core asks at every step where amplifiers act: commands of motors, and means of the voltages that arrive.
+
+    `directions` (k, n_v): current of the strain of each patch by v, A; `splits` part q, v, a of a state.
+    """
+
+    def __init__(
+        self,
+        loop: Loop,
+        at_sample: Callable[[int, float, Array], Array],
+        samples: Array,
+        T: float,
+        amplifiers: Amplifiers,
+        directions: Array,
+        splits: tuple[int, int],
+    ) -> None:
+        lag = amplifiers.lag[amplifiers.lag > 0.0].min(initial=np.inf)
+        self._parts = int(np.clip(np.ceil(OF_LAG * T / lag), OF_RATES if amplifiers.has_rates else 1, MOST))
+        self._loop, self._at_sample, self._samples, self._amplifiers = loop, at_sample, samples, amplifiers
+        self._directions, self._v, self._h = directions, slice(*splits), T / self._parts
+        self.times: Array = (samples[:, None] + self._h * np.arange(self._parts)).ravel()
+        self.first, self.taken = loop.first, 0
+        self.commands = np.zeros((len(self.times), len(self.first)))
+        self._now = self.first[len(self.first) - len(directions) :]
+
+    def __call__(self, k: int, t: float, state: Array) -> Array:
+        """Commands in step k."""
+        if k % self._parts == 0:
+            self._at_sample(k // self._parts, t, state)
+        loop, motors = self._loop, len(self.first) - len(self._now)
+        last = loop.commands[loop.taken - 1]
+        wanted = np.array([self._wanted(t, motors + j, d) for j, d in enumerate(self._amplifiers.delay)])
+        self._now, mean = self._amplifiers.advance(
+            self._h, self._now, (wanted, wanted), self._directions @ state[self._v]
+        )
+        command: Array = np.concatenate([last[:motors], mean])
+        self.commands[k], self.taken = command, k + 1
+        return command
+
+    def _wanted(self, t: float, column: int, delay: float) -> float:
+        """Mean over a step from `t` (s) on of a command that acts `delay` (s) after its sample, once it changes."""
+        loop, h = self._loop, self._h
+        k = int(np.searchsorted(self._samples[: loop.taken], t + h * (1.0 - 1e-9) - delay, side="right"))
+        known = [loop.first[column], *loop.commands[max(k - 2, 0) : k, column]]
+        late = 0.0 if k == 0 else float(np.clip((self._samples[k - 1] + delay - t) / h, 0.0, 1.0))
+        return float((1.0 - late) * known[-1] + (late * known[-2] if late else 0.0))
 
 
 @struct

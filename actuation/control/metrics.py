@@ -20,7 +20,8 @@ from ...common.peaks import largest, root_mean_square, shares
 from ...common.structs import struct
 
 if TYPE_CHECKING:  # metrics are read from files, too, by what does not control
-    from .controllers import Loop, Setup
+    from .controllers import Setup
+    from .loop import Loop
 
 SETTLED = 0.05  # of the largest error
 PERIODS = 3.0  # of the lowest frequency, over which what is slower is found

@@ -18,11 +18,14 @@ import numpy as np
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError, SolveError, quoted
 from ...common.structs import struct
-from .controllers import Controller, Setup
-from .linear_model import LinearModel, observability, riccati, sampled, zero_order_hold
+from ...mbs.model.gears import with_compliance
+from ..context import ActuatedContext
+from .controllers import Controller, LinearFeedback, Setup, make_controllers
+from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
 from .margins import Feedback
-from .records import GainsObserver, KalmanRecord
-from .signals import Signal, filters
+from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis
+from .robot import default_tip, estimated_sensors
+from .signals import Sensing, Signal, filters, make_signals, merged
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
 HIDDEN = 1e-7  # of the largest singular value
@@ -306,3 +309,64 @@ def unseen(model: LinearModel, read: Sequence[Signal]) -> list[str]:
     """In words, modes of the model that sensors cannot see."""
     lost = observability(model, [signal.name for signal in read]).lost
     return [f"observer: sensors cannot see {', '.join(lost)}"] if lost else []
+
+
+def make_observed(
+    analysis: SampledAnalysis, context: ActuatedContext, setup: Setup, reference: Array, ranges: Array, nominal: Array
+) -> Observed:
+    """The observer with the controllers that act on its estimates.
+
+    `reference` (K, estimates) as of `Setup`, `ranges` and `nominal` as of `Observed`. Raises `InputError` where the
+    observer does not fit the robot.
+    """
+    record, robot, T = analysis.observer, setup.robot, setup.sample_time
+    tip, origin = analysis.tip or default_tip(robot.model), setup.reference
+    warnings: list[str] = []
+    try:
+        if isinstance(record, KalmanRecord):
+            plant = with_compliance(robot.model)
+            read, more = (
+                [s for sensor in sensors for s in make_signals(plant, context, sensor)]
+                for sensors in (analysis.sensor, estimated_sensors(robot, analysis.controller, tip))
+            )
+            whole = merged(more, ())
+            names = [signal.name for signal in whole]
+            source, found = setup.source, []
+            at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
+            instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
+            pushed = (name.split("/") for name in (*record.process, *record.disturbance))
+            points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
+            for row in instants:
+                mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
+                rows = zip(*Sensing(plant, (*read, *whole)).rows(mechanism), strict=True)
+                readings = dict(zip([s.name for s in (*read, *whole)], rows, strict=True))
+                model = state_space(mechanism, voltages, readings)
+                found.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
+                warnings += unseen(model, read)
+            schedule = Schedule(source.time[instants], tuple(found))
+        else:
+            assert isinstance(record, GainsObserver)
+            one = given(record, setup)
+            schedule = Schedule(np.zeros(1), (one,))
+            if record.about == "zero":
+                origin, nominal = np.zeros_like(origin), np.zeros_like(nominal)
+            reference = origin[:, setup.columns(*record.outputs)]
+        if (radius := schedule.radius) >= 1.0:
+            raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")
+    except InputError as error:
+        raise InputError(f"{robot.path}: observer: {error}") from None
+    every = schedule.observers[0].estimates
+    still = np.zeros((len(reference), len(every) - reference.shape[1]))
+    inner = replace(
+        setup,
+        outputs=(*setup.outputs, *(f"estimate/{name}" for name in every)),
+        reference=np.hstack([setup.reference, reference, still]),
+    )
+    acting = make_controllers(analysis.controller, inner)
+    if isinstance(record, KalmanRecord) and record.reject:
+        own = [name for name in record.disturbance if name in setup.inputs]
+        P = np.zeros((len(inner.inputs), len(inner.outputs)))
+        P[inner.places(*own), inner.columns(*(f"estimate/disturbance/{name}" for name in own))] = 1.0
+        acting.append(LinearFeedback(inner, P))
+    seen_badly = list(dict.fromkeys(warnings))
+    return Observed(schedule, inner, acting, ranges, (origin, nominal), record.settle, tip, seen_badly)

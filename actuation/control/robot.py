@@ -1,8 +1,8 @@
-"""What controllers ask of a robot: names, links, patches, linear and rigid models."""
+"""What controllers ask of a robot: names, sensors, links, patches, linear and rigid models."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,7 @@ from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
+from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController, Sensor
 from .signals import check_joint, volts_on_file
 
 
@@ -227,3 +228,50 @@ def input_names(robot: Robot) -> tuple[str, ...]:
 def estimate(volts: Array, count: int) -> Array:
     """(count, k) of coordinates from what patches read of them, volts (k, m): as many as patches distinguish."""
     return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])
+
+
+def needed_sensors(robot: Robot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
+    """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
+    for record in controllers:
+        if isinstance(record, JointPid):
+            for joint in record.joints:
+                yield Sensor.model_validate({record.side: joint})
+                if joint in record.derivative and record.rate == "measured":
+                    yield Sensor.model_validate({record.side: joint, "measure": "rate"})
+        elif not isinstance(record, PythonController | ModalVelocity):
+            for joint in robot.motor_joints:
+                yield Sensor(joint=joint)
+                yield Sensor(joint=joint, measure="rate")
+        if isinstance(record, Lqr):
+            for joint in robot.elastic_joints:
+                yield Sensor(motor=joint)
+                yield Sensor(motor=joint, measure="rate")
+        if isinstance(record, ModalVelocity | Lqr):
+            bending = robot.patches if record.sensor == "pzt" else robot.links
+            bodies = record.bodies if isinstance(record, ModalVelocity) else tuple(bending)
+            for body in bodies:
+                if record.sensor == "pzt":
+                    yield from (Sensor(pzt=layout) for layout in robot.patches[body].layouts)
+                else:
+                    yield Sensor(modal=body)
+                    yield Sensor(modal=body, measure="rate")
+
+
+def estimated_sensors(robot: Robot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
+    """Ideal ones of what an observer estimates: the tip, all coordinates and rates, and what `controllers` need."""
+    model = robot.model
+    subjects = [{"joint": one.name} for one in model.scene.joint if one.units and one.name in model.tree.carried]
+    subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]
+    yield Sensor(point=tip)
+    for subject in subjects:
+        yield Sensor.model_validate(subject)
+        yield Sensor.model_validate(subject | {"measure": "rate"})
+    yield from needed_sensors(robot, controllers)
+
+
+def default_tip(model: Model) -> str:
+    """The tool of the scene, or the tip of the last link."""
+    if (tool := model.scene.tool_point) is not None:
+        return tool
+    body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
+    return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..actuation.control.linear import LinearModels
-from ..actuation.control.loop_record import LoopRecord
+from ..actuation.control.loop import LoopRecord
 from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placement import Placed
 from ..common.arrays import Array

@@ -16,7 +16,7 @@ from ..common.meanings import names_of, write_record
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
     from ..actuation.control.linear_model import LinearModel, Zeros
-    from ..actuation.control.loop_record import LoopRecord
+    from ..actuation.control.loop import LoopRecord
     from ..actuation.control.metrics import Metrics
     from ..actuation.control.observer import Estimates
     from ..mbs.analysis.operating_points import RobotAtRest

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..actuation.context import ActuatedContext
-from ..actuation.control.closed_loop import ClosedLoop, default_tip
+from ..actuation.control.closed_loop import ClosedLoop
 from ..actuation.control.records import JointPid, Sensor
-from ..actuation.control.robot import Robot
+from ..actuation.control.robot import Robot, default_tip
 from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
 from ..common.structs import struct
