@@ -21,8 +21,7 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers, joined
 from ...mbs.model.body import Body
 from ...mbs.model.divided_link import spread_of
-from .composite import Placed
-from .effects import Effects, effects
+from .composite import Effects, Placed, effects
 from .patches import (
     PatchArray,
     Reach,

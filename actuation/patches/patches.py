@@ -18,8 +18,7 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.model.body import Body
 from ...mbs.model.masses import uncoupling
-from .composite import SLIVER, Placed, stiffness_ratios
-from .effects import Effects
+from .composite import SLIVER, Effects, Placed, stiffness_ratios
 from .records import PztLayout
 
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding

@@ -98,7 +98,7 @@ def find_actuation(
     Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
     `known`: voltages (T, k) by body, V.
     """
-    from ..actuation.judgement import find_unmet, judge_actuators, links_in_motion
+    from ..actuation.feasibility import find_unmet, judge_actuators, links_in_motion
 
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
