@@ -54,7 +54,8 @@ def sweep(
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
-    from ..sweep import drop_results, forget_failures, missing_columns, plan_sweep, print_table, run_sweep, stale_rows
+    from ..sweep.runs import missing_columns
+    from ..sweep.sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
     protect(files_of(scene_file))

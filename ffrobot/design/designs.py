@@ -27,10 +27,9 @@ from ..run.inputs import changed, digest_of_file, files_of
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
-from ..sweep import Sweep, forget_failures, run_sweep
 from ..sweep.files import Variation, run_files
 from ..sweep.runs import RESULTS, Row, Workers
-from ..sweep.sweep import Key, check_point, claim_folder
+from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, run_sweep
 from .readings import Followed, Goal, Reading
 
 OUTPUTS = 1000  # at least, where goals are peaks or means over time: they do not depend on those of the scene
