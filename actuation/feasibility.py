@@ -81,7 +81,7 @@ def quasi_static_shift(motion: RobotMotion, modal: Mapping[str, Array], points: 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
     twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
     """
-    shift = _held(motion, modal).shift
+    shift, _ = _held(motion, modal)
     places = motion.model.tree.places(motion.q, shift)
     return {point: places.at(motion.model.tree.section(point)).velocity for point in points}
 
@@ -120,15 +120,11 @@ def seen_at_points(
     )
 
 
-class _Held(NamedTuple):
-    """δq (T, n_v) by −K⁻¹ r of modes where motors stand still, and R = ∂q/∂γ (T, n_v, motors) where they turn by γ."""
+def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> tuple[Array, Array]:
+    """δq (T, n_v) by −K⁻¹ r of modes where motors stand still, and R = ∂q/∂γ (T, n_v, motors) where they turn by γ.
 
-    shift: Array
-    R: Array
-
-
-def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> _Held:
-    """By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own."""
+    By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own.
+    """
     tree, q = motion.model.tree, motion.q[rows]
     joints = np.flatnonzero(tree.joint_columns)
     T, count = len(q), len(joints)
@@ -140,7 +136,7 @@ def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: Indices | slice
         shift[:, node.p_v] = -(r[rows] @ node.body.modal_transform) / node.body.stiffness
     shift[:, joints] = np.einsum("tjn,tn->tj", split.left.reshape(T, count, tree.n_v), shift)
     R[:, joints] = moments.reshape(T, count, moments.shape[1])
-    return _Held(shift, R)
+    return shift, R
 
 
 def _length(value: float) -> str:

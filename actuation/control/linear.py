@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, groupby
 from typing import Literal
 
 from ...common.arrays import Array
@@ -64,7 +64,10 @@ def _analyse(models: tuple[LinearModel, ...]) -> LinearModels:
         tuple(robot_modes(model) for model in models),
         tuple(controllability(model, acting) for model in models),
         tuple(observability(model, seen) for model in models),
-        {pair: tuple(zeros(model, *_split(pair)) for model in models) for pair in _pairs(first)},
+        {
+            pair: tuple(zeros(model, pair[: len(pair) // 2], pair[len(pair) // 2 :]) for model in models)
+            for pair in _pairs(first)
+        },
         unhurried_gains(models),
     )
 
@@ -78,22 +81,9 @@ def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
     single = next((pairs for pairs in (single, own) if len(pairs) * model.freedom**3 <= MOST_WORK), [])
     together = [(*motors, *motors)] if len(motors) > 1 else []
     if len(motors) > 1:
-        for of_point in _by_point(places).values():
+        for _, of_point in groupby(places, key=lambda place: place.rpartition("/")[0]):
             together += [(*motors, *chosen) for chosen in combinations(of_point, len(motors))]
     return [*single, *together]
-
-
-def _by_point(places: Sequence[str]) -> dict[str, list[str]]:
-    """The coordinates "point/BODY.POINT/x" of each point."""
-    found: dict[str, list[str]] = {}
-    for place in places:
-        found.setdefault(place.rpartition("/")[0], []).append(place)
-    return found
-
-
-def _split(pair: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    half = len(pair) // 2
-    return pair[:half], pair[half:]
 
 
 class Linear(InstantAnalysis):

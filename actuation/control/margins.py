@@ -266,7 +266,7 @@ def suggested_gains(
     omega = 2 * np.pi * min(FRACTION * lowest, 1 / (SAMPLES * T))
     names = [models[0].input_names[k].removeprefix("joint/") for k in _motor_inputs(models[0])]
     for _ in range(MOST_TIMES):
-        P, D = ({n: _two_digits(v) for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
+        P, D = ({n: float(f"{v:.2g}") for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
         record = JointPid(kind="joint-pid", proportional=P, derivative=D, side=side)
         twice = joint_gains(models[0], [record], T).times(SPARE)
         if all(spectral_radius(model, g, T, delay) <= STABLE for model in models for g in (twice, twice.times(0.5))):
@@ -344,7 +344,3 @@ def advice(loops: Loops, records: Sequence[JointPid], T: float, delay: float, fo
             "no joint PD gains are stable at this sample_time and delay: damping of the links, or faster sampling"
         )
     return texts
-
-
-def _two_digits(value: float) -> float:
-    return float(f"{value:.2g}")

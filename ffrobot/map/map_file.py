@@ -79,8 +79,6 @@ def _columns(found: PoseMap, name: str, values: Array) -> dict[str, Array]:
 
 
 CONDITIONS = {"compliant": "compliant gears", "locked": "joints locked"}
-
-
 ROUND_OFF = 1e-13  # of the reach: smaller deflections are round-off, of its power a smaller manipulability
 CONSTANT = 1e-9  # of the largest value: differences of less are round-off
 
@@ -133,11 +131,8 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
         table["torque"] = Quantity("largest static torque (N·m)", _largest(np.abs(values["torque"])), False)
     manipulability = _beyond(ROUND_OFF * reach ** values["place"].shape[1], values["manipulability"])
     table["manipulability"] = Quantity("manipulability", manipulability, True)
-    return {name: one._replace(values=_beyond(CONSTANT * _size(one.values), one.values)) for name, one in table.items()}
-
-
-def _size(values: Array) -> float:
-    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    size = {name: float(np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0)) for name, one in table.items()}
+    return {name: one._replace(values=_beyond(CONSTANT * size[name], one.values)) for name, one in table.items()}
 
 
 def _beyond(round_off: float, values: Array) -> Array:

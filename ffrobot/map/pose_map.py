@@ -8,7 +8,7 @@ import json
 import math
 import os
 import signal
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass
@@ -174,7 +174,12 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
             f"{plan.scene}: joint: expected motors that keep the poses of a map, found none: joints of kinematic loops"
             " have them with motor = true alone"
         )
-    _check_point(solution, plan.point)
+    known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
+    if plan.point not in known:
+        raise InputError(
+            f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{plan.point}"'
+            f"{did_you_mean(plan.point, known)}"
+        )
     watcher.stage("postures")
     request = _request(plan)
     kept = _kept_postures(plan, request)
@@ -190,17 +195,8 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     numbers = np.flatnonzero(good)
     parts = [numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART)]
     named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
-    found = dict(_judged(plan, evaluator, postures, named, processes, watcher))
+    found = _judged(plan, evaluator, postures, named, processes, watcher)
     return _assembled(plan, solution, evaluator, postures, [(part, found[name]) for name, part in named.items()])
-
-
-def _check_point(solution: Solution, point: str) -> None:
-    known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
-    if point not in known:
-        raise InputError(
-            f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{point}"'
-            f"{did_you_mean(point, known)}"
-        )
 
 
 def _judged(
@@ -210,15 +206,11 @@ def _judged(
     parts: Mapping[str, Indices],
     processes: int,
     watcher: Watcher,
-) -> Iterator[tuple[str, Mapping[str, Array]]]:
-    """By name of the part what was found, from files or by processes of their own."""
-    folder, left, done = plan.folder / PARTS, {}, 0
-    for name, part in parts.items():
-        if (found := _read(folder / f"{name}.npz")) is None:
-            left[name] = part
-        else:
-            done += 1
-            yield name, found
+) -> Mapping[str, Mapping[str, Array]]:
+    """Findings by name of the part, from files or by processes of their own."""
+    files = {name: plan.folder / PARTS / f"{name}.npz" for name in parts}
+    known = {name: found for name, file in files.items() if (found := _read(file)) is not None}
+    left = {name: part for name, part in parts.items() if name not in known}
     watcher.stage(f"{sum(map(len, left.values()))} poses")
     global _evaluator
     _evaluator = evaluator
@@ -227,13 +219,14 @@ def _judged(
         futures = {pool.submit(_judge, postures.q[part]): name for name, part in left.items()}
         try:
             for future in as_completed(futures):
-                name, done = futures[future], done + 1
-                _write(folder / f"{name}.npz", found := future.result())
-                watcher.advance(done, len(parts))
-                yield name, found
+                name, found = futures[future], future.result()
+                _write(files[name], found)
+                known[name] = found
+                watcher.advance(len(known), len(parts))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+    return known
 
 
 _evaluator: PoseEvaluator
