@@ -6,11 +6,16 @@ It is kept in the repository, so that it can be read there: `python docs/benchma
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ffrobot.bench.campaign import as_text
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+
+from bench.columns import COLUMNS
 
 INTRODUCTION = """# What was measured
 
@@ -37,7 +42,7 @@ def _section(path: Path, page: Path) -> Iterator[str]:
     yield f"{machine['processor']}, {machine['cores']} cores, {machine['compiler']}; load {record['load']:.2g}."
     if "verdict" in record:
         yield from ("", f"`{json.dumps(record['verdict'])}`")
-    headings, lines = as_text(record["rows"], record["part"])
+    headings, lines = as_text(record["rows"], COLUMNS[record["part"]])
     yield from ("", f"| {' | '.join(headings)} |", "|---" * len(headings) + "|")
     yield from (f"| {' | '.join(line)} |" for line in lines)
     yield ""

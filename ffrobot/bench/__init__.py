@@ -1,8 +1,7 @@
 """Run time against error of a scene, measured: `ffrobot bench`.
 
 measuring    one solve within a budget of time, its histories, and how far these are from a reference
-precision    a reference, and every integrator at every tolerance: the work-precision diagram
-axes         error of mesh, of the number of modes, of time integration, and of all three
+precision    a reference, every integrator at every tolerance; error of mesh, modes and time integration
 campaign     what runs in which order, what is written and printed
 """
 

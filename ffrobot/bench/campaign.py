@@ -32,17 +32,11 @@ from .precision import INTEGRATORS, TIGHTER, Point, Reference, Row, find_referen
 FORMAT, FORMAT_VERSION = "ffrobot-bench", 1
 
 ERRORS = tuple(f"error_{kind}" for kind in KINDS)
-# What is shown of the rows of a part.
-COLUMNS = {
+COLUMNS: Mapping[str, Sequence[str]] = {
     "work-precision": ("integrator", "ran", "tolerance", "status", "seconds_min", "steps", *ERRORS),
     "axes": ("axis", "elements", "modes", "tolerance", "status", "against", "seconds", *ERRORS),
-    "growth": ("with", "size", "seconds_min", "order"),
-    "evaluations": ("what", "seconds_min", "seconds", "aim", "of_hand_written", "of_hand_written_median"),
-    "aims": ("what", "run", "status", "integrator", "tolerance", "ratio", "ratio_median", "aim", "accurate"),
-    "replays": ("scene", "what", "integrator", "tolerance", "seconds", "of_pcid", "of_pcid_median", "steps",
-                "steps_of_pcid", "off"),
-    "peer": ("step", "gravity", "status", "seconds", "error_force", "error_displacement", "error_force_at_start"),
-}  # fmt: skip
+}
+"""What is shown of the rows of a part."""
 
 # The least time of repetitions is what the machine can do: what tables and figures show, and say that they do.
 HEADINGS = {"seconds_min": "least seconds"}
@@ -68,9 +62,9 @@ def _short(value: object) -> object:
     return f"{value:.5g}" if isinstance(value, float) else value
 
 
-def as_text(rows: Sequence[Row], part: str) -> tuple[list[str], list[list[str]]]:
-    """Headings and cells of what is shown of a part; columns that are empty in all rows are left out."""
-    shown = [column for column in COLUMNS[part] if any(row.get(column) is not None for row in rows)]
+def as_text(rows: Sequence[Row], columns: Sequence[str]) -> tuple[list[str], list[list[str]]]:
+    """Headings and cells of `columns`; those that are empty in all rows are left out."""
+    shown = [column for column in columns if any(row.get(column) is not None for row in rows)]
     headings = [HEADINGS.get(column, column.removeprefix("error_").replace("_", " ")) for column in shown]
     values = ([row.get(column) for column in shown] for row in rows)
     cells = [["" if v is None else f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in values]
@@ -144,6 +138,8 @@ class Settings:
 class Campaign:
     """Measures, writes below `folder` and prints to `console`."""
 
+    columns = COLUMNS
+
     def __init__(self, folder: Path, settings: Settings, display: Watcher, console: Console) -> None:
         check_folder(folder)
         self.folder, self.settings, self.display, self.console = folder, settings, display, console
@@ -173,7 +169,7 @@ class Campaign:
         rows = [point.row() for point in points]
         about = {"inputs": inputs_of(scene, reference.bodies), "analysis": name, "reference": reference.about()}
         self.keep("work-precision", rows, about, folder, f"{scene.name}, {name}: {reference.in_words}")
-        self.drawn(draw_work_precision(rows, (), scene.name, folder))
+        self.drawn(draw_work_precision(grouped(rows, "integrator"), scene.name, folder))
         return reference, points
 
     def keep(self, part: str, rows: Sequence[Row], about: Mapping[str, object], folder: Path, title: str) -> None:
@@ -182,7 +178,7 @@ class Campaign:
         inputs = _content_hash(repr((settings, about.get("inputs"))))
         record = {"machine": self.machine, "load": load(), "settings": settings, "inputs_hash": inputs, "title": title}
         self.drawn(write_record(folder, part, rows, record | dict(about)))
-        columns, lines = as_text(rows, part)
+        columns, lines = as_text(rows, self.columns[part])
         self.console.print(title, soft_wrap=True)
         print_table(self.console, columns, lines)
 
@@ -206,15 +202,12 @@ TIME = "seconds_min"
 MOST_TICKS = 6  # at the points themselves
 
 
-def draw_work_precision(rows: Rows, peer: Rows, title: str, folder: Path) -> list[Path]:
-    """Run time against error, a figure for each kind of quantity and a curve for each integrator (and the peer)."""
+def draw_work_precision(groups: Mapping[str, Rows], title: str, folder: Path) -> list[Path]:
+    """Run time against error, a figure for each kind of quantity and a curve for each group of rows."""
     written: list[Path] = []
     time, error = "least run time (s)", "error / peak"
     for kind in KINDS:
-        key = f"error_{kind}"
-        curves = {name: points_of(rows, "integrator", name, TIME, key) for name in names(rows, "integrator")}
-        for gravity in names(peer, "gravity"):
-            curves[f"EXUDYN, {gravity} gravity"] = points_of(peer, "gravity", gravity, "seconds", key)
+        curves = {name: points_of(rows, TIME, f"error_{kind}") for name, rows in groups.items()}
         written += draw(curves, f"{title}: {kind}", time, error, folder, f"work_precision_{kind}")
     return written
 
@@ -222,23 +215,22 @@ def draw_work_precision(rows: Rows, peer: Rows, title: str, folder: Path) -> lis
 def _draw_axes(rows: Rows, title: str, folder: Path) -> list[Path]:
     written: list[Path] = []
     for axis in ("mesh", "modes"):
-        along = [row for row in rows if row["axis"] == axis]
-        curves = {kind: points_of(along, "axis", axis, "times", f"error_{kind}") for kind in KINDS}
+        along = grouped(rows, "axis").get(axis, ())
+        curves = {kind: points_of(along, "times", f"error_{kind}") for kind in KINDS}
         label = "times the elements of the links" if axis == "mesh" else "times the modes of the links"
         written += draw(curves, f"{title}: {axis}", label, "error / peak", folder, f"error_{axis}")
     return written
 
 
-def names(rows: Rows, column: str) -> list[str]:
-    """Values of a column, each once."""
-    return list(dict.fromkeys(row[column] for row in rows))
+def grouped(rows: Rows, column: str) -> dict[str, Rows]:
+    """Rows by the values of a column."""
+    return {name: [row for row in rows if row[column] == name] for name in dict.fromkeys(row[column] for row in rows)}
 
 
-def points_of(rows: Rows, column: str, name: str, x: str, y: str) -> tuple[list[float], list[float]]:
-    """Values of x and y of the rows called `name` that have both."""
-    pairs = [(row.get(x), row.get(y)) for row in rows if row[column] == name]
-    found = [(float(a), float(b)) for a, b in pairs if a and b]
-    return [a for a, _ in found], [b for _, b in found]
+def points_of(rows: Rows, x: str, y: str) -> tuple[list[float], list[float]]:
+    """Values of x and y of the rows that have both."""
+    pairs = [(float(row[x]), float(row[y])) for row in rows if row.get(x) and row.get(y)]
+    return [a for a, _ in pairs], [b for _, b in pairs]
 
 
 def draw(curves: Curves, title: str, x_label: str, y_label: str, folder: Path, name: str) -> list[Path]:

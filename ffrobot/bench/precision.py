@@ -167,16 +167,6 @@ def at(scene: Scene, name: str, integrator: str, tolerance: float) -> Scene:
     return with_analysis(scene, name, integrator=integrator, tolerance=tolerance)
 
 
-def fastest(points: Sequence[Point], largest: Mapping[str, float]) -> Point | None:
-    """The fastest completed point whose errors are at most `largest`, by kind; None where no point is that good."""
-    good = [
-        point
-        for point in points
-        if point.first.completed and all(point.error.get(kind, 0.0) <= bound for kind, bound in largest.items())
-    ]
-    return min(good, key=lambda point: median(point.seconds), default=None)
-
-
 Keys = dict[str, Any]
 
 # Patches that fit the modes of the scene need not fit others; where they do, this changes nothing.

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median
 
 from ffrobot.bench.measuring import KINDS
-from ffrobot.bench.precision import Point, Row, fastest, find_reference, measure_points, repeat_point
+from ffrobot.bench.precision import Point, Row, find_reference, measure_points, repeat_point
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
@@ -26,6 +26,16 @@ EVALUATIONS, ROUNDS = 2_000, 30  # a millisecond in one go: many of them are und
 NAME, OUTPUT_STEP = "inverse", 0.01
 _SHARE = "1 + (cos(pi/4) - 1)*(10*t**3 - 15*t**4 + 6*t**5)"  # of the way: the ends of the paper's path, at rest there
 QUINTIC = {"x": f"1.5*({_SHARE})", "y": f"sqrt(3)/2*({_SHARE})"}
+
+
+def fastest(points: Sequence[Point], largest: Mapping[str, float]) -> Point | None:
+    """The fastest completed point whose errors are at most `largest`, by kind; None where no point is that good."""
+    good = [
+        point
+        for point in points
+        if point.first.completed and all(point.error.get(kind, 0.0) <= bound for kind, bound in largest.items())
+    ]
+    return min(good, key=lambda point: median(point.seconds), default=None)
 
 
 @dataclass(frozen=True)

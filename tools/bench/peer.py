@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from ffrobot.bench.measuring import relative
-from ffrobot.bench.precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
+from ffrobot.bench.precision import PATIENCE, Point, Reference, Row, repeat_point
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.scene import Scene
+
+from .aims import fastest
 
 SCRIPT = Path("tools/bench/peers/exudyn_two_link.py")
 NAME = "EXUDYN generalized-alpha"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ffrobot.bench import OF_A_SCENE
-from ffrobot.bench.campaign import TIME, Campaign, Rows, Swept, draw, draw_work_precision, inputs_of, names, points_of
+from ffrobot.bench.campaign import TIME, Campaign, Rows, Swept, draw, draw_work_precision, grouped, inputs_of, points_of
 from ffrobot.bench.measuring import find_analysis
 from ffrobot.common.errors import InputError
 from ffrobot.run.solve import prepare_scene
@@ -15,6 +15,7 @@ from ffrobot.scene.load import load_scene
 from ffrobot.scene.scene import Scene
 
 from .aims import measure_aims
+from .columns import COLUMNS
 from .evaluations import measure_evaluations
 from .growth import measure_growth
 from .peer import Exudyn, measure_peer
@@ -28,6 +29,8 @@ REPLAYED = ("two_link", "arm_3r")  # in the plane and in 3D
 
 class SourceTree(Campaign):
     """Measures what needs ffrobot's source tree."""
+
+    columns = COLUMNS
 
     def everything(self, repository: Path, parts: Sequence[str], peer_python: Path) -> None:
         """Those of `parts` that are told no scene, and the two cases of the paper."""
@@ -82,15 +85,17 @@ class SourceTree(Campaign):
         )
         about = {"inputs": inputs_of(scene, reference.bodies), "reference": reference.about(), "verdict": verdict}
         self.keep("peer", rows, about, folder, "EXUDYN on the same modal bodies; force without its start")
-        self.drawn(draw_work_precision([point.row() for point in points], rows, scene.name, folder))
+        of_peer = [{**row, TIME: row.get("seconds")} for row in rows]
+        curves = grouped([point.row() for point in points], "integrator")
+        curves |= {f"EXUDYN, {gravity} gravity": of for gravity, of in grouped(of_peer, "gravity").items()}
+        self.drawn(draw_work_precision(curves, scene.name, folder))
         self.console.print(f"at the peer's best error: {verdict}")
 
 
 def draw_growth(rows: Rows, folder: Path) -> list[Path]:
     """Time against size: of an evaluation with modes and links, and of a run with outputs."""
-    kinds = [kind for kind in names(rows, "with") if kind != "outputs"]
-    curves = {kind: points_of(rows, "with", kind, "size", TIME) for kind in kinds}
-    outputs = {"a run of 0.1 s": points_of(rows, "with", "outputs", "size", TIME)}
+    curves = {kind: points_of(of, "size", TIME) for kind, of in grouped(rows, "with").items()}
+    outputs = {"a run of 0.1 s": curves.pop("outputs", ([], []))}
     return [
         *draw(curves, "accelerations and multipliers", "modes, links", "least time each (s)", folder, "growth"),
         *draw(outputs, "outputs of a run", "outputs", "least run time (s)", folder, "growth_outputs"),
