@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -231,23 +231,20 @@ class Feasibility:
         return motors | {f"patches of {name}": float(np.max(of.factor)) for name, of in self.patches.items()}
 
 
-class ModalMotion(NamedTuple):
-    """Modal coordinates p and forces F_p (T, n) in the order of the modes of patches, at `time` (T,) s."""
-
-    time: Array
-    p: Array
-    F_p: Array
-
-
 def judge_patches(
-    patches: PatchArray, voltages: Voltages, motion: ModalMotion, with_count: Callable[[int], float | None] | None
+    patches: PatchArray,
+    voltages: Voltages,
+    time: Array,
+    p: Array,
+    F_p: Array,
+    with_count: Callable[[int], float | None] | None,
 ) -> PatchFeasibility:
     """Required against available of the patches of one layout.
 
+    Modal coordinates p and forces F_p (T, n) are in the order of the modes of patches, at `time` (T,), s.
     `with_count(k)` is the largest voltage (V) of k such patches, evenly spread; None where they have no room. Without
     it no other numbers of patches are tried.
     """
-    time, p, F_p = motion
     amplifiers, pace = patches.amplifiers, 1.0 / np.diff(time)[:, None]
     required, limit = worst(voltages.required, amplifiers.range)
     charge = voltages.required * amplifiers.capacitance + p @ patches.Phi_V
@@ -359,8 +356,8 @@ def judge_actuators(
         for name, array in of_link.arrays.items():
             modes = of_link.modes[name]
             trial = None if analysis.is_repeated else partial(_largest_voltage, path, motion, link, array.layout)
-            modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
-            judged[name] = judge_patches(array, voltages[name], modal, trial)
+            p, F_p = modes.coordinates(link.p), modes.forces(link.F_p)
+            judged[name] = judge_patches(array, voltages[name], motion.time, p, F_p, trial)
     missing = find_unsupplied(motion, links, patches, voltages, others)
     return Feasibility(judge_motors(motion, analysis), judged, missing)
 

@@ -166,7 +166,8 @@ def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequenc
     if setup.has_estimates:
         return tuple(lines)
     seen = _rigid_outputs(setup)
-    seen += [name for name in model.output_names if name.startswith("modal/") and _is_read(record, setup, name)]
+    bending = setup.robot.links if record.sensor == "ideal" else setup.robot.patches
+    seen += [n for n in model.output_names if n.startswith("modal/") and n.split("/")[1] in bending]
     hidden = observability(model, seen).lost
     return (*lines, *([f"LQR: unobservable: {', '.join(hidden)}"] if hidden else []))
 
@@ -174,7 +175,3 @@ def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequenc
 def _rigid_outputs(setup: Setup) -> list[str]:
     joints = [f"joint/{name}" for name in setup.robot.motors]
     return [*joints, *(f"motor/{name}" for name in setup.robot.elastic_joints)]
-
-
-def _is_read(record: Lqr, setup: Setup, name: str) -> bool:
-    return record.sensor == "ideal" or name.split("/")[1] in setup.robot.patches

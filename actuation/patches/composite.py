@@ -71,20 +71,15 @@ class GaussPoint(NamedTuple):
     station: int
 
 
-@struct
-class Composite:
-    """What k patches and their link do to each other, over the n modes of the modal body."""
+def composite(placed: Sequence[Placed], body: ModalBody) -> tuple[Array, Array]:
+    """What the k patches of all layouts and their link do to each other, over the n modes of the modal body.
 
-    stiffness: Array  # (n, n) that the patches add
-    # (k, n) modal forces per volt that the layers' own stiffness takes of those on a link held straight
-    shortfall: Array
-
-
-def composite(placed: Sequence[Placed], body: ModalBody) -> Composite:
-    """Of the patches of all layouts in their order; R is 0 where rigidities are not known."""
+    The stiffness (n, n) that patches add, and the modal forces per volt (k, n) that the layers' own stiffness takes of
+    those on a link held straight; R is 0 where rigidities are not known.
+    """
     layers = _on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
-    return Composite(0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt)
+    return 0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt
 
 
 def section_loads(placed: Placed, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
@@ -268,7 +263,7 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[Placed]) -> Bo
             masses.append(line_density * A)
             spins.append(line_density * (I + A * layout.width**2 / 12))
     stiff = [one for one in placed if one.layout.adds_stiffness]
-    added = T.T @ composite(stiff, body).stiffness @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
+    added = T.T @ composite(stiff, body)[0] @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
     return with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
 
 
@@ -301,7 +296,7 @@ def effects(key: str, placed: Sequence[Placed], body: ModalBody) -> list[Effects
     stiff = [k for k, one in enumerate(placed) if one.layout.adds_stiffness]
     if not stiff:
         return found
-    shortfall = composite([placed[k] for k in stiff], body).shortfall
+    _, shortfall = composite([placed[k] for k in stiff], body)
     ends = np.cumsum([len(placed[k].edges) for k in stiff])
     for k, lacking in zip(stiff, np.split(shortfall, ends[:-1]), strict=True):
         found[k] = found[k]._replace(Phi_V=found[k].Phi_V - lacking)

@@ -117,14 +117,6 @@ def _lever_of_rectangle(extent: float, across: float, patch_width: float) -> flo
     return surface_shear(extent, across, min(patch_width, across)) / (extent / 2)
 
 
-class LayerSection(NamedTuple):
-    """(A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis."""
-
-    A: float
-    S: float
-    I: float  # noqa: E741, second moment of area
-
-
 class LayerLoads(NamedTuple):
     """Loads of layers on a section, P = f V − C e over its strains e = (φ_z', u', φ_x', −φ_y'): C (4, 4), f (4,)."""
 
@@ -158,13 +150,16 @@ def felt_rows(layout: PztLayout) -> Indices:
     return np.array(sorted(found))
 
 
-def layer_section(layout: PztLayout, extent: float) -> LayerSection:
-    """On a link of that extent t_b (m) along their normal; those without a named face lie on one."""
+def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float]:
+    """(A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
+
+    On a link of that extent t_b (m) along their normal; those without a named face lie on one.
+    """
     w, t = layout.width, layout.layers * layout.thickness
     inner, outer = extent / 2, extent / 2 + t
     faces = 2 if layout.face == "both" else 1
     sign = 0.0 if layout.face == "both" else side(layout) or 1.0
-    return LayerSection(faces * w * t, sign * w * (outer**2 - inner**2) / 2, faces * w * (outer**3 - inner**3) / 3)
+    return faces * w * t, sign * w * (outer**2 - inner**2) / 2, faces * w * (outer**3 - inner**3) / 3
 
 
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:

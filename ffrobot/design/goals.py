@@ -227,12 +227,8 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
     raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
 
 
-def _duration(history: History) -> float:
-    return float(np.ptp(history.time))
-
-
 def _integral(history: History, by_all: bool) -> float:
-    return _mean(history, by_all) * _duration(history)
+    return _mean(history, by_all) * float(np.ptp(history.time))
 
 
 def _mean(history: History, by_all: bool) -> float:

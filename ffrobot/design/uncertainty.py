@@ -103,7 +103,8 @@ class Uncertainty(Finding):
         """Each response with what the keys do to it, then the bands."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             heading = (*self.statistics.named, "worst case")
-            yield Section(heading, [self._statistics_row(g)], line=_goal_line(goal, reading))
+            nominal = f"{goal}: {reading.in_words()} with all parameters at nominal values"
+            yield Section(heading, [self._statistics_row(g)], line=nominal)
             yield self._parts(g)
         if self.bands:
             yield Section(BAND_HEADINGS, self._band_rows())
@@ -231,10 +232,6 @@ class Uncertainty(Finding):
             high=floats(high), lowest=floats(band.statistics.lowest), highest=floats(band.statistics.highest),
             band_label=f"{NAMES[0]} to {NAMES[-1]}", worst_label=WORST[self.method],
         )  # fmt: skip
-
-
-def _goal_line(goal: str, reading: Reading) -> str:
-    return f"{goal}: {reading.in_words()} with all parameters at nominal values"
 
 
 def with_error(value: float, error: float) -> str:

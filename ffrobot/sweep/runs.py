@@ -322,15 +322,12 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
         return float(known.max())
     vector = is_vector(results, name, values)
     history = np.linalg.norm(values, axis=1) if vector else values[:, 0]
-    if values.shape[1] > 1 and not vector and (reduction == "max" or not _is_spectrum(name)):
+    is_spectrum = name.rpartition("/")[2] in PER_MODE and not OF_MODES.isdisjoint(name.split("/"))
+    if values.shape[1] > 1 and not vector and (reduction == "max" or not is_spectrum):
         history = np.abs(values).max(axis=1)
     time = results.time(dataset)
     time = time if len(time) == len(history) else np.arange(float(len(history)))  # of zeros, which have their own
     return float(REDUCTIONS[reduction](time, history))
-
-
-def _is_spectrum(name: str) -> bool:
-    return name.rpartition("/")[2] in PER_MODE and not OF_MODES.isdisjoint(name.split("/"))
 
 
 def is_vector(results: Results, name: str, values: Array) -> bool:
