@@ -58,8 +58,7 @@ class ClosedLoop(SampledAnalysis):
 
     Samples are at 0, sample_time, …; a zero-order hold applies the command of each `delay` later. Torques and voltages
     are limited as in the scene unless `unlimited`; bandwidth and delay of amplifiers act in any case, but the linear
-    model of the loop leaves them out. The initial state is that of the inverse analysis, or [initial] of
-    the scene, on the trajectories. `seed` initializes the noise. `tip` is the point whose position error is computed.
+    model of the loop leaves them out. An initial state of [initial] is on the trajectories.
 
     Sensors name patches by their layout. Joints with several coordinates have one signal per coordinate, "joint/NAME
     1", "joint/NAME 2", with the same gains.

@@ -35,10 +35,8 @@ from ...mbs.scene.loads import Load
 class Sensor(Referring):
     """A sensor of a joint coordinate, of a point, of the strain at a point, or of patch voltages.
 
-    `motor` names a joint with stiffness; the sensor measures the motor angle after its gear. `measure` is the value,
-    its rate, or (points) its acceleration in global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity,
-    in the axes of the section. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance` (F; default: that of
-    the patch itself). `modal` names a body whose modal coordinates are read directly, which no real sensor can.
+    An acceleration has global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
+    section. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
 
     A reading is filtered by `high_pass`, gets `bias` and Gaussian noise, is cut at ±`range` and rounded to
     `resolution`, kept for `sample_time`, and known `delay` later.
@@ -168,7 +166,7 @@ class ModalVelocity(ControllerRecord):
 
 
 class Lqr(ControllerRecord):
-    """u = −K x for the sampled linear model about the reference at `time`, links with their lowest `modes`.
+    """u = −K x for the sampled linear model about the reference.
 
     Weights are inverse squares of acceptable errors. With patches alone as `inputs`, a "joint-pid" controls the joints.
     States as in `ModalVelocity`.

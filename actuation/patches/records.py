@@ -138,20 +138,13 @@ class Amplifier(Record):
 class PztLayout(Record):
     """Equal piezoelectric patches along one link; several layouts on a body have names.
 
-    Lengths in m, moduli in Pa, d31 and d33 in m/V, density kg/m³, limit in V. Centers are distances along the link from
-    its root; `count` places them at (k − ½)·(length of link)/count. `thickness` is that of one of `layers`, stacked on
-    one `face` or on both, with opposite voltages. Without `face` they only bend or twist the link, as in the paper. A
-    positive voltage bends towards +y or +z (with d31 > 0), or twists by a positive angle.
-
-    `allocation = "least-squares"` accepts fewer patches than modes, and uncontrollable modes. If voltages cannot
-    produce all modal forces, `mode_weights` weigh the squares of unmet modal forces, `point_weights` the squares of the
-    resulting deflections at points of the link. `structural` lists what the patches add to their link: by default
-    stiffness, so that they bend it like a composite section; true adds mass, too; false adds nothing, as in the paper.
+    Layers on both faces have opposite voltages. A positive voltage bends towards +y or +z (with d31 > 0), or twists by
+    a positive angle. With their stiffness patches bend the link like a composite section; in the paper they add
+    nothing.
 
     Plain ceramic has one modulus and d31. Macro fiber composites have `fibre_angle`, d33 and `modulus` along the
-    fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`; a volt is a field of
-    1/`electrode_spacing`. Fibers at an angle wind around the link, that is, lie at the same angle on both faces seen
-    from outside.
+    fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`. Fibers at an angle wind around
+    the link, that is, lie at the same angle on both faces seen from outside.
     """
 
     body: str
