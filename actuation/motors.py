@@ -249,7 +249,7 @@ class JointTask(NamedTuple):
     acceleration: Array
 
 
-class Choice(NamedTuple):
+class MotorChoice(NamedTuple):
     """A motor with one of its gears on a joint: shares of its torques and speed that the task takes (1 is all).
 
     `rms`, `peak`, `speed` are of the motor, in its units.
@@ -310,7 +310,7 @@ def _numbers(text: Any) -> Any:
         return text
 
 
-def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[Choice]:
+def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoice]:
     """Every motor with each of its gears: those that fit first, of these the lightest (or smallest) first."""
     found = [choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio]
     return sorted(found, key=lambda one: (not one.fits, _size(one.motor) if one.fits else max(one.shares)))
@@ -320,10 +320,10 @@ def _size(motor: CatalogMotor) -> tuple[float, ...]:
     return (np.inf if motor.mass is None else motor.mass, motor.rated_torque, motor.peak_torque)
 
 
-def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> Choice:
+def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> MotorChoice:
     """With the ratio N: τ = J N α + L/(N η) where the load L takes power, J N α + η L/N where it returns it."""
     is_driven = task.load * task.rate >= 0.0
     through = np.where(is_driven, 1.0 / motor.efficiency, motor.efficiency)
     torque = motor.rotor_inertia * N * task.acceleration + task.load * through / N
     speed = float(np.abs(N * task.rate).max())
-    return Choice(motor, N, root_mean_square(task.time, torque), float(np.abs(torque).max()), speed)
+    return MotorChoice(motor, N, root_mean_square(task.time, torque), float(np.abs(torque).max()), speed)

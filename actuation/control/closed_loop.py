@@ -43,11 +43,11 @@ from .loop import (
     times_of_run,
 )
 from .margins import Feedback, lowest_frequency
-from .metrics import Followed, last_change, place_of_tip
+from .metrics import LoopMotion, last_change, place_of_tip
 from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
 from .records import SampledAnalysis
-from .robot import Robot, default_tip, estimated_sensors, input_names, needed_sensors
+from .robot import ControlledRobot, default_tip, estimated_sensors, input_names, needed_sensors
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged
 
 APART = 1e-6  # of a run, between two times of a spline
@@ -162,11 +162,11 @@ def _resolved(source: Outcome) -> Outcome:
     return run.at([int(k) for k in np.flatnonzero(apart)])
 
 
-def _robot(context: ActuatedContext, source: Outcome) -> Robot:
+def _robot(context: ActuatedContext, source: Outcome) -> ControlledRobot:
     """What controllers know of: whole links also where the plant has their pieces."""
     if context.whole is None:
-        return Robot(without_paths(context.model), context.patches, source)
-    return Robot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
+        return ControlledRobot(without_paths(context.model), context.patches, source)
+    return ControlledRobot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
 
 
 def loop_models(
@@ -277,7 +277,7 @@ def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: 
 
 def _followed(
     run: Outcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str, quiet: float
-) -> Followed:
+) -> LoopMotion:
     """Where the tip went against where it should be; `quiet` as there."""
     assert isinstance(run.analysis, ClosedLoop)
     model = run.model
@@ -285,7 +285,7 @@ def _followed(
     rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
     error = _position(model, run.q, tip) - place_at(run.time)
     completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
-    return Followed(run.time, error, place_at, rates, held(run.time), completed, is_disturbed, quiet)
+    return LoopMotion(run.time, error, place_at, rates, held(run.time), completed, is_disturbed, quiet)
 
 
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str) -> Callable[[Array], Array]:

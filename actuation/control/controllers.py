@@ -34,7 +34,7 @@ from ...mbs.run.outcome import Outcome
 from ..patches.link_patches import LinkPatches
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
 from .records import Controller as Record
-from .robot import RigidArm, Robot, estimate
+from .robot import ControlledRobot, RigidArm, estimate
 
 
 class Controller(Protocol):
@@ -53,7 +53,7 @@ class Controller(Protocol):
 class Setup:
     """What a controller may know when it is made."""
 
-    robot: Robot  # what is known of it; see `robot.Robot`
+    robot: ControlledRobot  # what is known of it; see there
     model: Model  # its equations of motion
     patches: Mapping[str, LinkPatches]  # by body
     # inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them

@@ -17,7 +17,16 @@ from ...mbs.model.model import Model, modal_directions
 from ...mbs.run.outcome import Details, Outcome
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
-from .linear_model import LinearModel, Reach, Zeros, controllability, observability, robot_modes, state_space, zeros
+from .linear_model import (
+    LinearModel,
+    Reachability,
+    Zeros,
+    controllability,
+    observability,
+    robot_modes,
+    state_space,
+    zeros,
+)
 from .margins import Suggestion, unhurried_gains
 
 MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some seconds
@@ -35,8 +44,8 @@ class LinearModels(Details):
 
     models: tuple[LinearModel, ...]
     modes: tuple[RobotModes, ...]
-    controllable: tuple[Reach, ...]
-    observable: tuple[Reach, ...]
+    controllable: tuple[Reachability, ...]
+    observable: tuple[Reachability, ...]
     zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
     suggested: tuple[Suggestion, float] | None = None
     conditions: tuple[Mapping[str, JointCondition], ...] = ()

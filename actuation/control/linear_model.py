@@ -298,7 +298,7 @@ def locked_frequencies(model: LinearModel) -> Array:
 
 
 @struct
-class Reach:
+class Reachability:
     """How well inputs reach, or outputs see, each mode: (f,) between 0 and 1, and names of the modes out of reach.
 
     1: a unit of the input that fits best drives nothing but this mode, in the mass metric. Modes of equal frequency are
@@ -309,13 +309,13 @@ class Reach:
     lost: tuple[str, ...]
 
 
-def controllability(model: LinearModel, inputs: Names) -> Reach:
+def controllability(model: LinearModel, inputs: Names) -> Reachability:
     """By mode, from [λ² I + λ D̂ + K̂, b̂] (Popov–Belevitch–Hautus, for second-order equations)."""
     _, _, B, _ = model.second_order
     return _reach(model, _scaled(B, model.input_names)[:, model.inputs(inputs)], left=True)
 
 
-def observability(model: LinearModel, outputs: Names) -> Reach:
+def observability(model: LinearModel, outputs: Names) -> Reachability:
     """By mode, as `controllability` with the outputs' rows, those of rates times λ."""
     f = model.freedom
     inverse = np.linalg.inv(np.linalg.cholesky(model.mass).T)
@@ -342,7 +342,7 @@ def _scaled(columns: Array, names: Sequence[str]) -> Array:
     return found
 
 
-def _reach(model: LinearModel, columns: Array, left: bool) -> Reach:
+def _reach(model: LinearModel, columns: Array, left: bool) -> Reachability:
     K, D, _, _ = model.second_order
     modes, unit = robot_modes(model), np.eye(model.freedom)
     scale = np.abs(modes.poles).max(initial=0.0) ** 2
@@ -359,7 +359,7 @@ def _reach(model: LinearModel, columns: Array, left: bool) -> Reach:
         measure[k] = np.linalg.svd(padded, compute_uv=False)[-1]
     names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(modes.frequency, 1)]
     lost = tuple(name for name, reached in zip(names, measure, strict=True) if reached < OUT_OF_REACH)
-    return Reach(measure, lost)
+    return Reachability(measure, lost)
 
 
 INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not

@@ -14,7 +14,7 @@ from ...mbs.run.outcome import Details
 from ...mbs.run.samples import in_order
 from .controllers import Controller, Setup
 from .margins import Feedback, Loops, Margins, advice, loop_eigenvalues, margins
-from .metrics import CALM, Followed, Metrics, measure, resting, ringing, watched
+from .metrics import CALM, LoopMotion, Metrics, measure, resting, ringing, watched
 from .observer import Estimates
 from .records import ComputedTorque, JointPid, SampledAnalysis
 from .signals import Filter, Signal
@@ -170,7 +170,7 @@ def held_commands(times: Array, samples: Array, delay: float, loop: Loop | Ampli
 def times_of_run(outputs: Array, place_at: Callable[[Array], Array], lowest: float) -> tuple[Array, list[int]]:
     """Times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
 
-    Beside them the rows of the outputs. `place_at` as in `Followed`.
+    Beside them the rows of the outputs. `place_at` as in `LoopMotion`.
     """
     frequency, window = ringing(*resting(place_at, outputs), lowest)
     more = watched(float(outputs[-1]), window, frequency)
@@ -183,7 +183,7 @@ def loop_record(
     setup: Setup,
     loop: Loop,
     acting: Sequence[Controller],
-    runs: tuple[Followed, Followed],
+    runs: tuple[LoopMotion, LoopMotion],
     loops: Loops,
     lowest: float,
     *,

@@ -75,7 +75,7 @@ class Metrics:
 
 
 @struct
-class Followed:
+class LoopMotion:
     """What a loop did, at the outputs of its run and between."""
 
     time: Array  # (T,) s
@@ -88,7 +88,7 @@ class Followed:
     quiet: float  # s, from which on the reference rests and loads stay
 
 
-def measure(run: Followed, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
+def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
     """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN.
 
     `is_stable`: the sampled linear loop; None where it is not known.
@@ -261,7 +261,7 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
 
 
 def _verdict(
-    run: Followed, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
+    run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
     """Of the sampled linear loop, where that is known, and of the run; `cut` (K, inputs): 1 and -1 at limits, else 0.
 

@@ -122,7 +122,7 @@ def _rigid(body: Body) -> Body:
 
 
 @struct
-class LinkModes:
+class FlexibleLink:
     """A flexible link: `mass` (kg), `length` (m), and the `stiffness` ω² (n,) (rad²/s²) of its modal coordinates p."""
 
     mass: float
@@ -131,7 +131,7 @@ class LinkModes:
 
 
 @struct
-class PatchedLink:
+class PatchSignals:
     """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first."""
 
     inputs: tuple[str, ...]  # names of their voltages, which are those of their readings
@@ -143,7 +143,7 @@ class PatchedLink:
 
 
 @struct
-class Robot:
+class ControlledRobot:
     """A robot about the motion of an inverse analysis."""
 
     model: Model  # its constraint equations are those of loops alone, its gears do not give: see `linear`
@@ -181,22 +181,22 @@ class Robot:
         return len(self.motors) == rigid_freedom(self.model)
 
     @cached_property
-    def links(self) -> Mapping[str, LinkModes]:
+    def links(self) -> Mapping[str, FlexibleLink]:
         """Flexible ones by name."""
         bodies = [node.body for node in self.model.tree.nodes if node.body.n_modes]
-        return {body.name: LinkModes(body.mass, body.length or 1.0, body.stiffness) for body in bodies}
+        return {body.name: FlexibleLink(body.mass, body.length or 1.0, body.stiffness) for body in bodies}
 
     @cached_property
-    def patches(self) -> Mapping[str, PatchedLink]:
+    def patches(self) -> Mapping[str, PatchSignals]:
         """By link, with the modes that its layouts reach together."""
         return {name: self._patched(name, of_link) for name, of_link in self.of_links.items()}
 
-    def _patched(self, name: str, of_link: LinkPatches) -> PatchedLink:
+    def _patched(self, name: str, of_link: LinkPatches) -> PatchSignals:
         reached, to_file = of_link.reached, self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
         inputs = [f"pzt/{layout}/{k}" for layout, of in of_link.arrays.items() for k in range(1, len(of.edges) + 1)]
         volts = np.vstack([volts_on_file(of_link, layout)[name] for layout in of_link.arrays])
         own = reached.coordinates(to_file.T).T
-        return PatchedLink(
+        return PatchSignals(
             tuple(inputs), tuple(of_link.arrays), np.sqrt(reached.stiffness[: reached.served]),
             voltage_gain(of_link.reach), reached.seen(volts), own,
         )  # fmt: skip
@@ -219,7 +219,7 @@ class Robot:
         return RigidArm(self.model, self.source.q[0])
 
 
-def input_names(robot: Robot) -> tuple[str, ...]:
+def input_names(robot: ControlledRobot) -> tuple[str, ...]:
     """Names of all commands: motor moments "joint/NAME", then voltages "pzt/LAYOUT/k"."""
     voltages = [name for link in robot.patches.values() for name in link.inputs]
     return tuple([f"joint/{name}" for name in robot.motors] + voltages)
@@ -230,7 +230,7 @@ def estimate(volts: Array, count: int) -> Array:
     return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])
 
 
-def needed_sensors(robot: Robot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
+def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
     """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
     for record in controllers:
         if isinstance(record, JointPid):
@@ -257,7 +257,7 @@ def needed_sensors(robot: Robot, controllers: Sequence[Controller]) -> Iterator[
                     yield Sensor(modal=body, measure="rate")
 
 
-def estimated_sensors(robot: Robot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
+def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
     """Ideal ones of what an observer estimates: the tip, all coordinates and rates, and what `controllers` need."""
     model = robot.model
     subjects = [{"joint": one.name} for one in model.scene.joint if one.units and one.name in model.tree.carried]

@@ -55,7 +55,7 @@ SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
 
-class Placed(NamedTuple):
+class PlacedLayout(NamedTuple):
     """A layout with its patches between `edges` (k, 2), m."""
 
     layout: PztLayout
@@ -71,7 +71,7 @@ class GaussPoint(NamedTuple):
     station: int
 
 
-def composite(placed: Sequence[Placed], body: ModalBody) -> tuple[Array, Array]:
+def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array]:
     """What the k patches of all layouts and their link do to each other, over the n modes of the modal body.
 
     The stiffness (n, n) that patches add, and the modal forces per volt (k, n) that the layers' own stiffness takes of
@@ -82,7 +82,7 @@ def composite(placed: Sequence[Placed], body: ModalBody) -> tuple[Array, Array]:
     return 0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt
 
 
-def section_loads(placed: Placed, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
+def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
     """P over a motion, per length of the link, of patches that bend in the plane: p (T, n), file's; voltages (T, k)."""
     layers = _on_link([placed], body)
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
@@ -108,7 +108,7 @@ class _OnLink(NamedTuple):
     straight: Array
 
 
-def _on_link(placed: Sequence[Placed], body: ModalBody) -> _OnLink:
+def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
     sections = link_sections(body)
     felt = np.unique(np.concatenate([felt_rows(layout) for layout, _ in placed]))
     intervals, covering = _intervals(placed)
@@ -130,7 +130,7 @@ def _on_link(placed: Sequence[Placed], body: ModalBody) -> _OnLink:
     return _OnLink(points, B, held[:, : B.shape[1]], held[:, B.shape[1] :], straight)
 
 
-def stiffness_ratios(placed: Placed, body: ModalBody) -> tuple[Array, Array]:
+def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
     """Of each patch (k,): ψ, and its authority; nan where the link's rigidities are not known.
 
     ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature (or twist) under a
@@ -201,7 +201,7 @@ def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> Layer
     return LayerLoads(C, f)
 
 
-def _intervals(placed: Sequence[Placed]) -> tuple[Array, list[list[tuple[PztLayout, int]]]]:
+def _intervals(placed: Sequence[PlacedLayout]) -> tuple[Array, list[list[tuple[PztLayout, int]]]]:
     """Stretches (m, 2) of the link with the same patches on each, and which: layouts with numbers of their patches.
 
     Patches are numbered through the layouts. Those of one layout lie beside each other and are the stretches.
@@ -245,7 +245,7 @@ class StructureEffect:
     frequency: Array  # (2, n) Hz
 
 
-def patched_body(spatial: Body, body: ModalBody, placed: Sequence[Placed]) -> Body:
+def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
     """The link, or a piece of it, with mass and stiffness of patches, as far as layouts say so; it keeps all modes.
 
     Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
@@ -290,7 +290,7 @@ class Effects(NamedTuple):
     Phi_V: Array  # (k, n) modal forces per volt, less what the layers' own stiffness takes
 
 
-def effects(key: str, placed: Sequence[Placed], body: ModalBody) -> list[Effects]:
+def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
     """Of the layouts of one link, which their stiffness makes feel each other where it counts."""
     found = [_straight(key, one, body) for one in placed]
     stiff = [k for k, one in enumerate(placed) if one.layout.adds_stiffness]
@@ -303,7 +303,7 @@ def effects(key: str, placed: Sequence[Placed], body: ModalBody) -> list[Effects
     return found
 
 
-def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
+def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
     """On a link held straight: the loads of a volt times the differences of what they work on, stretch by stretch."""
     layout, edges = placed
     own, sections = own_row(layout), link_sections(body)

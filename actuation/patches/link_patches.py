@@ -21,7 +21,7 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers, joined
 from ...mbs.model.body import Body
 from ...mbs.model.divided_link import spread_of
-from .composite import Effects, Placed, effects
+from .composite import Effects, PlacedLayout, effects
 from .patches import (
     PatchArray,
     Reach,
@@ -124,7 +124,7 @@ class LinkPatches:
         """From modal forces on `reached` to voltages (k,), with the limits of the patches or without."""
         return allocation(self.reach, limited=limited)
 
-    def placed_on(self, start: float, length: float) -> list[tuple[Indices, Placed]]:
+    def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
         """By layout with patches on a piece of the link: which of the k these are, and where they are on the piece.
 
         The piece is `length` (m) long and begins at `start` (m) from the root.
@@ -133,7 +133,7 @@ class LinkPatches:
         for label, array in self.arrays.items():
             which, edges = edges_on_piece(array.layout, array.edges, start, length)
             if which.size:
-                found.append((self.columns(label).start + which, Placed(array.layout, edges)))
+                found.append((self.columns(label).start + which, PlacedLayout(array.layout, edges)))
         return found
 
     def columns(self, layout: str) -> slice:
@@ -148,7 +148,7 @@ class LinkPatches:
         return left if self.on_kept is None else left @ self.on_kept
 
 
-def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[Placed]:
+def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
     """Where the patches of layouts are on their link. Raises `InputError` for patches that do not fit it."""
     return [_placed(path, layout, body) for layout in layouts]
 
@@ -224,11 +224,11 @@ def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, co
         return None
 
 
-def _placed(path: Path, layout: PztLayout, body: ModalBody) -> Placed:
+def _placed(path: Path, layout: PztLayout, body: ModalBody) -> PlacedLayout:
     key, edges = _key(path, layout.label), patch_edges(layout, body.length)
     check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
     check_edges(key, edges, body.length)
-    return Placed(layout, edges)
+    return PlacedLayout(layout, edges)
 
 
 def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: ModalBody) -> None:
@@ -242,7 +242,9 @@ def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: Mod
         )
 
 
-def _array(path: Path, placed: Placed, body: ModalBody, spatial: Body, of: Effects, modes: ReachedModes) -> PatchArray:
+def _array(
+    path: Path, placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects, modes: ReachedModes
+) -> PatchArray:
     T_inverse = spatial.on_file
     points = {name: modes.seen(at.translation @ T_inverse) for name, at in spatial.points.items()}
     W_sqrt = weights(_key(path, placed.layout.label), placed.layout, modes.served, modes.stiffness, points)

@@ -18,7 +18,7 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.model.body import Body
 from ...mbs.model.masses import uncoupling
-from .composite import SLIVER, Effects, Placed, stiffness_ratios
+from .composite import SLIVER, Effects, PlacedLayout, stiffness_ratios
 from .records import PztLayout
 
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
@@ -247,7 +247,7 @@ class PatchArray(Reach):
 
     @cached_property
     def _stiffness(self) -> tuple[Array, Array]:
-        return stiffness_ratios(Placed(self.layout, self.edges), self.link)
+        return stiffness_ratios(PlacedLayout(self.layout, self.edges), self.link)
 
     @property
     def stiffness_ratio(self) -> Array:
@@ -282,7 +282,7 @@ def _span(values: Array) -> str:
 
 
 def assembled(
-    placed: Placed, body: ModalBody, of: Effects, T: Array, stiffness: Array, W_sqrt: Array, served: int
+    placed: PlacedLayout, body: ModalBody, of: Effects, T: Array, stiffness: Array, W_sqrt: Array, served: int
 ) -> PatchArray:
     """The patches in modal coordinates p, of which T (n_file, n) makes those of the modal body; `stiffness` (n,)."""
     layout, edges = placed

@@ -27,7 +27,7 @@ from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .measuring import KINDS, find_analysis
-from .precision import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, measure_axes, measure_points
+from .precision import INTEGRATORS, TIGHTER, Point, ReferenceRun, Row, find_reference, measure_axes, measure_points
 
 FORMAT, FORMAT_VERSION = "ffrobot-bench", 1
 
@@ -107,7 +107,7 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-Swept = tuple[Reference, list[Point]]
+Swept = tuple[ReferenceRun, list[Point]]
 
 
 @dataclass(frozen=True)

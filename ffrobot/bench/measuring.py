@@ -79,7 +79,7 @@ UNLIMITED = 10**12  # steps: the budget ends a run
 
 
 @dataclass(frozen=True)
-class Run:
+class TimedRun:
     """What a run took and gave.
 
     Attributes:
@@ -155,7 +155,7 @@ def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
     return scene.model_copy(update={"analysis": tuple(reversed(kept))})
 
 
-def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool = True) -> Run:
+def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool = True) -> TimedRun:
     """Solve `scene`, which has the analysis `name` last, within `budget` (s). Histories only where `keep`.
 
     Raises `InputError` for anything wrong with the scene, `SolveError` where no state is found, `KeyboardInterrupt`
@@ -174,7 +174,7 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
     if keep and status == "completed":
         with Results.from_image(results_image(solution), scene.path) as results:
             found = histories(results, name)
-    return Run(
+    return TimedRun(
         last.statistics.integrator.name,
         status,
         sum(each.wall_seconds for each in runs),

@@ -16,7 +16,7 @@ from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, IntegratedAnalysis
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
-from .measuring import KINDS, Run, errors, run, with_analysis
+from .measuring import KINDS, TimedRun, errors, run, with_analysis
 
 INTEGRATORS = ("dopri5", "dop853", "radau", "generalized-alpha", "auto")
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -33,7 +33,7 @@ Row = dict[str, object]
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceRun:
     """What errors are measured against.
 
     Attributes:
@@ -67,7 +67,7 @@ class Point:
 
     integrator: str
     tolerance: float
-    first: Run
+    first: TimedRun
     error: Mapping[str, float]
     seconds: list[float]
 
@@ -88,13 +88,13 @@ class Point:
         }
 
 
-def find_reference(scene: Scene, name: str, tolerance: float, budget: float, display: Watcher) -> Reference:
+def find_reference(scene: Scene, name: str, tolerance: float, budget: float, display: Watcher) -> ReferenceRun:
     """Solve at `tolerance` with one integrator, and near it with another.
 
     Raises `SolveError` where fewer than two of them complete.
     """
     tolerance = max(TIGHTEST_TOLERANCE, tolerance)
-    done: list[tuple[str, float, Run]] = []
+    done: list[tuple[str, float, TimedRun]] = []
     for integrator, looser in CANDIDATES:
         display.stage(f"reference: {integrator} at {looser * tolerance:.0e}")
         tight = with_analysis(scene, name, integrator=integrator, tolerance=looser * tolerance)
@@ -110,13 +110,13 @@ def find_reference(scene: Scene, name: str, tolerance: float, budget: float, dis
         )
     (integrator, at, best), (other, other_at, second) = done
     error = errors(second.histories, best.histories)
-    return Reference(integrator, at, other, other_at, error, best.histories, best.bodies)
+    return ReferenceRun(integrator, at, other, other_at, error, best.histories, best.bodies)
 
 
 def measure_points(
     scene: Scene,
     name: str,
-    reference: Reference,
+    reference: ReferenceRun,
     integrators: Sequence[str],
     tolerances: Sequence[float],
     repeat: int,
@@ -258,9 +258,9 @@ class _Trials:
 
     def __init__(self, scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher) -> None:
         self.scene, self.analysis, self.budget, self.display = scene, analysis, budget, display
-        self.done: dict[tuple[float, float, float], Run | str] = {}
+        self.done: dict[tuple[float, float, float], TimedRun | str] = {}
 
-    def __call__(self, elements: float, modes: float, tolerance: float) -> Run | str | None:
+    def __call__(self, elements: float, modes: float, tolerance: float) -> TimedRun | str | None:
         """The run, why there is none, or None where the link files do not let elements or modes change."""
         key = (elements, modes, tolerance)
         if key not in self.done:
@@ -271,30 +271,30 @@ class _Trials:
             self.done[key] = self._run(scene, tolerance)
         return self.done[key]
 
-    def row(self, axis: str, elements: float, modes: float, tolerance: float, best: Run | str | None) -> Row:
+    def row(self, axis: str, elements: float, modes: float, tolerance: float, best: TimedRun | str | None) -> Row:
         found, scene = self(elements, modes, tolerance), self._scene(elements, modes)
         assert scene is not None
-        completed = isinstance(found, Run) and found.completed
+        completed = isinstance(found, TimedRun) and found.completed
         error: dict[str, float] = {}
-        if completed and isinstance(best, Run) and isinstance(found, Run):
+        if completed and isinstance(best, TimedRun) and isinstance(found, TimedRun):
             error = errors(found.histories, best.histories)
         return {
             "axis": axis,
             "times": modes if axis == "modes" else elements,
             **sizes_of(scene),
             "tolerance": tolerance,
-            "status": found.status if isinstance(found, Run) else "refused",
-            "against": best.status if isinstance(best, Run) else "refused",
+            "status": found.status if isinstance(found, TimedRun) else "refused",
+            "against": best.status if isinstance(best, TimedRun) else "refused",
             "why": found if isinstance(found, str) else best if isinstance(best, str) else None,
-            "integrator": found.integrator if isinstance(found, Run) else None,
-            "seconds": found.seconds if isinstance(found, Run) else None,
+            "integrator": found.integrator if isinstance(found, TimedRun) else None,
+            "seconds": found.seconds if isinstance(found, TimedRun) else None,
             **{f"error_{kind}": error.get(kind) for kind in KINDS},
         }
 
     def _scene(self, elements: float, modes: float) -> Scene | None:
         return self.scene if elements == modes == 1.0 else refined(self.scene, elements, modes)
 
-    def _run(self, scene: Scene, tolerance: float) -> Run | str:
+    def _run(self, scene: Scene, tolerance: float) -> TimedRun | str:
         name = self.analysis.name
         try:
             return run(with_analysis(scene, name, tolerance=tolerance), name, self.budget, self.display)

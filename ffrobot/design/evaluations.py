@@ -33,9 +33,9 @@ from ..common.tables import as_csv
 from ..sweep.sweep import Key
 from .derivatives import weights
 from .designs import Design, Designs, Point, in_words, repeated_steps
-from .goals import KEPT, Problem
+from .goals import KEPT, DesignProblem
 from .readings import Followed, Reading
-from .variables import Place, Space
+from .variables import DesignSpace, Place
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Evaluated:
 class Evaluations:
     """All designs that a search has asked for. The first that completes gives the objective's size."""
 
-    def __init__(self, designs: Designs, space: Space, problem: Problem) -> None:
+    def __init__(self, designs: Designs, space: DesignSpace, problem: DesignProblem) -> None:
         self.designs, self.space, self.problem = designs, space, problem
         self._searched: dict[Point, Evaluated] = {}
         self._followed: dict[tuple[Place, Path], tuple[Followed, ...]] = {}

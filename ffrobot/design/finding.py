@@ -21,7 +21,7 @@ from ..present.console import plain_console
 from ..present.lines import print_table
 
 
-class Section(NamedTuple):
+class TextTable(NamedTuple):
     """A table of text: in print below a `line`; on the page of a report its heading begins with `of`."""
 
     heading: Sequence[str]
@@ -62,7 +62,7 @@ class Finding(ABC):
         """The answer in one line."""
 
     @abstractmethod
-    def sections(self) -> Iterator[Section]:
+    def sections(self) -> Iterator[TextTable]:
         """Tables of text."""
 
     @abstractmethod

@@ -18,7 +18,7 @@ from ..present.feasibility import joint_tasks
 from ..results.file import Results
 from ..sweep.files import value_of
 from .readings import MISSED, POWER, UNCERTAIN, Followed, Goal, History, Peak, Reading, read_history
-from .variables import Space, Variable
+from .variables import DesignSpace, DesignVariable
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class OfMotors(Goal):
 
     text: str
     what: str
-    chosen: tuple[Variable, ...] = ()
+    chosen: tuple[DesignVariable, ...] = ()
 
     def read(self, results: Results) -> Reading:
         """By the scene that the results have, and of shares by its motion."""
@@ -54,7 +54,7 @@ class OfMotors(Goal):
         return max(shares)
 
 
-def _of_scene(results: Results, variable: Variable) -> tuple[CatalogMotor, float]:
+def _of_scene(results: Results, variable: DesignVariable) -> tuple[CatalogMotor, float]:
     row = tuple(value_of(results.scene, key) for key in variable.keys)
     return variable.motors[variable.rows.index(row)], row[0]
 
@@ -127,7 +127,7 @@ class OfSettling(Goal):
 
 
 @dataclass(frozen=True)
-class Frequency(Goal):
+class OfFrequency(Goal):
     """Of an eigenmode of a link, Hz, by its number from 1 in the order of the modal body."""
 
     text: str
@@ -163,7 +163,7 @@ class Frequency(Goal):
 
 
 @dataclass(frozen=True)
-class Mass(Goal):
+class OfMass(Goal):
     """Of a body, or of all bodies, kg: payloads and patches are not counted."""
 
     text: str
@@ -183,7 +183,7 @@ class Mass(Goal):
 
 
 @dataclass(frozen=True)
-class Value(Goal):
+class OfValue(Goal):
     """A number of the scene file itself, such as the duration of a path; not of link files."""
 
     text: str
@@ -215,15 +215,15 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
         case (("residual" | "settling"), [point]):
             return OfSettling(text, word, point)
         case "frequency", [number, body] if number.isdecimal():
-            return Frequency(text, int(number), body)
+            return OfFrequency(text, int(number), body)
         case "mass", []:
-            return Mass(text)
+            return OfMass(text)
         case "mass", [body]:
-            return Mass(text, body)
+            return OfMass(text, body)
         case "motors", [what] if what in ("mass", "cost", "share"):
             return OfMotors(text, what)
         case "value", [key] if all(key.split(".")):
-            return Value(text, key)
+            return OfValue(text, key)
     raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
 
 
@@ -295,7 +295,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Problem:
+class DesignProblem:
     """The objective shall be least (`sense` 1) or largest (−1), within the `limits`; `scale` is its size."""
 
     objective: Goal
@@ -349,16 +349,16 @@ class Problem:
         return max(0.0, float(excess.max())) if excess.size else 0.0
 
 
-def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> Problem:
+def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> DesignProblem:
     """By what the command line says. Raises `InputError`."""
     if (minimise is None) == (maximise is None):
         found = "both" if minimise is not None else "none"
         raise InputError(f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {found}")
     objective = parse_goal(minimise, "--minimise") if minimise is not None else parse_goal(maximise or "", "--maximise")
-    return Problem(objective, 1.0 if minimise is not None else -1.0, tuple(map(parse_limit, subject_to)))
+    return DesignProblem(objective, 1.0 if minimise is not None else -1.0, tuple(map(parse_limit, subject_to)))
 
 
-def with_motors(problem: Problem, space: Space) -> Problem:
+def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:
     """The problem with goals of motors by the variables that are such; within their limits, unless one says others."""
     chosen = tuple(variable for variable in space.variables if variable.motors)
 

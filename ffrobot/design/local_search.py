@@ -20,7 +20,7 @@ from ..common.arrays import Array, as_floats
 from .designs import SpentError
 from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, optimality
 from .goals import KEPT
-from .variables import Place, Space
+from .variables import DesignSpace, Place
 
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum
 FAILED = 1e3  # how much worse a design that fails reads than the last good one, of the objective's size
@@ -56,7 +56,7 @@ def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
     return (0, objective) if violation <= KEPT else (1, violation)
 
 
-class Steps:
+class SearchFunctions:
     """The functions that optimizers call, of the coordinates x that are no catalog's.
 
     Rows whose largest is to be least are those of the objective, or with `excess` those of the limits. Where there are
@@ -187,7 +187,7 @@ class Steps:
         )
 
 
-def _slsqp(steps: Steps) -> str:
+def _slsqp(steps: SearchFunctions) -> str:
     """Sequential quadratic programming (Kraft 1988)."""
     steps.shortest = SHORTEST
     limits = {"type": "ineq", "fun": lambda x: -steps.excesses(x), "jac": lambda x: -steps.excess_gradients(x)}
@@ -198,7 +198,7 @@ def _slsqp(steps: Steps) -> str:
     return "" if done.success else f"SLSQP: {done.message}"
 
 
-def _trust_constr(steps: Steps) -> str:
+def _trust_constr(steps: SearchFunctions) -> str:
     """A trust region with an interior point (Byrd, Hribar & Nocedal 1999)."""
     limits = NonlinearConstraint(steps.excesses, -np.inf, 0.0, jac=steps.excess_gradients)
     low, high = steps.bounds.T
@@ -269,7 +269,7 @@ def _pass(
     judged: bool, excess: bool = False,
 ) -> tuple[Evaluated, str]:  # fmt: skip
     """The best design that an optimizer comes to from `best`, and why it ended where that is not at an optimum."""
-    steps = Steps(differentiation, best, tell, judged=judged, excess=excess)
+    steps = SearchFunctions(differentiation, best, tell, judged=judged, excess=excess)
     message = ""
     with suppress(ReachedError, StalledError):
         message = OPTIMISERS[optimizer](steps)
@@ -291,7 +291,7 @@ GENERATIONS = 500
 SPREAD = 1e-3  # of the objective in the last generation
 
 
-def combinations(space: Space) -> int:
+def combinations(space: DesignSpace) -> int:
     """How many designs there are; 0 where numbers are between bounds."""
     return prod(len(variable.rows) for variable in space.variables)
 

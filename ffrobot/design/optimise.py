@@ -28,12 +28,12 @@ from ..run.watcher import Watcher
 from ..sweep.files import run_files
 from .designs import Designs, Runs, SpentError, changes_for, may_repeat, number
 from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
-from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
-from .goals import KEPT, Limit, Problem, parse_goal, read_problem, with_motors
+from .finding import CsvFile, Finding, TextTable, floats, numbers, with_unit
+from .goals import KEPT, DesignProblem, Limit, parse_goal, read_problem, with_motors
 from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
 from .optimum_record import Optimum, parallel, states_of
 from .readings import Goal, Reading
-from .variables import Place, Space, read_space
+from .variables import DesignSpace, Place, read_space
 
 BEST = "best"  # folder of the best design's scene
 EVERY = 500  # combinations of rows: more are sought among
@@ -62,7 +62,7 @@ def find_optimum(
     return _optimum(runner, chosen, evaluations, best, searches, tolerance)
 
 
-def _method(space: Space, method: str, most: int) -> str:
+def _method(space: DesignSpace, method: str, most: int) -> str:
     catalogues, combined = any(v.is_catalogue for v in space.variables), combinations(space)
     if method == "auto":
         return "slsqp" if not catalogues else "all" if 0 < combined <= min(EVERY, most) else "differential-evolution"
@@ -77,7 +77,7 @@ def _method(space: Space, method: str, most: int) -> str:
     return method
 
 
-def check_start(path: Path, space: Space, method: str) -> None:
+def check_start(path: Path, space: DesignSpace, method: str) -> None:
     """Raise `InputError` where a search along gradients could not begin at the scene itself."""
     for variable, start in zip(space.variables, space.start(), strict=True):
         if start is None and method in ("slsqp", "trust-constr"):
@@ -88,7 +88,7 @@ def check_start(path: Path, space: Space, method: str) -> None:
             )
 
 
-def _designs(runner: Runs, space: Space, goals: Sequence[Goal], tolerance: float, most: int) -> Designs:
+def _designs(runner: Runs, space: DesignSpace, goals: Sequence[Goal], tolerance: float, most: int) -> Designs:
     """Designs in `space`. Raises `InputError` for a bound that is impossible wherever the others are."""
     fixed = changes_for(runner.path, goals, tolerance, keep_steps=may_repeat(space.keys))
     designs = Designs(runner, space.keys, space.own, fixed, most)
@@ -105,7 +105,7 @@ def _designs(runner: Runs, space: Space, goals: Sequence[Goal], tolerance: float
     return designs
 
 
-def _starts(space: Space, count: int, seed: int) -> list[Place]:
+def _starts(space: DesignSpace, count: int, seed: int) -> list[Place]:
     """The scene itself, where it is in all bounds and catalogs, and places of a Latin hypercube."""
     found = [] if space.start_place is None else [space.start_place]
     if count > 1:
@@ -208,8 +208,8 @@ class Front(Finding):
     points: tuple[FrontPoint, ...]
     runs: int
     tolerance: float
-    space: Space
-    problem: Problem
+    space: DesignSpace
+    problem: DesignProblem
     tried: tuple[Evaluated, ...]
 
     @property
@@ -227,11 +227,11 @@ class Front(Finding):
         """How many designs, of which responses."""
         return f"{self.goals[0]} against {self.goals[1]}: {len(self.points)} designs"
 
-    def sections(self) -> Iterator[Section]:
+    def sections(self) -> Iterator[TextTable]:
         """A line for each design: both responses, what the second one costs, the keys."""
         price = " per ".join(unit or "1" for unit in self.units)
         heading = (*map(with_unit, self.goals, self.units), f"price ({price})", *self.keys, "")
-        yield Section(heading, self._rows())
+        yield TextTable(heading, self._rows())
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         for one in self.points:
@@ -303,9 +303,9 @@ class _Searches:
     """What the searches of a front share."""
 
     runner: Runs
-    space: Space
+    space: DesignSpace
     designs: Designs
-    problem: Problem
+    problem: DesignProblem
     against: Goal
     tolerance: float
     tried: dict[Path, Evaluated] = field(default_factory=dict)
@@ -331,7 +331,7 @@ class _Searches:
             self.problem, tuple(map(self._with_both, self.tried.values())),
         )  # fmt: skip
 
-    def _least(self, problem: Problem, start: Place, title: str) -> FrontPoint:
+    def _least(self, problem: DesignProblem, start: Place, title: str) -> FrontPoint:
         evaluations, runner = Evaluations(self.designs, self.space, problem), self.runner
         differentiation, found = Differentiation(evaluations, self.tolerance), None
         with suppress(SpentError):
@@ -349,7 +349,7 @@ class _Searches:
             evaluations.problem.violation(found.best.readings) <= KEPT, found.message, found.best,
         )  # fmt: skip
 
-    def _price(self, found: Local, problem: Problem) -> float:
+    def _price(self, found: Local, problem: DesignProblem) -> float:
         """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached, NaN at the ends."""
         if found.optimality is None or not problem.limits or problem.limits[0].goal is not self.against:
             return np.nan

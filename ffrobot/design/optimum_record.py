@@ -13,13 +13,13 @@ from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress,
 from ..results.verdict import Verdict
 from .designs import number
 from .evaluations import Evaluated, Optimality
-from .finding import CsvFile, Finding, Section, failed_runs, numbers, with_unit
-from .goals import KEPT, Limit, Problem
+from .finding import CsvFile, Finding, TextTable, failed_runs, numbers, with_unit
+from .goals import KEPT, DesignProblem, Limit
 from .local_search import AIM, Local
-from .variables import Space, Variable
+from .variables import DesignSpace, DesignVariable
 
 
-def states_of(problem: Problem, designs: Sequence[Evaluated], best: Sequence[Evaluated]) -> tuple[State, ...]:
+def states_of(problem: DesignProblem, designs: Sequence[Evaluated], best: Sequence[Evaluated]) -> tuple[State, ...]:
     """Of each design, whose readings begin with those of the responses of `problem`."""
     chosen = {one.design.folder for one in best}
 
@@ -34,7 +34,7 @@ def states_of(problem: Problem, designs: Sequence[Evaluated], best: Sequence[Eva
 
 
 def parallel(
-    space: Space,
+    space: DesignSpace,
     goals: Sequence[tuple[str, Limit | None]],
     designs: Sequence[Evaluated],
     states: tuple[State, ...],
@@ -58,7 +58,7 @@ def parallel(
     )  # fmt: skip
 
 
-def progress(problem: Problem, designs: Sequence[Evaluated], states: tuple[State, ...]) -> Progress:
+def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple[State, ...]) -> Progress:
     """The response of each design in the order of the search."""
     values = [one.values[0] if one.completed else np.nan for one in designs]
     unit = next((one.readings[0].unit for one in designs if one.completed), "")
@@ -70,7 +70,7 @@ def progress(problem: Problem, designs: Sequence[Evaluated], states: tuple[State
     )  # fmt: skip
 
 
-def _best_so_far(problem: Problem, designs: Sequence[Evaluated], values: Sequence[float]) -> Numbers:
+def _best_so_far(problem: DesignProblem, designs: Sequence[Evaluated], values: Sequence[float]) -> Numbers:
     kept = [
         problem.sense * value if one.completed and problem.violation(one.readings) <= KEPT else np.inf
         for one, value in zip(designs, values, strict=True)
@@ -78,7 +78,7 @@ def _best_so_far(problem: Problem, designs: Sequence[Evaluated], values: Sequenc
     return numbers(problem.sense * np.minimum.accumulate(kept))
 
 
-def _axis(variable: Variable, k: int, values: Sequence[object]) -> Axis:
+def _axis(variable: DesignVariable, k: int, values: Sequence[object]) -> Axis:
     if not variable.is_catalogue:
         low, high = variable.low, variable.high
         numbers_of = tuple(float(value) for value in values)  # type: ignore[arg-type]
@@ -117,8 +117,8 @@ class Optimum(Finding):
     title = "Optimum"
 
     scene: Path
-    problem: Problem
-    space: Space
+    problem: DesignProblem
+    space: DesignSpace
     method: str
     start: Evaluated
     best: Evaluated
@@ -190,11 +190,11 @@ class Optimum(Finding):
         """That it does not keep all limits."""
         return "" if self.feasible else "no design found that keeps all limits: see the table of limits"
 
-    def sections(self) -> Iterator[Section]:
+    def sections(self) -> Iterator[TextTable]:
         """Keys and limits, at the start and in the best design."""
-        yield Section(("key", "start", "best", "bounds"), self._key_rows(), line=self.headline())
+        yield TextTable(("key", "start", "best", "bounds"), self._key_rows(), line=self.headline())
         if self.problem.limits:
-            yield Section(("limit", "start", "best", ""), [row[:4] for row in self._limit_rows()])
+            yield TextTable(("limit", "start", "best", ""), [row[:4] for row in self._limit_rows()])
 
     def report_tables(self) -> Iterator[StudyTable]:
         """With shadow prices of limits."""
@@ -202,7 +202,7 @@ class Optimum(Finding):
         yield keys.for_report()
         if limits:
             heading = ("limit", "start", "best", "", "shadow price: objective per unit of the limit")
-            yield Section(heading, self._limit_rows()).for_report()
+            yield TextTable(heading, self._limit_rows()).for_report()
 
     def headline(self) -> str:
         """The best value and what it saves, or that no design keeps all limits."""

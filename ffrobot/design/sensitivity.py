@@ -25,7 +25,7 @@ from ..sweep.files import number_at
 from ..sweep.sweep import Key
 from .derivatives import Base, Entry, Sample, entries, rough_keys
 from .designs import Designs, Runs, changes_for, may_repeat, parse_key, repeated_steps
-from .finding import CsvFile, Finding, Section, failed_runs, file_name, numbers
+from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, numbers
 from .goals import parse_goal
 from .readings import Goal, Reading
 
@@ -101,12 +101,12 @@ class Sensitivity(Finding):
         """The key with the largest influence on each response."""
         return "; ".join(f"{goal}: {self.keys[self.ranked(g)[0]]} matters most" for g, goal in enumerate(self.goals))
 
-    def sections(self) -> Iterator[Section]:
+    def sections(self) -> Iterator[TextTable]:
         """A table for each response, the most influential key first."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             rows = [self._row(g, k) for k in self.ranked(g)]
             when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
-            yield Section(HEADING, rows, line=f"{goal}: {reading.in_words(8)}{when}", of=goal)
+            yield TextTable(HEADING, rows, line=f"{goal}: {reading.in_words(8)}{when}", of=goal)
 
     def _row(self, g: int, k: int) -> tuple[str, ...]:
         one = self.entries[g][k]

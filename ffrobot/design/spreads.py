@@ -31,7 +31,7 @@ RESAMPLES = 200  # of a bootstrap
 
 
 @dataclass(frozen=True)
-class Statistics:
+class SpreadStatistics:
     """Of quantities of any shape (…): `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
 
     Beside each its standard error: `mean_error`, `deviation_error`, `quantile_errors`. `lowest` and `highest` (…) are
@@ -64,7 +64,7 @@ class Statistics:
         return [float(one[k]) for one in (*values, self.lowest, self.highest)]
 
 
-def statistics(values: Array) -> Statistics:
+def statistics(values: Array) -> SpreadStatistics:
     """Of samples (n, …), n > 1.
 
     The error of s is √((m₄ − s⁴ (n − 3)/(n − 1))/n)/2s with the fourth central moment m₄; that of a quantile half the
@@ -81,7 +81,7 @@ def statistics(values: Array) -> Statistics:
     quantiles = np.quantile(values, p, axis=0)
     errors = as_floats(0.5 * (high - low))
     least, largest = values.min(axis=0), values.max(axis=0)
-    return Statistics(mean, s / np.sqrt(n), s, deviation_error, quantiles, errors, least, largest)
+    return SpreadStatistics(mean, s / np.sqrt(n), s, deviation_error, quantiles, errors, least, largest)
 
 
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
@@ -239,7 +239,7 @@ class LinearSpread:
         whole = squares.sum(axis=0)
         return as_floats(np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T)
 
-    def statistics(self) -> Statistics:
+    def statistics(self) -> SpreadStatistics:
         """Of the linear part; errors are the differences that the curvatures make.
 
         The worst case has every key at the end of its spread that makes it worst, a normal one two deviations off.
@@ -256,7 +256,7 @@ class LinearSpread:
         deviation = np.sqrt((self.slopes**2).sum(axis=0))
         ends = np.array([(one.ends[1] - one.mean) / one.deviation for one in self.spreads])
         reach = np.tensordot(ends, np.abs(self.slopes), 1)
-        return Statistics(
+        return SpreadStatistics(
             self.middle, as_floats(np.abs(bent.mean(axis=0) - linear.mean(axis=0))),
             as_floats(deviation), as_floats(np.abs(bent.std(axis=0) - linear.std(axis=0))),
             as_floats(quantiles), as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),

@@ -16,10 +16,9 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
-from ..pictures.studies.study import Band as BandDiagram
-from ..pictures.studies.study import Bars, Diagram, Series, StudyTable
+from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
 from .designs import Design, Designs, Point, Runs, changes_for, in_words
-from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, numbers, with_unit
+from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
 from .goals import parse_goal
 from .readings import Goal, History, Reading, read_history
 from .spreads import (
@@ -27,7 +26,7 @@ from .spreads import (
     Indices,
     LinearSpread,
     Spread,
-    Statistics,
+    SpreadStatistics,
     read_spreads,
     regression_shares,
     sobol_indices,
@@ -44,14 +43,14 @@ WORST = {"samples": "lowest and highest sample", "gradients": "keys at their wor
 
 
 @dataclass(frozen=True)
-class Band:
+class HistoryBand:
     """A history's statistics at `time` (T,), s; `nominal` (T,) with all keys at the middle of their spreads."""
 
     name: str
     unit: str
     time: Array
     nominal: Array
-    statistics: Statistics
+    statistics: SpreadStatistics
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,8 @@ class Uncertainty(Finding):
     method: LinearOrSampled
     goals: tuple[str, ...]
     readings: tuple[Reading, ...]
-    statistics: Statistics
-    bands: tuple[Band, ...]
+    statistics: SpreadStatistics
+    bands: tuple[HistoryBand, ...]
     shares: Array
     explained: Array
     indices: Indices | None
@@ -99,15 +98,15 @@ class Uncertainty(Finding):
             texts.append(f"{goal}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})")
         return "; ".join([*texts, *(f"band of {band.name}" for band in self.bands)])
 
-    def sections(self) -> Iterator[Section]:
+    def sections(self) -> Iterator[TextTable]:
         """Each response with what the keys do to it, then the bands."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             heading = (*self.statistics.named, "worst case")
             nominal = f"{goal}: {reading.in_words()} with all parameters at nominal values"
-            yield Section(heading, [self._statistics_row(g)], line=nominal)
+            yield TextTable(heading, [self._statistics_row(g)], line=nominal)
             yield self._parts(g)
         if self.bands:
-            yield Section(BAND_HEADINGS, self._band_rows())
+            yield TextTable(BAND_HEADINGS, self._band_rows())
 
     def report_tables(self) -> Iterator[StudyTable]:
         """The statistics of all responses in one table."""
@@ -117,17 +116,17 @@ class Uncertainty(Finding):
                 for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True))
             ]
             heading = ("response", "unit", "nominal", *self.statistics.named, "worst case")
-            yield Section(heading, rows).for_report()
+            yield TextTable(heading, rows).for_report()
         yield from (self._parts(g).for_report() for g in range(len(self.goals)))
         if self.bands:
-            yield Section(BAND_HEADINGS, self._band_rows()).for_report()
+            yield TextTable(BAND_HEADINGS, self._band_rows()).for_report()
 
     def _statistics_row(self, g: int) -> tuple[str, ...]:
         s = self.statistics
         cells = (with_error(value[g], error[g]) for value, error in s.named.values())
         return (*cells, f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
 
-    def _parts(self, g: int) -> Section:
+    def _parts(self, g: int) -> TextTable:
         """The keys' shares of the variance of goal g, the largest first; Sobol indices where known."""
         rows = []
         for k in self.ranked(g):
@@ -138,7 +137,7 @@ class Uncertainty(Finding):
                 cells = [f"{with_error(100.0 * part[g, k], 100.0 * error[g, k])} %" for part, error in pairs]
             rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
         parts = ("alone", "with others") if self.indices else ("share of the variance",)
-        return Section(("key", "spread", *parts), rows, of=self.goals[g])
+        return TextTable(("key", "spread", *parts), rows, of=self.goals[g])
 
     def ranked(self, g: int) -> list[int]:
         """Keys by number, the most influential for response g first."""
@@ -223,9 +222,9 @@ class Uncertainty(Finding):
             labels=tuple(".".join(self.spreads[k].key) for k in order), series=tuple(series),
         )  # fmt: skip
 
-    def _band(self, band: Band) -> BandDiagram:
+    def _band(self, band: HistoryBand) -> Band:
         low, median, high = band.statistics.quantiles
-        return BandDiagram(
+        return Band(
             name=f"band_{file_name(band.name)}", title=band.name,
             y_label=with_unit(band.name.rpartition(".")[2], band.unit),
             time=floats(band.time), nominal=floats(band.nominal), median=floats(median), low=floats(low),
@@ -246,7 +245,7 @@ FEWEST = 8  # samples for a quantile of 5 %
 
 
 @dataclass(frozen=True)
-class Curve(Goal):
+class WholeHistory(Goal):
     """A history as a whole."""
 
     text: str
@@ -272,7 +271,7 @@ def find_uncertainty(
         raise InputError("uncertainty: expected Sobol indices of samples, found --by gradients")
     names = list(dict.fromkeys(of))
     goals = tuple(parse_goal(text) for text in names if not _is_history(text))
-    curves = tuple(Curve(text, text) for text in names if _is_history(text))
+    curves = tuple(WholeHistory(text, text) for text in names if _is_history(text))
     spreads = read_spreads(runs.path, spread)
     if not names or not spreads:
         raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
@@ -291,7 +290,7 @@ class _Study:
     """
 
     def __init__(
-        self, runs: Runs, spreads: tuple[Spread, ...], goals: tuple[Goal, ...], curves: tuple[Curve, ...],
+        self, runs: Runs, spreads: tuple[Spread, ...], goals: tuple[Goal, ...], curves: tuple[WholeHistory, ...],
         tolerance: float | None,
     ) -> None:  # fmt: skip
         self._path, self._spreads, self._goals, self._curves = runs.path, spreads, goals, curves
@@ -406,15 +405,17 @@ class _Study:
                 self._notes.setdefault(goal.text, f"{kink}; samples take it into account")
         return [one.value for one in followed] or [float("nan")] * len(self._goals)
 
-    def _bands(self, designs: Sequence[Design], of: Callable[[Array, Array], Statistics]) -> tuple[Band, ...]:
+    def _bands(
+        self, designs: Sequence[Design], of: Callable[[Array, Array], SpreadStatistics]
+    ) -> tuple[HistoryBand, ...]:
         """Statistics `of` each history: with nominal values (T,), and of the designs (n, T)."""
         bands = []
         for curve, nominal in zip(self._curves, self._nominal, strict=True):
             values, middle = np.array([self._values(curve, nominal, one) for one in designs]), nominal.values[:, 0]
-            bands.append(Band(nominal.name, nominal.unit, nominal.time, middle, of(middle, values)))
+            bands.append(HistoryBand(nominal.name, nominal.unit, nominal.time, middle, of(middle, values)))
         return tuple(bands)
 
-    def _values(self, curve: Curve, nominal: History, design: Design) -> Array:
+    def _values(self, curve: WholeHistory, nominal: History, design: Design) -> Array:
         history, time = curve.history(design), nominal.time
         if history.time.shape != time.shape or not np.allclose(history.time, time, rtol=1e-9, atol=1e-12):
             raise InputError(

@@ -34,7 +34,7 @@ FORMS = (
 
 
 @dataclass(frozen=True)
-class Variable:
+class DesignVariable:
     """A number between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key.
 
     `motors`: of rows that are motors of the catalog with one of their gears, the motor of each.
@@ -96,10 +96,10 @@ SMALL = 1e-3  # of the range: numbers near 0 take steps of this times the relati
 
 
 @dataclass(frozen=True)
-class Space:
+class DesignSpace:
     """All `variables`; `own` is what the scene has at their keys, in order."""
 
-    variables: tuple[Variable, ...]
+    variables: tuple[DesignVariable, ...]
     own: Point
 
     @property
@@ -126,23 +126,23 @@ class Space:
         return tuple(own) if len(own) == len(self.variables) else None
 
 
-def read_space(path: Path, vary: Sequence[str]) -> Space:
+def read_space(path: Path, vary: Sequence[str]) -> DesignSpace:
     """What `--vary` says of the scene file at `path`. Raises `InputError`."""
     variables = tuple(parse_variable(text) for text in vary)
     if not variables:
         raise InputError(f"optimise: expected at least one --vary, {FORMS}")
     check_once([key for variable in variables for key in variable.keys])
     readers = [(value_at if variable.is_catalogue else number_at, variable.keys) for variable in variables]
-    return Space(variables, tuple(read(path, key, "--vary") for read, keys in readers for key in keys))
+    return DesignSpace(variables, tuple(read(path, key, "--vary") for read, keys in readers for key in keys))
 
 
-def parse_variable(text: str) -> Variable:
+def parse_variable(text: str) -> DesignVariable:
     """`payload.0.mass=0.1:0.5`, or `a.outer,a.inner in {0.05:0.045, 0.06:0.054}`. Raises `InputError`."""
     if match := MOTOR.fullmatch(text):
         return _motors(match["joint"], match["mass"], Path(match["file"]))
     if match := CATALOGUE.fullmatch(text):
         keys = _keys(match["keys"])
-        return Variable(keys, rows=_rows(match["rows"], len(keys), text))
+        return DesignVariable(keys, rows=_rows(match["rows"], len(keys), text))
     name, equals, bounds = text.partition("=")
     pieces = bounds.split(":")
     try:
@@ -156,10 +156,10 @@ def parse_variable(text: str) -> Variable:
         raise InputError(f'--vary: expected a lower bound and a higher one, LOW:HIGH, found "{shown(text)}"')
     if logarithmic and low <= 0.0:
         raise InputError(f'--vary: expected bounds above 0 for steps in the logarithm, found "{shown(text)}"')
-    return Variable(_keys(name), low, high, logarithmic)
+    return DesignVariable(_keys(name), low, high, logarithmic)
 
 
-def _motors(joint: str, mass: str | None, catalog: Path) -> Variable:
+def _motors(joint: str, mass: str | None, catalog: Path) -> DesignVariable:
     """The motors of a joint, each with each of its gears: inertia and limits as the scene has them, at the joint.
 
     With losses in the gear, the limit is the torque that is left of the motor's peak where it drives. `mass` is a key
@@ -180,7 +180,7 @@ def _motors(joint: str, mass: str | None, catalog: Path) -> Variable:
                 )
             rows[row] = motor
     more = () if mass is None else (parse_key(mass, "--vary"),)
-    return Variable((*keys, *more), rows=tuple(rows), motors=tuple(rows.values()))
+    return DesignVariable((*keys, *more), rows=tuple(rows), motors=tuple(rows.values()))
 
 
 def _keys(text: str) -> tuple[Key, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 
-from ..actuation.motors import Choice, JointTask, MotorFeasibility, choices, read_catalog
+from ..actuation.motors import JointTask, MotorChoice, MotorFeasibility, choices, read_catalog
 from ..common.errors import InputError, quoted
 from ..results.file import Results
 from .lines import plain_table, print_table
@@ -188,7 +188,7 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
     console.print("at the motor, with its own rotor; solve again with its gear_ratio and rotor_inertia to confirm")
 
 
-def _rows(joint: str, found: Sequence[Choice]) -> Iterator[tuple[str, ...]]:
+def _rows(joint: str, found: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]:
     fitting = [choice for choice in found if choice.fits]
     for k, choice in enumerate(fitting[:SHOWN] or found[:1]):
         name = choice.motor.name if choice.fits else f"none; nearest: {choice.motor.name}"

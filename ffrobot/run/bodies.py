@@ -24,7 +24,7 @@ from ..mbs.scene.bodies import BodyKeys, Payload, Tool, tensor
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:
-    from ..actuation.patches.composite import Placed, StructureEffect
+    from ..actuation.patches.composite import PlacedLayout, StructureEffect
 
 
 @struct
@@ -168,7 +168,7 @@ def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> Lo
     return with_structure(body, placed_patches(scene.path, layouts, body.modal))
 
 
-def with_structure(body: LoadedBody, placed: Sequence[Placed]) -> LoadedBody:
+def with_structure(body: LoadedBody, placed: Sequence[PlacedLayout]) -> LoadedBody:
     """A link, or a piece of one, with the mass and stiffness of patches, as far as layouts say so."""
     if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body

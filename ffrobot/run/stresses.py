@@ -81,14 +81,14 @@ def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, lo
 
     Voltages are those whose modal forces the motion shows.
     """
-    from ..actuation.patches.composite import Placed, section_loads
+    from ..actuation.patches.composite import PlacedLayout, section_loads
     from ..actuation.patches.patches import voltage_gain
 
     array = _in_plane(of_link)
     if array is None or not np.isfinite(array.authority).all():
         return None
     F_p = of_link.reached.forces(loads.modal_force @ spatial.on_file)
-    return section_loads(Placed(array.layout, array.edges), link, p, F_p @ voltage_gain(of_link.reach).T)
+    return section_loads(PlacedLayout(array.layout, array.edges), link, p, F_p @ voltage_gain(of_link.reach).T)
 
 
 def _is_known(link: ModalBody, sizes: Mapping[str, Array]) -> bool:

@@ -164,7 +164,7 @@ OF_MODES = {"linear", "joints_locked", "joints_compliant"}
 
 
 @dataclass(frozen=True)
-class Run:
+class SweepRun:
     """One combination of values: where its files are, what is collected of its results, and what it is made from."""
 
     number: int
@@ -196,7 +196,7 @@ class Row:
         return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 
-def perform(run: Run, workers: Workers) -> Row | None:
+def perform(run: SweepRun, workers: Workers) -> Row | None:
     """Solve the scene in the run's folder; None where a signal has asked it to stop.
 
     Earlier results are replaced in one step: another command in the same folder may be reading them.
@@ -223,7 +223,7 @@ def perform(run: Run, workers: Workers) -> Row | None:
 _of_process = Workers()
 
 
-def perform_under_mpi(run: Run) -> Row | None:
+def perform_under_mpi(run: SweepRun) -> Row | None:
     """As `perform`, by whichever process of `mpirun`."""
     return perform(run, _of_process)
 

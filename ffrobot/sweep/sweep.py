@@ -24,7 +24,7 @@ from ..common.tables import as_csv
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, Value, Variation, grid, latin_hypercube, parse_variation, run_files
-from .runs import RESULTS, ROW, Row, Run, Workers, collected, finished_row, perform, perform_under_mpi
+from .runs import RESULTS, ROW, Row, SweepRun, Workers, collected, finished_row, perform, perform_under_mpi
 
 PLAN = "plan.json"
 
@@ -69,10 +69,10 @@ class Sweep:
         return self.folder / "table.csv"
 
     @property
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[SweepRun]:
         """In the order of the table."""
         return [
-            Run(k, values, self.folder / "runs" / self._name(k, values), self.collect, {}, self.allow_python)
+            SweepRun(k, values, self.folder / "runs" / self._name(k, values), self.collect, {}, self.allow_python)
             for k, values in enumerate(self.points, start=len(self.earlier))
         ]
 
@@ -166,7 +166,7 @@ def stale_rows(sweep: Sweep) -> str:
     return f"{names} {'have' if len(stale) > 1 else 'has'} changed since: {count} rows computed again" if stale else ""
 
 
-def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
+def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, SweepRun]]:
     """By number: the rows of finished runs of the same input, and the runs that are left, their files written."""
     rows, waiting = {}, {}
     for run in sweep.runs:
@@ -181,7 +181,7 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
 
 
 @contextmanager
-def _performed(runs: Sequence[Run], side_by_side: int, workers: Workers) -> Iterator[Iterable[Row | None]]:
+def _performed(runs: Sequence[SweepRun], side_by_side: int, workers: Workers) -> Iterator[Iterable[Row | None]]:
     if processes() > 1:
         from mpi4py.futures import MPICommExecutor
 
@@ -198,7 +198,7 @@ def _performed(runs: Sequence[Run], side_by_side: int, workers: Workers) -> Iter
             workers.stop()
 
 
-def _files(sweep: Sweep, run: Run) -> RunFiles:
+def _files(sweep: Sweep, run: SweepRun) -> RunFiles:
     return run_files(sweep.scene, sweep.changes(run.values), run.folder)
 
 
@@ -213,7 +213,7 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
     from ..scene.load import load_scene
 
     with TemporaryDirectory() as folder:
-        run = Run(0, values, Path(folder))
+        run = SweepRun(0, values, Path(folder))
         try:
             with python_allowed(sweep.allow_python):
                 scene = load_scene(_files(sweep, run).write(run.folder))

@@ -7,7 +7,7 @@ from patches_on_links import bent, on_link, planar_body
 from tables_3d import joint, rigid, scene
 
 import ffrobot
-from ffrobot.actuation.patches.composite import Placed, patched_body
+from ffrobot.actuation.patches.composite import PlacedLayout, patched_body
 
 ALL = ["in-plane-bending", "out-of-plane-bending", "torsion", "axial"]
 AT_REST = [0.0, 0.0, 0.0]
@@ -69,7 +69,7 @@ def test_polymer_bimorph():
     body = modal_body(link)
     keys = {"width": width, "thickness": half, "modulus": E, "d31": e31 / E, "length": L, "structural": ("stiffness",)}
     bare, layer = planar_body(body), on_link(body, centers=(L / 2,), **keys)
-    layered = patched_body(bare, body, [Placed(layer.arrays["link"].layout, layer.arrays["link"].edges)])
+    layered = patched_body(bare, body, [PlacedLayout(layer.arrays["link"].layout, layer.arrays["link"].edges)])
     tip = layered.points["tip"].translation[1] @ bent(layered, on_link(body, layered, centers=(L / 2,), **keys), [1.0])
     assert tip == pytest.approx(3 * e31 * L**2 / (2 * E * (2 * half) ** 2), rel=1e-3)
     assert tip == pytest.approx(3.45e-7, rel=1e-3)

@@ -15,7 +15,7 @@ import tomli_w
 from loops import wheel
 
 import ffrobot
-from ffrobot.sweep.runs import Done, Run, Workers, perform
+from ffrobot.sweep.runs import Done, SweepRun, Workers, perform
 
 CONTROLLER = '''
 """A motor's constant command, by functions that do much else to their process."""
@@ -231,7 +231,7 @@ def _is_running(pid):
 
 def test_results_are_replaced_in_one_step(scene, tmp_path):
     """Another command in the same folder may read them at any time: two equal studies at once, for one."""
-    run = Run(0, (), tmp_path / "run")
+    run = SweepRun(0, (), tmp_path / "run")
     run.folder.mkdir()
     results, seen = run.folder / "results.h5", []
 
@@ -256,7 +256,7 @@ def test_messages_name_files_of_the_run_without_its_folder(tmp_path, monkeypatch
     (tmp_path / "sw").mkdir()
     (tmp_path / "sw" / "scene.toml").write_text("nothing = 1\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    row = perform(Run(0, (), Path("sw")), Workers())
+    row = perform(SweepRun(0, (), Path("sw")), Workers())
     assert row.status == "wrong input"
     assert row.message.startswith("scene.toml: ")
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ffrobot.bench.measuring import relative
-from ffrobot.bench.precision import PATIENCE, Point, Reference, Row, repeat_point
+from ffrobot.bench.precision import PATIENCE, Point, ReferenceRun, Row, repeat_point
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.scene import Scene
@@ -47,7 +47,7 @@ class Exudyn:
                 " another one with --peer-python"
             )
 
-    def __call__(self, step: float, gravity: str, reference: Reference) -> Row:
+    def __call__(self, step: float, gravity: str, reference: ReferenceRun) -> Row:
         """One run as a row: seconds and errors; "over budget" without."""
         row: Row = {"integrator": NAME, "step": step, "gravity": gravity}
         with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
@@ -75,7 +75,7 @@ class Exudyn:
             return row | {"status": "completed", "seconds": about["seconds"], **_errors(path, reference), **about}
 
 
-def _errors(path: Path, reference: Reference) -> dict[str, float]:
+def _errors(path: Path, reference: ReferenceRun) -> dict[str, float]:
     """Of the tip; its force without the first output, which EXUDYN gets wrong at any step and reports for itself."""
     values = np.loadtxt(path, delimiter=",", skiprows=1)
     force, deflection = reference.histories["force"][FORCE], reference.histories["displacement"][DEFLECTION]
@@ -90,7 +90,7 @@ def measure_peer(
     exudyn: Exudyn,
     scene: Scene,
     name: str,
-    reference: Reference,
+    reference: ReferenceRun,
     points: Sequence[Point],
     repeat: int,
     budget: float,
