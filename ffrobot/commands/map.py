@@ -57,10 +57,9 @@ def map_(
     Motors keep the pose; links and compliant gears deflect under weight and loads. Joints that the grid leaves open
     stay as near to the start of the scene as they can. The same command resumes a stopped map.
     """  # noqa: D301 (click wants the backspace itself)
-    from ..map.map_file import TABLE, write_map
+    from ..map.map_file import TABLE, print_map, write_map
     from ..map.pose_map import make_map, plan_map
     from ..present.console import Display, summary_console
-    from ..present.pose_map import print_map
     from ..run.inputs import files_of
 
     folder = output or scene_file.with_suffix(".map")

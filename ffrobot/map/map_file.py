@@ -1,11 +1,13 @@
-"""The files of a map: map.h5 with all arrays over the grid, table.csv with a line for each pose."""
+"""The files of a map, map.h5 with all arrays over the grid, table.csv with a line for each pose; what is printed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from rich.console import Console
 
 from ..common.arrays import Array, as_floats
 from ..common.checksum import MARK, sealed
@@ -14,6 +16,7 @@ from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.tables import as_csv
 from ..common.version import VERSION
+from ..present.lines import print_table
 from .pose_map import STATUS, PoseMap
 
 FORMAT, FORMAT_VERSION = "ffrobot-map", 1
@@ -144,3 +147,27 @@ def _largest(values: Array) -> Array:
     """(P,) of (P, n), nan where all are."""
     known = np.isfinite(values)
     return as_floats(np.where(known.any(axis=1), np.where(known, values, -np.inf).max(axis=1), np.nan))
+
+
+def print_map(found: PoseMap, console: Console) -> None:
+    """A table of quantities: the worst and the best value with the poses; then how many poses there are."""
+    console.print(f"{found.plan.point} over {' and '.join(axis.name for axis in found.plan.axes)}", soft_wrap=True)
+    print_table(console, ("quantity", "worst", "at", "best", "at"), _ranges(found))
+    counts = ", ".join(f"{int((found.status == k).sum())} {name}" for k, name in enumerate(STATUS))
+    console.print(f"poses      {counts}", soft_wrap=True)
+
+
+def _ranges(found: PoseMap) -> Iterator[tuple[str, ...]]:
+    for quantity in quantities(found).values():
+        if quantity.everywhere:
+            yield quantity.title, quantity.everywhere, "everywhere", "", ""
+        elif np.isfinite(quantity.values).any():
+            ends = ((f"{quantity.values[k]:.4g}", _place(found, k)) for k in (quantity.worst, quantity.best))
+            yield quantity.title, *(cell for end in ends for cell in end)
+
+
+def _place(found: PoseMap, number: int) -> str:
+    place = np.unravel_index(number, found.plan.shape)
+    pairs = zip(found.plan.axes, place, strict=True)
+    numbers = ((axis, axis.values[k]) for axis, k in pairs if len(axis.values) > 1)
+    return ", ".join(f"{one:.3g} m" if axis.unit == "m" else f"{np.degrees(one):.3g}°" for axis, one in numbers)

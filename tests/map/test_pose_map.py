@@ -18,10 +18,9 @@ from rich.console import Console
 from ffrobot import solve
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.map import pose_map
-from ffrobot.map.map_file import quantities, torque_share, write_map
+from ffrobot.map.map_file import print_map, quantities, torque_share, write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.pictures.studies.pose_map import draw_map
-from ffrobot.present.pose_map import print_map
 from ffrobot.run.watcher import Watcher
 
 ARM = """name = "arm"
