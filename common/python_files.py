@@ -207,7 +207,6 @@ def _code(code: CodeType) -> Iterator[bytes]:
 
 
 def _names(code: CodeType) -> set[str]:
-    """Global names of a function and of functions inside it."""
     inner = (constant for constant in code.co_consts if isinstance(constant, CodeType))
     return set(code.co_names).union(*map(_names, inner))
 

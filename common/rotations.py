@@ -76,7 +76,6 @@ def _closed(m: int, x: Array) -> Array:
 
 
 def _of_skew(vectors: Array, first: int, second: int) -> Array:
-    """The sum c_first φ~ + c_second φ~²."""
     S, x = skew(vectors), np.sum(np.square(vectors), axis=-1)[..., None, None]
     return _value(first, x) * S + _value(second, x) * (S @ S)
 

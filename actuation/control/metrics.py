@@ -307,6 +307,5 @@ def _is_seen(loop: Loop, setup: Setup) -> bool:
 
 
 def _grows(shaking: Array) -> bool:
-    """From quarter to quarter of its times."""
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]
     return bool(quarters[1] < quarters[2] < quarters[3] and quarters[3] > max(GROWTH * quarters[1], ROUND_OFF))

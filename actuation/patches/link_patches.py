@@ -232,7 +232,6 @@ def _placed(path: Path, layout: PztLayout, body: ModalBody) -> PlacedLayout:
 
 
 def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: ModalBody) -> None:
-    """Raise `InputError` where a layout bends or twists the link in no mode."""
     if not modes.served:
         families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
         raise InputError(

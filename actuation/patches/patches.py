@@ -161,7 +161,6 @@ def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedMod
 
 @lru_cache(maxsize=KEPT)
 def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> ReachedModes:
-    """Those of a link that moves in these families alone."""
     moving = spatial.modal_transform.any(axis=1)
     rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
     T_inverse, square = spatial.on_file, np.ix_(rows, rows)

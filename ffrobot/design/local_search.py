@@ -134,7 +134,6 @@ class SearchFunctions:
         return evaluations.problem.scaled(one.values)
 
     def _row_gradients(self, x: Array) -> Array:
-        """(r, n) of them."""
         one = self._at(x)
         if one.place not in self._gradients:
             if not one.completed:

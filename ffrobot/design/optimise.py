@@ -300,8 +300,6 @@ def find_front(
 
 @dataclass
 class _Searches:
-    """What the searches of a front share."""
-
     runner: Runs
     space: DesignSpace
     designs: Designs

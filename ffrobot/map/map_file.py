@@ -139,7 +139,6 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
 
 
 def _beyond(round_off: float, values: Array) -> Array:
-    """Values, 0 if they are round-off."""
     return as_floats(np.where(np.abs(values) <= round_off, 0.0, values))
 
 

@@ -180,7 +180,6 @@ def _at_most(rows: Sequence[Row], room: int) -> list[Row]:
 
 
 def _aligned(rows: Sequence[Row]) -> list[str]:
-    """As lines, columns of numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     shown = [k for k, of in enumerate(zip(*rows[1:], strict=True)) if any(of)]
     return ["  ".join(row[k].ljust(widths[k]) for k in shown) for row in rows]

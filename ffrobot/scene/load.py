@@ -129,7 +129,6 @@ def _raise(found: Iterable[str], path: Path) -> None:
 
 
 def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
-    """Keys that only planar scenes have, before they are called unknown."""
     for table, keys in UNAVAILABLE.items():
         found = data.get(table, [])
         for entry in found if isinstance(found, list) else [found]:
@@ -292,7 +291,6 @@ def _guess_problems(scene: SceneKeys) -> Iterator[str]:
 
 
 def _load_problems(scene: SceneKeys) -> Iterator[str]:
-    """Numbers of voltages, and of moments of joints with several coordinates."""
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
     joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     for k, load in enumerate(scene.load, 1):

@@ -113,7 +113,6 @@ def _renamed(value: T, places: Mapping[str, str]) -> T:
 
 
 def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str]:
-    """What cannot be had together with links in pieces."""
     if not divided:
         return
     beside = f'with subdivided bodies ("{next(iter(divided))}")'
