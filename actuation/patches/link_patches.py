@@ -80,7 +80,7 @@ class LinkPatches:
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
         """By layout, of modal forces F_p (T, n); `unmet` is what all layouts leave of those that this one reaches."""
         found = solve_voltages(self.reach, self.reached.forces(F_p))
-        return self._by_layout(found.required, found.within_limit, self.unmet(F_p, found.within_limit))
+        return self._by_layout(found.required, found.within_limit, F_p)
 
     @property
     def amplifiers(self) -> Amplifiers:
@@ -94,16 +94,14 @@ class LinkPatches:
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
         """By layout, of known V (T, k) where modal forces F_p (T, n) are wanted."""
-        within = np.clip(V, *self.amplifiers.range)
-        return self._by_layout(V, within, self.unmet(F_p, within))
+        return self._by_layout(V, np.clip(V, *self.amplifiers.range), F_p)
 
-    def _by_layout(self, required: Array, within: Array, unmet: Array) -> dict[str, Voltages]:
-        ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
-        pairs = (np.split(x, ends[:-1], axis=1) for x in (required, within))
-        return {
-            name: Voltages(one, other, self.modes[name].forces(unmet), self.modes[name].served)
-            for name, one, other in zip(self.arrays, *pairs, strict=True)
-        }
+    def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
+        unmet, found = self.unmet(F_p, within), {}
+        for name, modes in self.modes.items():
+            own = np.s_[:, self.columns(name)]
+            found[name] = Voltages(required[own], within[own], modes.forces(unmet), modes.served)
+        return found
 
     @property
     def per_volt(self) -> dict[str, Array]:

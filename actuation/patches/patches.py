@@ -61,12 +61,6 @@ class Reach:
         """Whether some voltages produce any forces on the modes to be served."""
         return self.Phi_V.shape[1] >= self.served and not self.unreached_modes.size
 
-    @property
-    def in_order(self) -> Array:
-        """(rows, n) roots of weights: modes first, and attachment modes with what more patches than modes are left."""
-        n, k = self.Phi_V.shape
-        return served_first(self.served, n, k)
-
 
 def served_first(served: int, n: int, patches: int) -> Array:
     """(rows, n) roots of weights of the `served` first of n modes; more patches than these serve the others, too."""
@@ -208,7 +202,7 @@ def voltage_gain(patches: Reach) -> Array:
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and patches.serves_all:
         return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
-    W_sqrt = patches.in_order if patches.serves_all else patches.W_sqrt
+    W_sqrt = served_first(served, n, k) if patches.serves_all else patches.W_sqrt
     scale = voltage_scale(patches)
     return scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
 
