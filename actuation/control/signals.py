@@ -21,7 +21,6 @@ from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.scene.space import SPACES
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
-from ..patches.patches import PatchArray
 from .records import Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2, "accelerometer": 3, "gyro": 4}
@@ -233,19 +232,16 @@ def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Arr
     return found
 
 
-def volts_per_turn(patches: PatchArray, capacitance: float | None = None) -> Array:
-    """Voltage (k,) of each patch per turn: its charge c [φ'(x2) − φ'(x1)] over its capacitance.
-
-    By reciprocity the charge of a rotation is the moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The
-    free capacitance of a patch is that of its layers; one that also drives the link is read through a bridge, which
-    leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992).
-    """
-    return patches.moment_per_volt / (patches.layout.capacitance() if capacitance is None else capacitance)
-
-
 def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
-    """By body that may carry a layout: (k, n) that its patches read per unit of the modes of the body's file."""
-    volts, columns = volts_per_turn(of_link.arrays[layout], capacitance), of_link.columns(layout)
+    """By body that may carry a layout: (k, n) that its patches read per unit of the modes of the body's file.
+
+    A patch reads its charge c [φ'(x2) − φ'(x1)] over its capacitance. By reciprocity the charge of a rotation is the
+    moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The free capacitance of a patch is that of its
+    layers; one that also drives the link is read through a bridge, which leaves this voltage (Dosch, Inman and Garcia,
+    J. Intell. Mater. Syst. Struct. 3, 1992).
+    """
+    array, columns = of_link.arrays[layout], of_link.columns(layout)
+    volts = array.moment_per_volt / (array.layout.capacitance() if capacitance is None else capacitance)
     return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
 
 
