@@ -132,8 +132,7 @@ class SolidGeometry(Record):
 class SolidMeshRecord(Record):
     """Mesh of a solid; for a part from a mesh file `order` only.
 
-    `size` is the requested edge length; `divisions` (along x, y, z) makes a structured mesh, of boxes only. `order` is
-    the polynomial order of the displacements; curved faces get curved elements.
+    Curved faces get curved elements.
     """
 
     cell: Literal["tetrahedron", "hexahedron"] | None = None
@@ -149,9 +148,7 @@ class SolidMeshRecord(Record):
 class PlaceRecord(Record):
     """A place on a link: where an interface is.
 
-    A beam's `position` is a number, m from the root. A solid's place is a face: that of a physical `group` of the
-    mesh file, or the one nearest to the point `position` (m, link frame) that faces along `normal`; a number as
-    `position` is the cross section at that distance from the root. The faces of `root` and `tip` need no table: they
+    The faces of `root` and `tip` need no table: they
     are the plane faces at x = 0 and x = length, unless a table of that name says otherwise.
     """
 

@@ -131,8 +131,7 @@ class BeamModel(Record):
 class Reference(Record):
     """Reference conditions of the link's frame (docs/theory.md, Reference conditions).
 
-    `coupling` is that of a solid's end faces; default: mean for simply-supported, else rigid. Sections of beams stay
-    plane, so both are the same there.
+    Sections of beams stay plane, so that both kinds of `coupling` are the same there.
     """
 
     condition: Literal["cantilever", "simply-supported", "craig-bampton"]

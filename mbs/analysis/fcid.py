@@ -43,11 +43,7 @@ Shape = list[list[TimeFunction]]
 
 
 class Fcid(TimedAnalysis):
-    """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape.
-
-    `shape` is zero, the static equilibrium at every instant, or given in `modal`: expressions for the first modes of a
-    body, numbered as in its modal file; all others are 0. `check` as in `Pcid`.
-    """
+    """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape."""
 
     kind: Literal["fcid"]
     shape: Literal["zero", "static", "given"]

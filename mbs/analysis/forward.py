@@ -37,9 +37,7 @@ MOST_STEPS = 100_000
 class Forward(ActuatedAnalysis):
     """Motion under the loads of the scene and the inputs computed by the inverse analysis `actuation`.
 
-    `apply` selects the inputs: motor torques, motor torques and patch voltages, forces along the trajectories, or
-    forces at the actuation points. `limits` saturates motors and patches at their limits, with the current and slew
-    rate of amplifiers. Their bandwidth and delay always act.
+    Limits of amplifiers are those of current and slew rate, too. Their bandwidth and delay always act.
     """
 
     kind: Literal["forward"]

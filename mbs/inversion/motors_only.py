@@ -140,13 +140,7 @@ PATH_TOLERANCE = 1e-9  # m, rad: of a path that is left
 
 
 class MotorsOnly(TimedAnalysis):
-    """Motor torques that move the robot along its trajectories without patches (stable inversion).
-
-    With `output` "tip" the points of the trajectories follow them; with "redefined" the points with `factor` times the
-    vibration do. The default `factor` is nine tenths of the largest that is minimum phase. `pre_actuation` and
-    `post_actuation` (s) are durations of torques before and after the path, which is constant there; by default the
-    zero dynamics determines them. `check` as in `Pcid`.
-    """
+    """Motor torques that move the robot along its trajectories without patches (stable inversion)."""
 
     kind: Literal["motors-only"]
     output: Literal["tip", "redefined"] = "tip"
