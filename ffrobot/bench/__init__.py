@@ -1,7 +1,6 @@
 """Run time against error of a scene, measured: `ffrobot bench`.
 
-measuring    one solve within a budget of time, its histories, and how far these are from a reference
-precision    a reference, every integrator at every tolerance; error of mesh, modes and time integration
+precision    solves within a budget of time, a reference, every integrator at every tolerance; error of mesh and modes
 campaign     what runs in which order, what is written and printed
 """
 

@@ -26,8 +26,18 @@ from ..present.lines import print_table
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
-from .measuring import KINDS, find_analysis
-from .precision import INTEGRATORS, TIGHTER, Point, ReferenceRun, Row, find_reference, measure_axes, measure_points
+from .precision import (
+    INTEGRATORS,
+    KINDS,
+    TIGHTER,
+    Point,
+    ReferenceRun,
+    Row,
+    find_analysis,
+    find_reference,
+    measure_axes,
+    measure_points,
+)
 
 FORMAT, FORMAT_VERSION = "ffrobot-bench", 1
 

@@ -9,8 +9,7 @@ import tomli_w
 from beam_links import beam_link, rectangle
 
 from ffrobot import InputError
-from ffrobot.bench.measuring import TimedRun
-from ffrobot.bench.precision import Point, _is_hopeless
+from ffrobot.bench.precision import Point, TimedRun, _is_hopeless
 from ffrobot.cli import cli
 
 MODES = {"count": 2, "family": "in-plane-bending", "attachment_modes": False}

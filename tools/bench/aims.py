@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ffrobot.bench.measuring import KINDS
-from ffrobot.bench.precision import Point, Row, find_reference, measure_points, repeat_point
+from ffrobot.bench.precision import KINDS, Point, Row, find_reference, measure_points, repeat_point
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene

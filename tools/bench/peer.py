@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ffrobot.bench.measuring import relative
-from ffrobot.bench.precision import PATIENCE, Point, ReferenceRun, Row, repeat_point
+from ffrobot.bench.precision import PATIENCE, Point, ReferenceRun, Row, relative, repeat_point
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.scene import Scene

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ffrobot.bench import OF_A_SCENE
 from ffrobot.bench.campaign import TIME, Campaign, Rows, Swept, draw, draw_work_precision, grouped, inputs_of, points_of
-from ffrobot.bench.measuring import find_analysis
+from ffrobot.bench.precision import find_analysis
 from ffrobot.common.errors import InputError
 from ffrobot.run.solve import prepare_scene
 from ffrobot.scene.load import load_scene
