@@ -26,7 +26,7 @@ from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first
 from .common.version import VERSION
-from .present.failures import describe, ready_streams, without_output
+from .present.console import describe, ready_streams, without_output
 from .present.logs import LOGGER, log_warning
 
 

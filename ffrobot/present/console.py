@@ -1,28 +1,29 @@
-"""The standard output as a console, and progress: a bar on a terminal, a line now and then in a pipe or a log.
+"""Standard streams, the standard output as a console, progress, and what is said of errors of input and machine.
 
-Importing this loads nothing of an analysis.
+Progress is a bar on a terminal, a line now and then in a pipe or a log. Importing this loads nothing of an analysis.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import TextIOWrapper
 from shutil import get_terminal_size
+from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
-if TYPE_CHECKING:
-    from rich.console import Console
-import logging
-import time
-from types import TracebackType
-from typing import TYPE_CHECKING
-
+from ..common.errors import FfrobotError
+from ..common.extras import missing
 from ..common.parallel import is_first
 from ..run.watcher import Watcher
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.progress import Progress, TaskID
-
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 
@@ -105,3 +106,61 @@ class Display(Watcher):
         if now - self._last_shown > EVERY and is_first():
             self._last_shown = now
             print(f"ffrobot: {self._title}{reached} ({now - self._began:.0f} s)", file=sys.stderr, flush=True)
+
+
+def describe(error: Exception) -> str | None:
+    """The message of an error that comes from the user's input or the machine; None where it is a fault of ffrobot."""
+    if isinstance(error, FfrobotError):
+        return str(error)
+    if isinstance(error, ModuleNotFoundError):
+        return missing(error)
+    if isinstance(error, ImportError) and ".so" in f"{error.path} {error}":  # a library that it needs is not there
+        return f"a library cannot be loaded: {error}"
+    if isinstance(error, MemoryError):
+        return "not enough memory: fewer outputs, elements or modes take less"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'a file that a library reads or writes'}: {error.strerror}"
+    return None
+
+
+class _Output(TextIOWrapper):
+    """Standard output whose errors have its name: libraries raise others without one."""
+
+    def write(self, text: str, /) -> int:
+        with _named():
+            return super().write(text)
+
+    def flush(self) -> None:
+        with _named():
+            super().flush()
+
+
+@contextmanager
+def _named() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        error.filename = "standard output"
+        raise
+
+
+def ready_streams() -> None:
+    """Have streams that take every character and are there: one that was closed is as good as none."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 (for good)
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    if type(sys.stdout) is TextIOWrapper:
+        encoding, at_lines = sys.stdout.encoding, sys.stdout.line_buffering
+        sys.stdout = _Output(sys.stdout.detach(), encoding, "backslashreplace", line_buffering=at_lines)
+
+
+def without_output() -> None:
+    """Forget what is still to be printed where it cannot be, so that Python does not try again at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
