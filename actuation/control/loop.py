@@ -204,11 +204,22 @@ def loop_record(
     if found is not None and metrics.verdict not in CALM:
         texts = advice(loops, pids if len(pids) == len(analysis.controller) else (), T, delay, found)
     return LoopRecord(
-        setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
-        loop.commands[taken], loop.wanted[taken], tip_error,
-        largest(run.time, np.linalg.norm(run.error, axis=1))[1], metrics, warnings, found, tuple(texts),
-        *((loops[0][1], loop_eigenvalues(*loops[0], T, delay)) if loops else ()),
-    )  # fmt: skip
+        inputs=setup.inputs,
+        outputs=setup.outputs,
+        time=setup.times[taken],
+        readings=loop.readings[taken],
+        reference=setup.reference[taken],
+        commands=loop.commands[taken],
+        wanted=loop.wanted[taken],
+        tip_error=tip_error,
+        tip_error_peak_time=largest(run.time, np.linalg.norm(run.error, axis=1))[1],
+        metrics=metrics,
+        warnings=warnings,
+        margins=found,
+        advice=tuple(texts),
+        feedback=loops[0][1] if loops else None,
+        poles=loop_eigenvalues(*loops[0], T, delay) if loops else None,
+    )
 
 
 def _warnings(

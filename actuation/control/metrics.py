@@ -102,20 +102,20 @@ def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable:
     asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0)
     lowest, window = ringing(*resting(run.place_at, t), lowest)
     return Metrics(
-        _verdict(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
-        root_mean_square(t, distance),
-        largest(t, distance)[0],
-        _settling(t, distance),
-        vibration(t, run.error, window, lowest),
-        float(distance[-1]),
-        float(((work[1:] + work[:-1]) / 2 * np.diff(t)).sum()),
-        float((volts**2).sum() * setup.sample_time),
-        float(np.abs(moments).max(initial=0.0)),
-        float(np.abs(volts).max(initial=0.0)),
-        float(cut.any(axis=1).mean()),
-        overshoot(t, run.place_at(t), run.error),
-        lowest,
-        window,
+        verdict=_verdict(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
+        tip_error_rms=root_mean_square(t, distance),
+        tip_error_max=largest(t, distance)[0],
+        settling_time=_settling(t, distance),
+        vibration=vibration(t, run.error, window, lowest),
+        residual=float(distance[-1]),
+        motor_work=float(((work[1:] + work[:-1]) / 2 * np.diff(t)).sum()),
+        voltage_effort=float((volts**2).sum() * setup.sample_time),
+        peak_moment=float(np.abs(moments).max(initial=0.0)),
+        peak_voltage=float(np.abs(volts).max(initial=0.0)),
+        saturated=float(cut.any(axis=1).mean()),
+        overshoot=overshoot(t, run.place_at(t), run.error),
+        lowest_frequency=lowest,
+        vibration_window=window,
     )
 
 

@@ -160,11 +160,23 @@ def _optimum(
     folder = runs.folder / BEST
     scene = run_files(runs.path, changes, folder).write(folder)
     return Optimum(
-        runs.path, problem, space, method, best.start, best.best, best.optimality, best.message,
-        tuple(searches), evaluations.designs.count, tuple(evaluations.failures), tolerance, verdict,
-        scene if runs.kept else None, designs=runs.folder / "designs.csv" if runs.kept else None,
+        scene=runs.path,
+        problem=problem,
+        space=space,
+        method=method,
+        start=best.start,
+        best=best.best,
+        optimality=best.optimality,
+        message=best.message,
+        searches=tuple(searches),
+        runs=evaluations.designs.count,
+        failures=tuple(evaluations.failures),
+        tolerance=tolerance,
+        verdict=verdict,
+        best_scene=scene if runs.kept else None,
+        designs=runs.folder / "designs.csv" if runs.kept else None,
         tried=tuple(evaluations.searched),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
