@@ -23,7 +23,7 @@ from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, Setup, make_controllers
 from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
 from .margins import Feedback
-from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis
+from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis, Sensor
 from .robot import default_tip, estimated_sensors
 from .signals import Sensing, Signal, filters, make_signals, merged
 
@@ -86,16 +86,10 @@ def kalman(
 ) -> Observer:
     """The steady-state filter of a model that has what is read and estimated among its outputs.
 
-    `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for sensors without noise,
-    for noise that acts on no input of the model, and where something that does not die out cannot be seen.
+    `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for noise that acts on no
+    input of the model, and where something that does not die out cannot be seen.
     """
     inputs, T, delay = sampling
-    exact = [s.name for s in read if not (s.sensor.deviation(T) or s.sensor.resolution)]
-    if exact or not read:
-        raise InputError(
-            "expected sensors with noise, noise_density or resolution, found"
-            + (f" none of these of {quoted(exact)}" if exact else " no sensor")
-        )
     names = [signal.name for signal in read]
     rows, columns = model.outputs(names), model.inputs(inputs)
     added, process = model.inputs(list(record.disturbance)), model.inputs(list(record.process))
@@ -121,14 +115,7 @@ def kalman(
     R = np.array([s.sensor.deviation(T) ** 2 + s.sensor.resolution**2 / 12 for s in read])
     a, c, q = A[np.ix_(unknown, unknown)], C[:, unknown], Q[np.ix_(unknown, unknown)]
     states = [*model.state_names, *record.disturbance, *(f"filter {k}" for k in range(1, len(A_w) + 1))]
-    try:
-        P = riccati(a.T, c.T, q, np.diag(R))
-    except ValueError as error:
-        unseen, still = hidden(a, c, states), hidden(a.T, q, states)
-        why = f"they cannot see {', '.join(unseen)}" if unseen else str(error)
-        if still and not unseen:
-            why = f"noise of `process` does not reach {', '.join(still)}"
-        raise InputError(f"expected sensors that see every motion that does not decay, found: {why}") from None
+    P = _covariance(a, c, q, R, states)
     L = np.zeros((len(A), len(rows)))
     L[unknown] = np.linalg.solve(c @ P @ c.T + np.diag(R), c @ P).T
     covariance = np.zeros_like(A)
@@ -139,6 +126,17 @@ def kalman(
     B = np.vstack([plant.B, np.zeros((len(A_w), len(columns)))])
     names = [*estimated, *(f"disturbance/{name}" for name in record.disturbance)]
     return Observer(A, B, C, L, np.zeros_like(L), E, covariance, tuple(names))
+
+
+def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -> Array:
+    """P of x − x̂⁻ in the steady state. Raises `InputError` where there is none."""
+    try:
+        return riccati(A.T, C.T, Q, np.diag(R))
+    except ValueError as error:
+        unseen, still = hidden(A, C, states), hidden(A.T, Q, states)
+        why = f"noise of `process` does not reach {', '.join(still)}" if still else str(error)
+        why = f"they cannot see {', '.join(unseen)}" if unseen else why
+        raise InputError(f"expected sensors that see every motion that does not decay, found: {why}") from None
 
 
 def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
@@ -305,10 +303,37 @@ class Observed:
         )  # fmt: skip
 
 
-def unseen(model: LinearModel, read: Sequence[Signal]) -> list[str]:
-    """In words, modes of the model that sensors cannot see."""
-    lost = observability(model, [signal.name for signal in read]).lost
-    return [f"observer: sensors cannot see {', '.join(lost)}"] if lost else []
+def kalman_filters(
+    record: KalmanRecord, context: ActuatedContext, setup: Setup, sensors: Sequence[Sensor], more: Sequence[Sensor]
+) -> tuple[Schedule, list[str]]:
+    """The filters at instants of the path that estimate `more`, and in words the modes that `sensors` cannot see there.
+
+    Raises `InputError` for sensors without noise, and as `kalman` does.
+    """
+    robot, source, T = setup.robot, setup.source, setup.sample_time
+    plant = with_compliance(robot.model)
+    read, estimated = ([s for one in of for s in make_signals(plant, context, one)] for of in (sensors, more))
+    exact = [s.name for s in read if not (s.sensor.deviation(T) or s.sensor.resolution)]
+    if exact or not read:
+        raise InputError(
+            "expected sensors with noise, noise_density or resolution, found"
+            + (f" none of these of {quoted(exact)}" if exact else " no sensor")
+        )
+    wanted = merged(estimated, ())
+    names, signals = [signal.name for signal in wanted], (*read, *wanted)
+    at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
+    instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
+    pushed = (name.split("/") for name in (*record.process, *record.disturbance))
+    points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
+    filters_there, unseen = [], dict[str, None]()
+    for row in instants:
+        mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
+        readings = zip(*Sensing(plant, signals).rows(mechanism), strict=True)
+        model = state_space(mechanism, voltages, dict(zip([s.name for s in signals], readings, strict=True)))
+        filters_there.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
+        if lost := observability(model, [signal.name for signal in read]).lost:
+            unseen[f"observer: sensors cannot see {', '.join(lost)}"] = None
+    return Schedule(source.time[instants], tuple(filters_there)), list(unseen)
 
 
 def make_observed(
@@ -319,35 +344,16 @@ def make_observed(
     `reference` (K, estimates) as of `Setup`, `ranges` and `nominal` as of `Observed`. Raises `InputError` where the
     observer does not fit the robot.
     """
-    record, robot, T = analysis.observer, setup.robot, setup.sample_time
+    record, robot = analysis.observer, setup.robot
     tip, origin = analysis.tip or default_tip(robot.model), setup.reference
-    warnings: list[str] = []
+    unseen: list[str] = []
     try:
         if isinstance(record, KalmanRecord):
-            plant = with_compliance(robot.model)
-            read, more = (
-                [s for sensor in sensors for s in make_signals(plant, context, sensor)]
-                for sensors in (analysis.sensor, estimated_sensors(robot, analysis.controller, tip))
-            )
-            whole = merged(more, ())
-            names = [signal.name for signal in whole]
-            source, found = setup.source, []
-            at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
-            instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
-            pushed = (name.split("/") for name in (*record.process, *record.disturbance))
-            points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
-            for row in instants:
-                mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
-                rows = zip(*Sensing(plant, (*read, *whole)).rows(mechanism), strict=True)
-                readings = dict(zip([s.name for s in (*read, *whole)], rows, strict=True))
-                model = state_space(mechanism, voltages, readings)
-                found.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
-                warnings += unseen(model, read)
-            schedule = Schedule(source.time[instants], tuple(found))
+            sensors = analysis.sensor, tuple(estimated_sensors(robot, analysis.controller, tip))
+            schedule, unseen = kalman_filters(record, context, setup, *sensors)
         else:
             assert isinstance(record, GainsObserver)
-            one = given(record, setup)
-            schedule = Schedule(np.zeros(1), (one,))
+            schedule = Schedule(np.zeros(1), (given(record, setup),))
             if record.about == "zero":
                 origin, nominal = np.zeros_like(origin), np.zeros_like(nominal)
             reference = origin[:, setup.columns(*record.outputs)]
@@ -368,5 +374,4 @@ def make_observed(
         P = np.zeros((len(inner.inputs), len(inner.outputs)))
         P[inner.places(*own), inner.columns(*(f"estimate/disturbance/{name}" for name in own))] = 1.0
         acting.append(LinearFeedback(inner, P))
-    seen_badly = list(dict.fromkeys(warnings))
-    return Observed(schedule, inner, acting, ranges, (origin, nominal), record.settle, tip, seen_badly)
+    return Observed(schedule, inner, acting, ranges, (origin, nominal), record.settle, tip, unseen)
