@@ -29,52 +29,52 @@ UNITS = {
 NOT_IN_TABLE = ("compliance", "response", "robot")
 
 
-def torque_share(found: PoseMap) -> Array:
+def torque_share(poses: PoseMap) -> Array:
     """(P, motors) of the torque of each motor in the pose in its limit; nan where it has none."""
-    return np.abs(found.values["torque"]) / found.limits
+    return np.abs(poses.values["torque"]) / poses.limits
 
 
-def write_map(found: PoseMap) -> Path:
+def write_map(poses: PoseMap) -> Path:
     """Both files in the folder of the plan; the HDF5 file."""
-    plan = found.plan
+    plan = poses.plan
     with in_memory() as file:
         file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, MARK: CHECKSUM})
         file.attrs.update({"ffrobot_version": VERSION, "scene": str(plan.scene), "point": plan.point})
-        file.attrs["axes"], file.attrs["motors"] = [axis.name for axis in plan.axes], list(found.motors)
+        file.attrs["axes"], file.attrs["motors"] = [axis.name for axis in plan.axes], list(poses.motors)
         for axis in plan.axes:
             file[f"axes/{axis.name}"] = axis.values
-        file["status"] = found.status.reshape(plan.shape)
+        file["status"] = poses.status.reshape(plan.shape)
         file["status"].attrs["meaning"] = list(STATUS)
-        file["torque_limit"], file["frequencies"] = found.limits, plan.frequencies
-        for name, values in {**found.values, "torque_share": torque_share(found), "q": found.q}.items():
+        file["torque_limit"], file["frequencies"] = poses.limits, plan.frequencies
+        for name, values in {**poses.values, "torque_share": torque_share(poses), "q": poses.q}.items():
             file[name] = values.reshape(*plan.shape, *values.shape[1:])
             file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
         image = image_of(file)
     write_atomically(plan.folder / FILE, sealed(image), "map", make_folder=True, ours=True)
-    write_atomically(plan.folder / TABLE, _table(found).encode(), "table of the map", ours=True)
+    write_atomically(plan.folder / TABLE, _table(poses).encode(), "table of the map", ours=True)
     return plan.folder / FILE
 
 
-def _table(found: PoseMap) -> str:
+def _table(poses: PoseMap) -> str:
     """A line for each pose: the grid's coordinates, how it went, and all that is not a matrix."""
-    plan = found.plan
+    plan = poses.plan
     grid = np.stack(np.meshgrid(*(axis.values for axis in plan.axes), indexing="ij"), axis=-1)
     names = [axis.name for axis in plan.axes]
     columns = {name: column for name, column in zip(names, grid.reshape(-1, len(names)).T, strict=True)}
-    for name, values in {**found.values, "torque_share": torque_share(found)}.items():
+    for name, values in {**poses.values, "torque_share": torque_share(poses)}.items():
         if name.rpartition("/")[2] not in NOT_IN_TABLE:
-            columns |= _columns(found, name, values)
+            columns |= _columns(poses, name, values)
     lines: list[list[object]] = [[*names, "status", *(name for name in columns if name not in names)]]
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    for status, row in zip(found.status, rows, strict=True):
+    for status, row in zip(poses.status, rows, strict=True):
         lines.append([*row[: len(names)], STATUS[status], *("" if x != x else x for x in row[len(names) :])])
     return as_csv(lines)
 
 
-def _columns(found: PoseMap, name: str, values: Array) -> dict[str, Array]:
+def _columns(poses: PoseMap, name: str, values: Array) -> dict[str, Array]:
     if values.ndim == 1:
         return {name: values}
-    labels = {"torque": found.motors, "torque_share": found.motors}.get(name)
+    labels = {"torque": poses.motors, "torque_share": poses.motors}.get(name)
     if labels is None:
         is_vector = name.rpartition("/")[2] in ("place", "sag", "stiffness", "direction")
         labels = tuple("xyz" if is_vector else map(str, range(1, values.shape[1] + 1)))
@@ -112,9 +112,9 @@ class Quantity(NamedTuple):
         return int(np.nanargmax(self.values) if self.more_is_better else np.nanargmin(self.values))
 
 
-def quantities(found: PoseMap) -> dict[str, Quantity]:
+def quantities(poses: PoseMap) -> dict[str, Quantity]:
     """By the name of their picture."""
-    values, table = found.values, {}
+    values, table = poses.values, {}
     for condition, words in CONDITIONS.items():
         if f"joints_{condition}/frequency" in values:
             frequency = values[f"joints_{condition}/frequency"][:, 0]
@@ -127,7 +127,7 @@ def quantities(found: PoseMap) -> dict[str, Quantity]:
     reach = np.nanmax(np.linalg.norm(values["place"], axis=1))
     deflection = 1e3 * _beyond(ROUND_OFF * reach, np.linalg.norm(values["sag"], axis=1))
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)
-    share = torque_share(found)
+    share = torque_share(poses)
     if np.isfinite(share).any():
         table["torque"] = Quantity("largest static torque (% of limit)", 100 * _largest(share), False)
     elif share.shape[1]:
@@ -148,25 +148,25 @@ def _largest(values: Array) -> Array:
     return as_floats(np.where(known.any(axis=1), np.where(known, values, -np.inf).max(axis=1), np.nan))
 
 
-def print_map(found: PoseMap, console: Console) -> None:
+def print_map(poses: PoseMap, console: Console) -> None:
     """A table of quantities: the worst and the best value with the poses; then how many poses there are."""
-    console.print(f"{found.plan.point} over {' and '.join(axis.name for axis in found.plan.axes)}", soft_wrap=True)
-    print_table(console, ("quantity", "worst", "at", "best", "at"), _ranges(found))
-    counts = ", ".join(f"{int((found.status == k).sum())} {name}" for k, name in enumerate(STATUS))
+    console.print(f"{poses.plan.point} over {' and '.join(axis.name for axis in poses.plan.axes)}", soft_wrap=True)
+    print_table(console, ("quantity", "worst", "at", "best", "at"), _ranges(poses))
+    counts = ", ".join(f"{int((poses.status == k).sum())} {name}" for k, name in enumerate(STATUS))
     console.print(f"poses      {counts}", soft_wrap=True)
 
 
-def _ranges(found: PoseMap) -> Iterator[tuple[str, ...]]:
-    for quantity in quantities(found).values():
+def _ranges(poses: PoseMap) -> Iterator[tuple[str, ...]]:
+    for quantity in quantities(poses).values():
         if quantity.everywhere:
             yield quantity.title, quantity.everywhere, "everywhere", "", ""
         elif np.isfinite(quantity.values).any():
-            ends = ((f"{quantity.values[k]:.4g}", _place(found, k)) for k in (quantity.worst, quantity.best))
+            ends = ((f"{quantity.values[k]:.4g}", _place(poses, k)) for k in (quantity.worst, quantity.best))
             yield quantity.title, *(cell for end in ends for cell in end)
 
 
-def _place(found: PoseMap, number: int) -> str:
-    place = np.unravel_index(number, found.plan.shape)
-    pairs = zip(found.plan.axes, place, strict=True)
+def _place(poses: PoseMap, number: int) -> str:
+    place = np.unravel_index(number, poses.plan.shape)
+    pairs = zip(poses.plan.axes, place, strict=True)
     numbers = ((axis, axis.values[k]) for axis, k in pairs if len(axis.values) > 1)
     return ", ".join(f"{one:.3g} m" if axis.unit == "m" else f"{np.degrees(one):.3g}°" for axis, one in numbers)
