@@ -35,7 +35,7 @@ from ...mbs.scene.loads import Load
 class Sensor(Referring):
     """A sensor of a joint coordinate, of a point, of the strain at a point, or of patch voltages.
 
-    An acceleration has global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
+    Accelerations are in global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
     section. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
 
     A reading is filtered by `high_pass`, gets `bias` and Gaussian noise, is cut at ±`range` and rounded to
