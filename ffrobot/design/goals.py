@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..actuation.motors import CatalogMotor, choice_of
+from ..actuation.motor_catalog import CatalogMotor, choice_of
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, did_you_mean, either, quoted
 from ..common.peaks import root_mean_square, shares

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actuation.motors import CatalogMotor, read_catalog
+from ..actuation.motor_catalog import CatalogMotor, read_catalog
 from ..common.errors import InputError
 from ..common.keys import MOST_RUNS
 from ..common.tables import shown

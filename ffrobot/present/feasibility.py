@@ -11,7 +11,8 @@ import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 
-from ..actuation.motors import JointTask, MotorChoice, MotorFeasibility, choices, read_catalog
+from ..actuation.motor_catalog import JointTask, MotorChoice, choices, read_catalog
+from ..actuation.motors import MotorFeasibility
 from ..common.errors import InputError, quoted
 from ..results.file import Results
 from .lines import plain_table, print_table

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.motors import CatalogMotor, JointTask, choices, read_catalog
+from ffrobot.actuation.motor_catalog import CatalogMotor, JointTask, choices, read_catalog
 from ffrobot.common.errors import InputError
 
 OMEGA, INERTIA, AMPLITUDE = 3.0, 2.0, 0.8
