@@ -29,7 +29,7 @@ from ...mbs.run.outcome import Outcome
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
-from .controllers import Controller, PythonControl, Setup, make_controllers
+from .controllers import Controller, PythonControl, make_controllers
 from .linear import voltages_at
 from .linear_model import LinearModel, state_space
 from .loop import (
@@ -47,7 +47,7 @@ from .metrics import LoopMotion, last_change, place_of_tip
 from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
 from .records import SampledAnalysis
-from .robot import ControlledRobot, default_tip, estimated_sensors, input_names, needed_sensors
+from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input_names, needed_sensors
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged
 
 APART = 1e-6  # of a run, between two times of a spline

@@ -2,7 +2,7 @@
 
 A user's own controller: a function in a Python file that is given the setup and returns what is asked at samples.
 
-    def controller(setup):                 # actuation.control.controllers.Setup
+    def controller(setup):                 # actuation.control.robot.Setup
         gamma = setup.columns("joint/O")   # where readings are in y, by name
         tau = setup.places("joint/O")      # where commands are in u
 
@@ -19,22 +19,18 @@ It reads the sensors that the scene gives.
 from __future__ import annotations
 
 import runpy
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
-from ...common.errors import InputError, SolveError, quoted
+from ...common.arrays import Array
+from ...common.errors import InputError, SolveError
 from ...common.python_files import count_failed, count_imports, imported_files
-from ...common.structs import struct
-from ...mbs.model.model import Model
-from ...mbs.run.outcome import Outcome
-from ..patches.link_patches import LinkPatches
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
 from .records import Controller as Record
-from .robot import ControlledRobot, RigidArm, estimate
+from .robot import RigidArm, Setup, estimate
 
 
 class Controller(Protocol):
@@ -47,52 +43,6 @@ class Controller(Protocol):
 
     def __call__(self, k: int, y: Array) -> Array:
         """Commands u (inputs,) at sample k for the readings y (outputs,); they are added to the feed-forward."""
-
-
-@struct
-class Setup:
-    """What a controller may know when it is made."""
-
-    robot: ControlledRobot  # what is known of it; see there
-    model: Model  # its equations of motion
-    patches: Mapping[str, LinkPatches]  # by body
-    # inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    times: Array  # (K,) of the samples, s
-    sample_time: float  # s
-    delay: float  # s, after which a command acts
-    reference: Array  # (K, outputs) what the sensors would read on the motion of `source`
-    feed_forward: Array  # (K, inputs) what is commanded anyhow
-    source: Outcome  # of the inverse analysis
-
-    def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
-        """Joints with the names of their coordinates, one after the other."""
-        for joint in joints:
-            yield from ((joint, name) for name in self.robot.coordinates(joint))
-
-    @property
-    def has_estimates(self) -> bool:
-        """Whether an observer adds "estimate/NAME" to the readings."""
-        return any(name.startswith("estimate/") for name in self.outputs)
-
-    def columns(self, *names: str) -> Indices:
-        """Where these readings are in y, or their estimates. Raises `InputError` where there is neither."""
-        of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
-        return self._indices(of, self.outputs, "readings")
-
-    def places(self, *names: str) -> Indices:
-        """Where these commands are in u. Raises `InputError` for a joint without a motor."""
-        return self._indices(names, self.inputs, "commands")
-
-    def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
-        if missing := [name for name in names if name not in among]:
-            raise InputError(f"{self.robot.path}: controller: expected {of}, {quoted(among)}, found {quoted(missing)}")
-        return np.array([among.index(name) for name in names], dtype=int)
-
-    def patch_places(self, body: str) -> Indices:
-        """Where the voltages of a body's patches are in u."""
-        return self.places(*self.robot.patches[body].inputs)
 
 
 class LinearFeedback:
@@ -154,7 +104,7 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
         if record.sensor == "pzt":
             columns, modes = setup.columns(*link.inputs), estimate(link.volts, m)
         else:
-            columns, modes = modal_columns(setup, name, link.own.shape[1]), link.own[:m]
+            columns, modes = setup.modal_columns(name, link.own.shape[1]), link.own[:m]
         G[np.ix_(setup.patch_places(name), columns)] = damping @ modes
         bandwidth = max(bandwidth, float(link.omega[m - 1]))
     P, D = (None, G) if record.sensor == "pzt" else (G, None)
@@ -173,11 +123,6 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
         )
     K[np.ix_(setup.places(*record.inputs), np.array(states, dtype=int))] = gain
     return LinearFeedback(setup, K)
-
-
-def modal_columns(setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:
-    """The readings of the lowest m modal coordinates of a body, or of their rates."""
-    return setup.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))
 
 
 class ComputedTorqueControl:

@@ -7,21 +7,35 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...common.arrays import Array, Booleans, ComplexArray
-from ...common.peaks import largest
+from ...common.peaks import largest, root_mean_square
 from ...common.structs import struct
 from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.run.outcome import Details
 from ...mbs.run.samples import in_order
-from .controllers import Controller, Setup
+from .controllers import Controller
 from .margins import Feedback, Loops, Margins, advice, loop_eigenvalues, margins
-from .metrics import CALM, LoopMotion, Metrics, measure, resting, ringing, watched
+from .metrics import (
+    CALM,
+    RESTING,
+    LoopMotion,
+    Metrics,
+    overshoot,
+    resting,
+    ringing,
+    settling,
+    verdict_of,
+    vibration,
+    watched,
+)
 from .observer import Estimates
 from .records import ComputedTorque, JointPid, SampledAnalysis
+from .robot import Setup
 from .signals import Filter, Signal
 
 OF_LAG = 2  # steps of the shortest time constant of an amplifier
 OF_RATES = 4  # steps of a sample, at least, where amplifiers limit rates or currents
 MOST = 20  # steps of a sample
+JITTER = 20.0  # times noise and resolution of a sensor: less than so much of motion it may not see
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
 
@@ -116,6 +130,44 @@ class AmplifiedLoop:
         known = [loop.first[column], *loop.commands[max(k - 2, 0) : k, column]]
         late = 0.0 if k == 0 else float(np.clip((self._samples[k - 1] + delay - t) / h, 0.0, 1.0))
         return float((1.0 - late) * known[-1] + (late * known[-2] if late else 0.0))
+
+
+def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
+    """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN.
+
+    `is_stable`: the sampled linear loop; None where it is not known.
+    """
+    t, motors = run.time, len(setup.robot.motors)
+    distance = np.linalg.norm(run.error, axis=1)
+    taken = slice(loop.taken)
+    moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
+    work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
+    cut = np.sign(loop.commands[taken]) * loop.at_limits
+    asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0)
+    lowest, window = ringing(*resting(run.place_at, t), lowest)
+    return Metrics(
+        verdict=verdict_of(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
+        tip_error_rms=root_mean_square(t, distance),
+        tip_error_max=largest(t, distance)[0],
+        settling_time=settling(t, distance),
+        vibration=vibration(t, run.error, window, lowest),
+        residual=float(distance[-1]),
+        motor_work=float(((work[1:] + work[:-1]) / 2 * np.diff(t)).sum()),
+        voltage_effort=float((volts**2).sum() * setup.sample_time),
+        peak_moment=float(np.abs(moments).max(initial=0.0)),
+        peak_voltage=float(np.abs(volts).max(initial=0.0)),
+        saturated=float(cut.any(axis=1).mean()),
+        overshoot=overshoot(t, run.place_at(t), run.error),
+        lowest_frequency=lowest,
+        vibration_window=window,
+    )
+
+
+def _is_seen(loop: Loop, setup: Setup) -> bool:
+    """Whether sensors move at the end by more than their noise and resolution may be the cause of."""
+    end = slice(loop.taken - max(round(RESTING * loop.taken), 1), loop.taken)
+    moves, blurred = np.ptp(loop.readings[end] - setup.reference[end], axis=0), loop.blur > 0.0
+    return not blurred.any() or bool((moves > JITTER * loop.blur)[blurred].any())
 
 
 @struct

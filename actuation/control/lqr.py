@@ -9,7 +9,6 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from .controllers import Setup, modal_columns
 from .linear_model import (
     LinearModel,
     SampledModel,
@@ -21,7 +20,7 @@ from .linear_model import (
     state_space,
 )
 from .records import JointPid, Lqr
-from .robot import estimate
+from .robot import Setup, estimate
 
 MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
@@ -150,8 +149,8 @@ def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Ar
         rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body}/")], dtype=int)
         m = len(rows)
         if record.sensor == "ideal":
-            values[np.ix_(rows, modal_columns(setup, body, m, ""))] = np.eye(m)
-            rates[np.ix_(rows, modal_columns(setup, body, m))] = np.eye(m)
+            values[np.ix_(rows, setup.modal_columns(body, m, ""))] = np.eye(m)
+            rates[np.ix_(rows, setup.modal_columns(body, m))] = np.eye(m)
         elif m and (link := setup.robot.patches.get(body)) is not None:
             known = estimate(link.volts @ link.own, m)
             at = np.ix_(rows[: len(known)], setup.columns(*link.inputs))

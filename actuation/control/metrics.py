@@ -11,17 +11,13 @@ they are read at times that do not depend on the steps (`watched`), and no fit i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.peaks import largest, root_mean_square, shares
+from ...common.peaks import largest, shares
 from ...common.structs import struct
-
-if TYPE_CHECKING:  # metrics are read from files, too, by what does not control
-    from .controllers import Setup
-    from .loop import Loop
 
 SETTLED = 0.05  # of the largest error
 PERIODS = 3.0  # of the lowest frequency, over which what is slower is found
@@ -40,7 +36,6 @@ AT_LIMITS = 0.05  # of the samples
 KEPT = 0.5  # of the vibration of a quarter, in its second half
 NEGLIGIBLE = 1e-3  # of the largest motion, or of the way
 ROUND_OFF = 1e-9  # m
-JITTER = 20.0  # times noise and resolution of a sensor
 CALM = ("stable", "not settled")
 
 DEFINITIONS = (
@@ -54,7 +49,7 @@ DEFINITIONS = (
 class Metrics:
     """One run in numbers; see `DEFINITIONS`."""
 
-    verdict: str  # see `_verdict`
+    verdict: str  # see `verdict_of`
     # tip_error_rms, tip_error_max: distance of the tip from its place, m
     tip_error_rms: float
     tip_error_max: float
@@ -86,37 +81,6 @@ class LoopMotion:
     completed: bool  # whether it came to its end
     is_disturbed: bool  # by loads that the reference does not know
     quiet: float  # s, from which on the reference rests and loads stay
-
-
-def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
-    """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN.
-
-    `is_stable`: the sampled linear loop; None where it is not known.
-    """
-    t, motors = run.time, len(setup.robot.motors)
-    distance = np.linalg.norm(run.error, axis=1)
-    taken = slice(loop.taken)
-    moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
-    work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
-    cut = np.sign(loop.commands[taken]) * loop.at_limits
-    asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0)
-    lowest, window = ringing(*resting(run.place_at, t), lowest)
-    return Metrics(
-        verdict=_verdict(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
-        tip_error_rms=root_mean_square(t, distance),
-        tip_error_max=largest(t, distance)[0],
-        settling_time=_settling(t, distance),
-        vibration=vibration(t, run.error, window, lowest),
-        residual=float(distance[-1]),
-        motor_work=float(((work[1:] + work[:-1]) / 2 * np.diff(t)).sum()),
-        voltage_effort=float((volts**2).sum() * setup.sample_time),
-        peak_moment=float(np.abs(moments).max(initial=0.0)),
-        peak_voltage=float(np.abs(volts).max(initial=0.0)),
-        saturated=float(cut.any(axis=1).mean()),
-        overshoot=overshoot(t, run.place_at(t), run.error),
-        lowest_frequency=lowest,
-        vibration_window=window,
-    )
 
 
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
@@ -228,7 +192,8 @@ def _slow(t: Array, values: Array, window: float) -> Array:
     return savgol_filter(values, count, CUBIC, axis=0)
 
 
-def _settling(t: Array, distance: Array) -> float:
+def settling(t: Array, distance: Array) -> float:
+    """When (s) `distance` (T,) stays below `SETTLED` of its largest value; NaN where it does not."""
     largest_error = float(distance.max())
     return _last_crossing(t, distance, SETTLED * largest_error) if largest_error > 0.0 else 0.0
 
@@ -260,7 +225,7 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
     return float(even[min(changing[-1] + 1, FINE)]) if changing.size else float(time[0])
 
 
-def _verdict(
+def verdict_of(
     run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
     """Of the sampled linear loop, where that is known, and of the run; `cut` (K, inputs): 1 and -1 at limits, else 0.
@@ -297,13 +262,6 @@ def _verdict(
     moves, least = off[even >= even[-1] - tail].max(initial=0.0), np.linalg.norm(np.ptp(run.place_at(even), axis=0))
     is_settled = moves <= max(SETTLED * off.max(initial=0.0), NEGLIGIBLE * least, ROUND_OFF)
     return "stable" if is_settled or not is_quiet or not is_seen else "not settled"
-
-
-def _is_seen(loop: Loop, setup: Setup) -> bool:
-    """Whether sensors move at the end by more than their noise and resolution may be the cause of."""
-    end = slice(loop.taken - max(round(RESTING * loop.taken), 1), loop.taken)
-    moves, blurred = np.ptp(loop.readings[end] - setup.reference[end], axis=0), loop.blur > 0.0
-    return not blurred.any() or bool((moves > JITTER * loop.blur)[blurred].any())
 
 
 def _grows(shaking: Array) -> bool:

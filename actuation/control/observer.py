@@ -20,11 +20,11 @@ from ...common.errors import InputError, SolveError, quoted
 from ...common.structs import struct
 from ...mbs.model.gears import with_compliance
 from ..context import ActuatedContext
-from .controllers import Controller, LinearFeedback, Setup, make_controllers
+from .controllers import Controller, LinearFeedback, make_controllers
 from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
 from .margins import Feedback
-from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis, Sensor
-from .robot import default_tip, estimated_sensors
+from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis, ScheduledObserver, Sensor
+from .robot import Setup, default_tip, estimated_sensors
 from .signals import Sensing, Signal, filters, make_signals, merged
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
@@ -304,7 +304,11 @@ class Observed:
 
 
 def kalman_filters(
-    record: KalmanRecord, context: ActuatedContext, setup: Setup, sensors: Sequence[Sensor], more: Sequence[Sensor]
+    record: KalmanObserver | ScheduledObserver,
+    context: ActuatedContext,
+    setup: Setup,
+    sensors: Sequence[Sensor],
+    more: Sequence[Sensor],
 ) -> tuple[Schedule, list[str]]:
     """The filters at instants of the path that estimate `more`, and in words the modes that `sensors` cannot see there.
 

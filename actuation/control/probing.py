@@ -11,8 +11,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
-from .controllers import Controller, Setup
+from .controllers import Controller
 from .margins import Feedback
+from .robot import Setup
 
 LONGEST, FEWEST = 64, 12  # samples that are looked at
 AT, LATER = 1, 4  # sample at which readings are off: the first may be special; and that of all together

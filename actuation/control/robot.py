@@ -1,8 +1,8 @@
-"""What controllers ask of a robot: names, sensors, links, patches, linear and rigid models."""
+"""What controllers ask of a robot: names, sensors, links, patches, linear and rigid models, what they are made with."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
-from ...common.errors import InputError, SolveError
+from ...common.arrays import Array, Indices, as_floats
+from ...common.errors import InputError, SolveError, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
 from ...mbs.model.body import Body
@@ -275,3 +275,53 @@ def default_tip(model: Model) -> str:
         return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
     return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
+
+
+@struct
+class Setup:
+    """What a controller may know when it is made."""
+
+    robot: ControlledRobot
+    model: Model  # its equations of motion
+    patches: Mapping[str, LinkPatches]  # by body
+    # inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    times: Array  # (K,) of the samples, s
+    sample_time: float  # s
+    delay: float  # s, after which a command acts
+    reference: Array  # (K, outputs) what the sensors would read on the motion of `source`
+    feed_forward: Array  # (K, inputs) what is commanded anyhow
+    source: Outcome  # of the inverse analysis
+
+    def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
+        """Joints with the names of their coordinates, one after the other."""
+        for joint in joints:
+            yield from ((joint, name) for name in self.robot.coordinates(joint))
+
+    @property
+    def has_estimates(self) -> bool:
+        """Whether an observer adds "estimate/NAME" to the readings."""
+        return any(name.startswith("estimate/") for name in self.outputs)
+
+    def columns(self, *names: str) -> Indices:
+        """Where these readings are in y, or their estimates. Raises `InputError` where there is neither."""
+        of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
+        return self._indices(of, self.outputs, "readings")
+
+    def places(self, *names: str) -> Indices:
+        """Where these commands are in u. Raises `InputError` for a joint without a motor."""
+        return self._indices(names, self.inputs, "commands")
+
+    def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
+        if missing := [name for name in names if name not in among]:
+            raise InputError(f"{self.robot.path}: controller: expected {of}, {quoted(among)}, found {quoted(missing)}")
+        return np.array([among.index(name) for name in names], dtype=int)
+
+    def patch_places(self, body: str) -> Indices:
+        """Where the voltages of a body's patches are in u."""
+        return self.places(*self.robot.patches[body].inputs)
+
+    def modal_columns(self, body: str, m: int, ending: str = "/rate") -> Indices:
+        """The readings of the lowest m modal coordinates of a body, or of their rates."""
+        return self.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))

@@ -12,7 +12,7 @@ import numpy as np
 from ..actuation.context import ActuatedContext
 from ..actuation.control.closed_loop import ClosedLoop
 from ..actuation.control.records import JointPid, Sensor
-from ..actuation.control.robot import Robot, default_tip
+from ..actuation.control.robot import ControlledRobot, default_tip
 from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
 from ..common.structs import struct
@@ -127,7 +127,7 @@ class _Runs:
         """Critically damped with rigid links, and slow enough for its samples where links bend away from the motors."""
         model, motors = self.context.model, self.context.model.motors
         columns = np.concatenate([*motors.values()]).astype(int)
-        arm = Robot(without_paths(model), self.context.patches, self.source).rigid()
+        arm = ControlledRobot(without_paths(model), self.context.patches, self.source).rigid()
         angles = arm.angles()
         rigid = np.diag(np.linalg.inv(arm.terms(angles, np.zeros_like(angles))[0]))
         bending = np.diag(np.linalg.inv(mass_matrices(model, self.source.q[:1])[0]))[columns]

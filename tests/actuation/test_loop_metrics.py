@@ -7,7 +7,7 @@ import pytest
 from beam_links import beam_link, rectangle
 
 import ffrobot
-from ffrobot.actuation.control.metrics import _settling, overshoot, ringing, vibration, watched
+from ffrobot.actuation.control.metrics import overshoot, ringing, settling, vibration, watched
 
 TIME = np.linspace(0.0, 2.0, 2001)
 TRAVEL = np.column_stack([np.clip(TIME / 0.3, 0.0, 1.0), 0.0 * TIME])
@@ -76,12 +76,12 @@ def test_on_a_circle_vibration_is_the_diameter():
     assert vibration(TIME, turning, 6 * np.pi / 41, 41 / (2 * np.pi)) == pytest.approx(0.04, rel=0.01)
 
 
-def test_settling_is_where_the_error_comes_down_to_its_share():
+def testsettling_is_where_the_error_comes_down_to_its_share():
     """e^{−5 t} comes to 5 % at ln 20/5, between the times at which it is known, whatever these are."""
     for times in (np.linspace(0.0, 2.0, 101), np.linspace(0.0, 1.9, 73) ** 1.1):
-        assert _settling(times, np.exp(-5.0 * times)) == pytest.approx(np.log(20.0) / 5.0, rel=1e-5)
-    assert np.isnan(_settling(TIME, 1.0 + TIME))
-    assert _settling(TIME, 0.0 * TIME) == 0.0
+        assert settling(times, np.exp(-5.0 * times)) == pytest.approx(np.log(20.0) / 5.0, rel=1e-5)
+    assert np.isnan(settling(TIME, 1.0 + TIME))
+    assert settling(TIME, 0.0 * TIME) == 0.0
 
 
 def arm(*, space, thickness, step):
