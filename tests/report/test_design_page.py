@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from ffrobot.pictures.report import write_report
+from ffrobot.pictures.studies.figures import draw
 from ffrobot.pictures.studies.study import (
+    LOOKS,
     Axis,
     Band,
     Bars,
@@ -15,6 +17,7 @@ from ffrobot.pictures.studies.study import (
     Study,
     StudyTable,
     axis_of_goal,
+    read_study,
     write_study,
 )
 
@@ -79,24 +82,20 @@ def folder(tmp_path_factory):
     return folder
 
 
-def open_alone(browser, folder, tmp_path):
+def test_a_page_of_studies_alone(browser, folder, tmp_path):
+    """No motion, nothing that the browser complains of, every diagram in view under its title."""
     page = tmp_path / "page.html"
     write_report([folder], page)
     browser.driver.get_log("browser")
     browser.driver.get(page.as_uri())
-    browser.run("document.querySelectorAll('[data-chart]').forEach(drawChart)")
-    browser.wait("[...document.querySelectorAll('[data-chart]')].every((c) => c.querySelector('.main-svg'))")
-
-
-def chart(browser, name):
-    return browser.value(f"document.querySelector('[data-chart$=\"_{name}\"]').data.map((t) => [t.name, t.x, t.y])")
-
-
-def test_a_page_of_studies_alone(browser, folder, tmp_path):
-    """No motion, nothing that the browser complains of, every diagram drawn."""
-    open_alone(browser, folder, tmp_path)
     assert browser.complaints == []
-    assert browser.value("places.length") == 6
+    assert browser.value("places.length") == 0
+    pictures = "[...document.querySelectorAll('.diagrams img')]"
+    browser.wait(f"{pictures}.every((one) => one.complete)")
+    assert sorted(browser.value(f"{pictures}.map((one) => one.alt)")) == [
+        "4 designs", "mass", "mass", "mass", "mass against deflection", "moment",
+    ]  # fmt: skip
+    assert min(browser.value(f"{pictures}.map((one) => one.naturalWidth)")) > 200
     assert browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)") == [
         "Design",
         "Input files and versions",
@@ -107,41 +106,42 @@ def test_a_page_of_studies_alone(browser, folder, tmp_path):
     assert browser.value("document.querySelectorAll('.verdict.good').length") == 1
 
 
-def test_lines_of_designs(browser, folder, tmp_path):
+def drawn(folder, file, name):
+    (diagram,) = (one for one in read_study(folder / file).diagrams if one.name == name)
+    return draw(diagram)
+
+
+def names(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_lines_of_designs(folder):
     """Each by its state, the best one last and on top; the failed one ends before the goal; axes by logarithms."""
-    open_alone(browser, folder, tmp_path)
-    lines = {name: (x, y) for name, x, y in chart(browser, "designs")}
-    assert list(lines) == ["failed", "beyond a limit", "within limits", "best", "limit, pointing beyond it"]
-    assert lines["failed"][0] == [0, 1, None]
-    assert lines["best"][0] == [0, 1, 2, None]
-    np.testing.assert_allclose(lines["best"][1][:2], [0.5, 0.25])  # 100 of 10 to 1000
-    marks = browser.value(
-        "[...document.querySelectorAll('[data-chart$=\"_designs\"] .annotation-text')].map((t) => t.textContent)"
-    )
-    for text in ("joint.1.gear_ratio", "10 –", "100 –", "1000 –", "<thin> –", "mass (kg)"):
-        assert text in marks
-    wide = "document.querySelector('[data-chart$=\"_designs\"]').getBoundingClientRect().width"
-    assert browser.value(wide) > 0.9 * browser.value("document.querySelector('main').clientWidth") - 100
+    picture = drawn(folder, "optimum.json", "designs")
+    assert names(picture) == ["failed", "beyond a limit", "within limits", "best", "limit, pointing beyond it"]
+    (axes,) = picture.axes
+    lines = [line for line in axes.lines if len(line.get_xdata()) in (2, 3) and line.get_linewidth() != 0.6]
+    np.testing.assert_array_equal(lines[0].get_xdata(), [0, 1])
+    best = next(line for line in axes.lines if line.get_linewidth() == LOOKS["best"].width)
+    np.testing.assert_array_equal(best.get_xdata(), [0, 1, 2])
+    np.testing.assert_allclose(best.get_ydata()[:2], [0.5, 0.25])  # 100 of 10 to 1000
+    texts = [text.get_text().replace("\n", "") for text in axes.texts]
+    assert {"joint.1.gear_ratio", "10", "100", "1000", "<thin>", "mass (kg)"} <= set(texts)
 
 
-def test_convergence_and_bands(browser, folder, tmp_path):
-    open_alone(browser, folder, tmp_path)
-    best = {name: y for name, _, y in chart(browser, "convergence")}
-    assert best["best so far"] == [None, None, 2.5, 2.0]
-    assert best["within limits"] == [2.5]
-    named = browser.value(
-        "document.querySelector('[data-chart$=\"_band_moment\"]').data"
-        ".filter((t) => t.showlegend !== false).map((t) => t.name)"
-    )
-    assert named == ["lowest and highest sample", "5% to 95%", "median", "nominal values"]
+def test_convergence_and_bands(folder):
+    (axes,) = drawn(folder, "optimum.json", "convergence").axes
+    curves = {line.get_label(): line.get_ydata() for line in axes.lines}
+    np.testing.assert_array_equal(curves["best so far"], [np.nan, np.nan, 2.5, 2.0])
+    assert curves["within limits"] == [2.5]
+    band = drawn(folder, "uncertainty.json", "band_moment")
+    assert names(band) == ["lowest and highest sample", "5% to 95%", "median", "nominal values"]
 
 
 def test_beside_results(browser, page, folder, two_link):
     """Motion and designs on one page."""
-    path = page(two_link.folder / "scene.results.h5", folder)
-    browser.open(path)
-    browser.run("document.querySelectorAll('[data-chart]').forEach(drawChart)")
-    browser.wait("document.querySelector('[data-chart$=\"_designs\"] .main-svg')")
+    browser.open(page(two_link.folder / "scene.results.h5", folder))
     assert browser.complaints == []
-    found = browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)")
-    assert found == ["Motion", "Summary", "Histories", "Modes", "Design", "Input files and versions"]
+    links = browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)")
+    assert links == ["Motion", "Summary", "Histories", "Modes", "Design", "Input files and versions"]
+    assert browser.value("document.querySelectorAll('.diagrams img').length") == 6

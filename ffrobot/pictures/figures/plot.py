@@ -421,12 +421,13 @@ def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str
     """A picture in all formats."""
     paths = [folder / f"{name}.{extension}" for extension in formats]
     for path, extension in zip(paths, formats, strict=True):
-        write_atomically(path, _image(picture, extension), "figure", make_folder=True)
+        write_atomically(path, image_of(picture, extension), "figure", make_folder=True)
         picture.set_layout_engine(None)  # other formats take the layout of the first: two of four drawings less
     return paths
 
 
-def _image(picture: Figure, extension: str) -> bytes:
+def image_of(picture: Figure, extension: str) -> bytes:
+    """Return the file of a picture, "png", "pdf" or "svg"."""
     stream = BytesIO()
     with warnings.catch_warnings():  # of characters that the font lacks: a box stands for them
         warnings.filterwarnings("ignore", message="Glyph .* missing from")

@@ -125,24 +125,19 @@ class Chart:
             }
             for limit in self.limits
         ]  # fmt: skip
-        found = axes_layout(self.title, self.x_label, self.y_label, legend=len(self.traces) + len(lines) > 1) | {
-            "shapes": lines
-        }
+        y_title = {"text": plain(self.y_label), "standoff": 8}
+        y_axis: dict[str, Any] = {"title": y_title, "automargin": True, "exponentformat": "power"}
         if self.includes:
-            found["yaxis"] |= {"autorangeoptions": {"include": list(self.includes)}}
+            y_axis["autorangeoptions"] = {"include": list(self.includes)}
         if self.equal_axes:
-            found["yaxis"] |= {"scaleanchor": "x"}
-        return found
-
-
-def axes_layout(title: str, x: str, y: str, *, legend: bool = True) -> dict[str, Any]:
-    """Plotly's, of a chart with a title and labels of both axes."""
-    return {
-        "title": {"text": plain(title)},
-        "xaxis": {"title": {"text": plain(x), "standoff": 5}},
-        "yaxis": {"title": {"text": plain(y), "standoff": 8}, "automargin": True, "exponentformat": "power"},
-        "showlegend": legend,
-    }
+            y_axis["scaleanchor"] = "x"
+        return {
+            "title": {"text": plain(self.title)},
+            "xaxis": {"title": {"text": plain(self.x_label), "standoff": 5}},
+            "yaxis": y_axis,
+            "showlegend": len(self.traces) + len(lines) > 1,
+            "shapes": lines,
+        }
 
 
 def plain(text: str) -> str:

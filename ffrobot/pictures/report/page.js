@@ -98,14 +98,10 @@ const ROW = 16; // of a legend, in pixels
 const SIZES = {
   paper: {
     mechanism: { width: 690, height: 400, "legend.y": -0.2 },
-    broad: { width: 690, height: 400, "title.font.size": 11 },
-    long: { width: 690, "title.font.size": 11 },
     chart: { width: 340, height: 265, "font.size": 10, "legend.font.size": 8, "title.font.size": 11, "title.xref": "container" },
   },
   screen: {
     mechanism: { width: null, height: null, "legend.y": -0.13 },
-    broad: { width: null, height: null, "title.font.size": NARROW ? 13 : 14 },
-    long: { width: null, "title.font.size": NARROW ? 13 : 14 },
     chart: {
       width: null, height: null, "font.size": 12, "legend.font.size": NARROW ? 10 : 11, "title.font.size": NARROW ? 13 : 14,
       "title.xref": NARROW ? "container" : "paper",
@@ -115,9 +111,8 @@ const SIZES = {
 function resize(place) {
   for (const chart of drawn()) {
     if (chart.id === "modes-3d") continue;
-    const shape = ["broad", "long"].find((name) => chart.classList.contains(name)) ?? chart.id;
-    const columns = chart.dataset.chart && !["broad", "long"].includes(shape) ? legendColumns(chart) : 3; // of the legend
-    const size = { ...(SIZES[place][shape] ?? SIZES[place].chart) };
+    const columns = chart.dataset.chart ? legendColumns(chart) : 3; // of the legend
+    const size = { ...(SIZES[place][chart.id] ?? SIZES[place].chart) };
     if (size.height) size.height += ROW * Math.max(0, Math.ceil(legendEntries(chart).length / columns) - 2);
     Plotly.relayout(chart, size);
   }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -25,7 +26,6 @@ from ..figures.shared import bending_points
 from ..motion import targets
 from ..studies.study import Study, read_study, study_files
 from .charts import Chart, Run, folded, history_charts, path_error, runs, sources
-from .diagrams import DrawnDiagram, StudyPart
 from .mechanism import link_modes, mechanism, surface_modes
 
 
@@ -102,7 +102,7 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, float]]:
         yield f"deflection of {point}", millimeters(deflection), at
 
 
-def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Table:
+def origins_table(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> Table:
     """Files, hashes and versions that the page rests on."""
     rows = []
     for results, source in zip(files, sources(files), strict=True):
@@ -112,11 +112,15 @@ def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Tab
         for name, file in results.modal_files.items():
             rows.append(("", f"modal body of {name}", str(file.path), file.sha256))
             rows.append(("", f"link content of {name}", "", file.input_hash))
-    for part in studies:
-        rows.append((part.title, "study", str(part.file), _sha256(part.file.read_bytes())))
-        rows.append(("", "written by", f"ffrobot {part.study.ffrobot_version}", ""))
-        rows.append(("", "scene file", part.study.scene, ""))
+    for path, study in studies:
+        rows.append((_title(study), "study", str(path), _sha256(path.read_bytes())))
+        rows.append(("", "written by", f"ffrobot {study.ffrobot_version}", ""))
+        rows.append(("", "scene file", study.scene, ""))
     return Table(("results", "what", "where", "SHA-256"), rows)
+
+
+def _title(study: Study) -> str:
+    return f"{study.title}: {study.scene_name}"
 
 
 def _sha256(content: bytes) -> str:
@@ -232,25 +236,39 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    parts = [StudyPart(number, file, study) for number, (file, study) in enumerate(studies, start=1)]
     own = {name.replace(".", "_"): (HERE / name).read_text(encoding="utf-8") for name in OWN}
     versions = {"plotly_version": get_plotlyjs_version(), "ffrobot_version": VERSION}
     page = environment.get_template("page.html")
-    return page.render(_content(files, parts), plotly_js=get_plotlyjs(), **own, **versions)
+    return page.render(_content(files, studies), plotly_js=get_plotlyjs(), **own, **versions)
 
 
-def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str, Any]:
+def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> dict[str, Any]:
     solved, charts = _of_results(files) if files else ({}, [])
-    drawn: list[Chart | DrawnDiagram] = [*charts, *(chart for part in studies for chart in part.charts)]
-    names = [*(results.name for results in files), *(part.study.scene_name for part in studies)]
+    names = [*(results.name for results in files), *(study.scene_name for _, study in studies)]
     return {
         "title": ", ".join(dict.fromkeys(names)),
         "solved": bool(files),
-        "studies": studies,
-        "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in drawn}),
+        "studies": [_study_part(study) for _, study in studies],
+        "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
         "origins": origins_table(files, studies),
         "scenes": [(source or r.name, r.scene_text) for r, source in zip(files, sources(files), strict=True)],
         **solved,
+    }
+
+
+def _study_part(study: Study) -> dict[str, Any]:
+    """What the page shows of a study; its diagrams as SVG files in base64."""
+    try:
+        from ..studies.figures import svg_of
+    except ModuleNotFoundError as error:
+        raise SolveError(
+            f"diagrams of studies need {error.name}, which is not installed: pip install matplotlib"
+        ) from None
+    return {
+        "study": study,
+        "title": _title(study),
+        "mood": {True: "good", False: "bad", None: ""}[study.good],
+        "pictures": [(diagram.title, b64encode(svg_of(diagram)).decode()) for diagram in study.diagrams],
     }
 
 

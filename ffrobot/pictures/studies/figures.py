@@ -1,4 +1,4 @@
-"""Diagrams of a study as figures."""
+"""Diagrams of a study as figures, of files and of the page of a report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from ...common.arrays import Array, as_floats
-from ..figures.plot import write_figure
+from ..figures.plot import image_of, write_figure
 from ..figures.style import legend, literal, new_axes, style
 from ..projection import COLORS
 from .study import LOOKS, Axis, Band, Bars, Diagram, Look, Parallel, Points, Progress, Series, wrapped
@@ -23,10 +23,17 @@ from .study import LOOKS, Axis, Band, Bars, Diagram, Look, Parallel, Points, Pro
 def write_diagrams(diagrams: Sequence[Diagram], folder: Path) -> list[Path]:
     """A figure for each, as PNG and PDF; the files written."""
     with style():
-        return [path for one in diagrams for path in write_figure(literal(_draw(one)), folder, one.name)]
+        return [path for one in diagrams for path in write_figure(literal(draw(one)), folder, one.name)]
 
 
-def _draw(diagram: Diagram) -> Figure:
+def svg_of(diagram: Diagram) -> bytes:
+    """Return the figure of a diagram as an SVG file."""
+    with style():
+        return image_of(literal(draw(diagram)), "svg")
+
+
+def draw(diagram: Diagram) -> Figure:
+    """Draw a diagram."""
     match diagram:
         case Bars():
             return _draw_bars(diagram)

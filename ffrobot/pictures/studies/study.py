@@ -1,4 +1,4 @@
-"""Studies of design commands: data of the diagrams, which figures and the report draw alike, and the file."""
+"""Studies of design commands: data of their diagrams, and the file."""
 
 from __future__ import annotations
 
@@ -26,16 +26,8 @@ class Look:
     label: str
     color: str
     width: float
-    dash: str  # of matplotlib
-    marker: str  # of matplotlib
-
-    @property
-    def plotly(self) -> tuple[str, str]:
-        """Dashes and marker in Plotly's words."""
-        return (
-            {"-": "solid", ":": "dot", "--": "dash"}[self.dash],
-            {"o": "circle", "x": "x-thin-open", "^": "triangle-up-open", "D": "diamond"}[self.marker],
-        )
+    dash: str
+    marker: str
 
 
 LOOKS: dict[State, Look] = {
@@ -44,7 +36,6 @@ LOOKS: dict[State, Look] = {
     "kept": Look("within limits", COLORS[4], 0.8, "-", "o"),
     "best": Look("best", COLORS[1], 2.4, "-", "D"),
 }
-
 
 Numbers = tuple[float | None, ...]
 """None where there is no number: of runs that failed."""
