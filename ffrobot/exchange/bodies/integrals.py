@@ -10,7 +10,7 @@ codes, Mech. Struct. Mach. 22, 1994, 283–304), to first order in the modal coo
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -34,7 +34,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 """ω_a ω_b of the columns of O_e."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ShapeIntegrals:
     """Of a body with n modes; SI units, axes of the body.
 
@@ -95,16 +95,39 @@ class ShapeIntegrals:
     def S_bar_kl(self) -> Array:
         """(3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l]: symmetric parts are in O_e, the others in C_r."""
         n = self.n_modes
-        found, total = np.zeros((3, 3, n, n)), self.translational_mass
+        S = np.zeros((3, 3, n, n))
         for k, (a, b) in enumerate(PAIRS):
             if a == b:
-                found[a, a] = self.centrifugal_slope[k] + total
+                S[a, a] = self.centrifugal_slope[k] + self.translational_mass
                 continue
             c = 3 - a - b
-            sign = LEVI_CIVITA[a, b, c]
-            found[a, b] = 0.5 * (self.centrifugal_slope[k] - sign * self.spin_slope[c])
-            found[b, a] = found[a, b].T
-        return found
+            S[a, b] = 0.5 * (self.centrifugal_slope[k] - LEVI_CIVITA[a, b, c] * self.spin_slope[c])
+            S[b, a] = S[a, b].T
+        return S
+
+    @property
+    def about_center(self) -> Array:
+        """Inertia (3, 3) about the center of mass, kg·m²."""
+        return as_floats(self.inertia - steiner(self.mass, self.first_moment / self.mass))
+
+    def transformed(self, T: Array) -> ShapeIntegrals:
+        """The same in modal coordinates p, q = T p."""
+        return replace(
+            self,
+            S_bar=self.S_bar @ T,
+            inertia_slope=self.inertia_slope @ T,
+            spin=self.spin @ T,
+            spin_slope=T.T @ self.spin_slope @ T,
+            modal_mass=T.T @ self.modal_mass @ T,
+            centrifugal_slope=T.T @ self.centrifugal_slope @ T,
+            stiffness=T.T @ self.stiffness @ T,
+            damping=T.T @ self.damping @ T,
+        )
+
+
+def steiner(mass: float, center: Array) -> Array:
+    """(3, 3) inertia of a point mass at `center` (3,) about the origin."""
+    return as_floats(mass * (center @ center * np.eye(3) - np.outer(center, center)))
 
 
 def integrals_of(body: ModalBody) -> ShapeIntegrals:
@@ -112,9 +135,18 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
     spatial = from_modal_body(body.name, body)
     spin_slope, centrifugal_slope = slopes(spatial.S_bar_kl)
     return ShapeIntegrals(
-        spatial.mass, spatial.first_moment, spatial.S_bar, spatial.inertia, spatial.inertia_slope, spatial.spin,
-        spin_slope, body.modal_mass, centrifugal_slope, body.stiffness, spatial.damping,
-    )  # fmt: skip
+        mass=spatial.mass,
+        first_moment=spatial.first_moment,
+        S_bar=spatial.S_bar,
+        inertia=spatial.inertia,
+        inertia_slope=spatial.inertia_slope,
+        spin=spatial.spin,
+        spin_slope=spin_slope,
+        modal_mass=body.modal_mass,
+        centrifugal_slope=centrifugal_slope,
+        stiffness=body.stiffness,
+        damping=spatial.damping,
+    )
 
 
 def slopes(S: Array) -> tuple[Array, Array]:
@@ -124,7 +156,7 @@ def slopes(S: Array) -> tuple[Array, Array]:
     return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)
 
 
-def with_agreed_masses(found: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
+def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
     """The integrals with modal masses that the shapes can have, and what was changed for it.
 
     Files of few digits give M_e otherwise than the masses and shapes beside it do. Where nothing has inertia about the
@@ -134,35 +166,31 @@ def with_agreed_masses(found: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str
         InputError: M_e and ∫ρΦᵀΦ contradict each other there, or M_e is less than what the mean motion of the shapes
             alone has, S̄ᵀS̄/m.
     """
-    if not np.abs(found.modal_mass).max(initial=0.0) > 0:
-        return found, ()  # which is refused as no mass matrix
-    mean = found.S_bar.T @ found.S_bar / found.mass
-    sizes = np.sqrt(np.abs(np.diag(mean)) / np.maximum(np.diag(found.modal_mass), 1e-300))
+    M, translational = integrals.modal_mass, integrals.translational_mass
+    largest = np.abs(M).max(initial=0.0)
+    if not largest > 0:
+        return integrals, ()  # which is refused as no mass matrix
+    mean = np.sum(integrals.S_bar**2, axis=0) / integrals.mass
+    sizes = np.sqrt(np.abs(mean) / np.maximum(np.diag(M), 1e-300))
     if sizes.max(initial=0.0) > 1.0 + ROUNDED:
         raise InputError(
             "modal masses: expected at least those that the mean motion of the shapes has, found mode"
             f" {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its modal"
             " mass allows. Shapes and modal masses of the file contradict each other"
         )
-    off = np.abs(found.modal_mass - found.translational_mass).max(initial=0.0) / np.abs(found.modal_mass).max()
-    if off <= EXACT or np.linalg.eigvalsh(about_center(found))[0] > EXACT * np.abs(found.inertia).max():
-        return found, ()
+    off = np.abs(M - translational).max() / largest
+    if off <= EXACT or np.linalg.eigvalsh(integrals.about_center)[0] > EXACT * np.abs(integrals.inertia).max():
+        return integrals, ()
     if off > ROUNDED:
         raise InputError(
             f"modal masses: expected the sums over masses and shapes, as nothing has inertia about the axis, found them"
             f" off by {off:.2g} of the largest"
         )
-    texts = f"modal masses are sums over masses and shapes: those in the file are off by {off:.1e} of the largest"
-    return replace(found, modal_mass=found.translational_mass), (texts,)
+    remark = f"modal masses are sums over masses and shapes: those in the file are off by {off:.1e} of the largest"
+    return replace(integrals, modal_mass=translational), (remark,)
 
 
-def about_center(found: ShapeIntegrals) -> Array:
-    """Inertia (3, 3) about the center of mass, kg·m²."""
-    center = found.first_moment / found.mass
-    return as_floats(found.inertia - found.mass * (center @ center * np.eye(3) - np.outer(center, center)))
-
-
-def section_inertia(found: ShapeIntegrals) -> dict[str, Array | float]:
+def section_inertia(integrals: ShapeIntegrals) -> dict[str, Array | float]:
     """J_spin, h_spin, S_spin and second_moment of `ModalBody`, which only together make J_0, C_r0 and M_e.
 
     Formats have the sums alone, which these reproduce. Where sections turn (M_e is more than ∫ρΦᵀΦ) all of the inertia
@@ -170,41 +198,38 @@ def section_inertia(found: ShapeIntegrals) -> dict[str, Array | float]:
     C_r0 about x, both exact of a line of mass. Where that is more than S_s allows, of a line with masses that turn as
     well, C_r0 stays in I_bar.
     """
-    turning = found.modal_mass - found.translational_mass
-    n, J_spin, h_spin = found.n_modes, 0.0, np.zeros(found.n_modes)
-    if np.abs(turning).max(initial=0.0) > EXACT * np.abs(found.modal_mass).max(initial=1.0):
-        J_spin = float(1 / np.linalg.inv(about_center(found))[0, 0])
-        rest = np.linalg.eigvalsh(turning - np.outer(found.spin[0], found.spin[0]) / J_spin)
+    turning = integrals.modal_mass - integrals.translational_mass
+    J_spin, h_spin = 0.0, np.zeros(integrals.n_modes)
+    if np.abs(turning).max(initial=0.0) > EXACT * np.abs(integrals.modal_mass).max(initial=1.0):
+        J_spin = float(1 / np.linalg.inv(integrals.about_center)[0, 0])
+        rest = np.linalg.eigvalsh(turning - np.outer(integrals.spin[0], integrals.spin[0]) / J_spin)
         if rest[0] >= -POSITIVE * np.abs(turning).max():
-            h_spin = found.spin[0].copy()
+            h_spin = integrals.spin[0].copy()
     else:
-        turning = np.zeros((n, n))
-    J = found.inertia - J_spin * np.diag([1.0, 0.0, 0.0])
+        turning = np.zeros_like(turning)
+    J = integrals.inertia - J_spin * np.diag([1.0, 0.0, 0.0])
     second = 0.5 * np.trace(J) * np.eye(3) - J
     return {"second_moment": second, "J_spin": J_spin, "h_spin": h_spin, "S_spin": turning}
 
 
-@dataclass(frozen=True, eq=False)
-class Node:
-    """A point that a format knows the motion of, with its number there."""
-
-    number: int
-    at: Interface
+Nodes = Mapping[int, Interface]
+"""Points whose motion a format has, by their numbers there."""
+PARTS = ("position", "translation", "rotation")
 
 
-def nodes_of(body: ModalBody) -> tuple[list[Node], dict[str, int]]:
+def nodes_of(body: ModalBody) -> tuple[dict[int, Interface], dict[str, int]]:
     """Stations, then interfaces that are at none of them; and the number of each interface."""
-    stations = body.stations
-    nodes = [
-        Node(k + 1, Interface(*parts))
-        for k, parts in enumerate(zip(stations.position, stations.translation, stations.rotation, strict=True))
-    ]
+    stations = zip(*(getattr(body.stations, part) for part in PARTS), strict=True)
+    nodes = {number: Interface(*parts) for number, parts in enumerate(stations, 1)}
     numbers = dict[str, int]()
     for name, at in body.interfaces.items():
-        same = next((node.number for node in nodes if _is_same(node.at, at)), None)
-        if same is None:
-            nodes.append(Node(same := len(nodes) + 1, at))
-        numbers[name] = same
+        same = (
+            number
+            for number, node in nodes.items()
+            if all(np.array_equal(getattr(node, part), getattr(at, part)) for part in PARTS)
+        )
+        numbers[name] = next(same, len(nodes) + 1)
+        nodes.setdefault(numbers[name], at)
     return nodes, numbers
 
 
@@ -216,7 +241,7 @@ def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
 NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
 
 
-def noted(text: str, nodes: Sequence[Node]) -> tuple[str | None, dict[str, int]]:
+def noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
     """Reference condition and number of each interface, where this program wrote them into `text`; None and {} else.
 
     Raises:
@@ -225,29 +250,24 @@ def noted(text: str, nodes: Sequence[Node]) -> tuple[str | None, dict[str, int]]
     match = NOTE.search(text)
     if match is None:
         return None, {}
-    numbers, known = dict[str, int](), {node.number for node in nodes}
+    numbers = dict[str, int]()
     for pair in match["numbers"].strip().split(", "):
         name, _, number = pair.rpartition("=")
-        if not name or not number.isdecimal() or int(number) not in known:
+        if not name or not number.isdecimal() or int(number) not in nodes:
             raise InputError(f'interfaces: expected NAME=NUMBER of nodes in the file, found "{shown(pair)}"')
         numbers[name] = int(number)
     return match["condition"], numbers
 
 
-def _is_same(first: Interface, second: Interface) -> bool:
-    return all(np.array_equal(vars(first)[key], vars(second)[key]) for key in ("position", "translation", "rotation"))
-
-
-def interfaces_of(nodes: list[Node], numbers: Mapping[str, int]) -> dict[str, Interface]:
+def interfaces_of(nodes: Nodes, numbers: Mapping[str, int]) -> dict[str, Interface]:
     """By name: those of `numbers`, `root` (nearest to the origin), `tip` (farthest from it), else "node_NUMBER"."""
-    by_distance = sorted(nodes, key=lambda node: float(np.linalg.norm(node.at.position)))
+    by_distance = sorted(nodes, key=lambda number: float(np.linalg.norm(nodes[number].position)))
     ends = {"root": by_distance[0], "tip": by_distance[-1]}
-    if numbers:
-        at = {node.number: node.at for node in nodes}
-        named = {name: at[number] for name, number in numbers.items()}
-        return named | {name: node.at for name, node in ends.items() if name not in named}
-    names = {node.number: name for name, node in reversed(ends.items())}
-    return {names.get(node.number, f"node_{node.number}"): node.at for node in nodes}
+    names = {number: name for name, number in reversed(ends.items())}
+    named = dict(numbers) or {names.get(number, f"node_{number}"): number for number in nodes}
+    for name, number in ends.items():
+        named.setdefault(name, number)
+    return {name: nodes[number] for name, number in named.items()}
 
 
 ORTHONORMAL = 1e-12  # of M_e = E and of K_e diagonal: then modes stay as they are
@@ -260,63 +280,66 @@ NOT_IN_THE_FILE = (
 
 
 def modal_body(
-    name: str, found: ShapeIntegrals, nodes: Sequence[Node], numbers: Mapping[str, int], condition: str | None = None
+    name: str, integrals: ShapeIntegrals, nodes: Nodes, numbers: Mapping[str, int], condition: str | None = None
 ) -> ModalBody:
     """The body of foreign integrals and nodes.
 
     Raises:
         InputError: a mode has no stiffness, or the integrals cannot be those of a body.
     """
-    T, omega2 = _orthonormal(found)
-    found = _transformed(found, T, omega2)
-    turned = (Interface(at.position, at.translation @ T, at.rotation @ T) for at in (node.at for node in nodes))
-    nodes = [Node(node.number, at) for node, at in zip(nodes, turned, strict=True)]
+    T, omega2 = _orthonormal(integrals)
+    integrals, n = integrals.transformed(T), len(omega2)
+    nodes = {number: Interface(at.position, at.translation @ T, at.rotation @ T) for number, at in nodes.items()}
     interfaces = interfaces_of(nodes, numbers)
-    length = float(np.linalg.norm(interfaces["tip"].position - interfaces["root"].position))
-    S_bar_kl = found.S_bar_kl
-    sections = section_inertia(found)
-    S_bar_kl[2, 2] += sections["S_spin"]  # as `ModalBody` books it
-    without_sections = replace(found, spin=found.spin - np.outer(np.eye(3)[0], sections["h_spin"]))
-    omega = np.sqrt(omega2)
-    families = _families(S_bar_kl, np.asarray(sections["S_spin"]))
+    root, tip = interfaces["root"], interfaces["tip"]
+    length = float(np.linalg.norm(tip.position - root.position))
+    sections = section_inertia(integrals)
+    S_bar_kl, S_spin = integrals.S_bar_kl, np.asarray(sections["S_spin"])
+    families = _families(S_bar_kl, S_spin)
+    S_bar_kl[2, 2] += S_spin  # as `ModalBody` books it
+    without_sections = replace(integrals, spin=integrals.spin - np.outer([1.0, 0.0, 0.0], sections["h_spin"]))
     constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
     if condition == CRAIG_BAMPTON and not constraint:
         condition = "cantilever"  # which holds the root alike
+    omega = np.sqrt(omega2)
     return ModalBody(
         name=name,
         kind="beam" if sections["J_spin"] else "solid",
         reference_condition=condition or _condition(interfaces),
         length=length,
-        residual=np.repeat([0, 1], [found.n_modes - constraint, constraint]),
-        mass=found.mass,
-        first_moment=found.first_moment,
+        residual=np.repeat([0, 1], [n - constraint, constraint]),
+        mass=integrals.mass,
+        first_moment=integrals.first_moment,
         frequency=omega / (2 * np.pi),
         stiffness=np.diag(omega2),
-        modal_mass=np.eye(found.n_modes),
-        damping_ratio=np.diag(found.damping) / (2 * omega),
+        modal_mass=np.eye(n),
+        damping_ratio=np.diag(integrals.damping) / (2 * omega),
         family=families,
-        S_bar=found.S_bar,
+        S_bar=integrals.S_bar,
         I_bar=without_sections.I_bar,
         S_bar_kl=S_bar_kl,
         interfaces=interfaces,
-        stations=_stations(nodes, interfaces, length),
-        mesh=_line(interfaces, found.n_modes),
+        stations=_stations(nodes, root, tip, length),
+        mesh=PictureMesh(
+            np.array([root.position, tip.position]),
+            np.array([[0, 1]], dtype=np.int64),
+            np.array([root.translation, tip.translation]),
+        ),
         ffrobot_version=VERSION,
         **sections,  # type: ignore[arg-type]
     )
 
 
-def _orthonormal(found: ShapeIntegrals) -> tuple[Array, Array]:
+def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
     """T (n, n) with TᵀM_eT = E, TᵀK_eT = diag(ω²), and ω² (n,)."""
-    M, K, n = found.modal_mass, found.stiffness, found.n_modes
+    M, K, n = integrals.modal_mass, integrals.stiffness, integrals.n_modes
     squares = np.diag(K)
     if np.any(squares <= 0):
         raise InputError(
             f"K_e: expected a positive stiffness of every mode, found {squares.min():g}: leave out rigid modes"
         )
     size = np.sqrt(np.outer(squares, squares))
-    plain = np.abs(M - np.eye(n)).max() <= ORTHONORMAL and np.abs((K - np.diag(squares)) / size).max() <= ORTHONORMAL
-    if plain:
+    if np.abs(M - np.eye(n)).max() <= ORTHONORMAL and np.abs((K - np.diag(squares)) / size).max() <= ORTHONORMAL:
         return np.eye(n), squares
     try:
         omega2, T = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
@@ -327,52 +350,26 @@ def _orthonormal(found: ShapeIntegrals) -> tuple[Array, Array]:
     return np.asarray(T), np.asarray(omega2)
 
 
-def _transformed(found: ShapeIntegrals, T: Array, omega2: Array) -> ShapeIntegrals:
-    """In modal coordinates p, q = T p."""
-    return replace(
-        found,
-        S_bar=found.S_bar @ T,
-        inertia_slope=found.inertia_slope @ T,
-        spin=found.spin @ T,
-        spin_slope=np.einsum("alk,lm,kn->amn", found.spin_slope, T, T),
-        modal_mass=T.T @ found.modal_mass @ T,
-        centrifugal_slope=np.einsum("alk,lm,kn->amn", found.centrifugal_slope, T, T),
-        stiffness=np.diag(omega2),
-        damping=T.T @ found.damping @ T,
-    )
-
-
 def _condition(interfaces: Mapping[str, Interface]) -> str:
     """Cantilever where the root does not move in the frame; the other name stands for all else."""
-    root = interfaces["root"]
-    size = max(np.abs(at.translation).max(initial=0.0) for at in interfaces.values())
-    return "cantilever" if np.abs(root.translation).max(initial=0.0) <= 1e-9 * size else "simply-supported"
+    sizes = {name: np.abs(at.translation).max(initial=0.0) for name, at in interfaces.items()}
+    return "cantilever" if sizes["root"] <= 1e-9 * max(sizes.values()) else "simply-supported"
 
 
 def _families(S_bar_kl: Array, S_spin: Array) -> tuple[str, ...]:
     """By the direction in which most of a mode's mass moves."""
-    shares = [np.diag(S_bar_kl[a, a]) for a in range(3)]
-    shares[2] = shares[2] - np.diag(S_spin)
+    shares = [*(np.diag(S_bar_kl[a, a]) for a in range(3)), np.diag(S_spin)]
     names = ("axial", "in-plane-bending", "out-of-plane-bending", "torsion")
-    return tuple(names[k] for k in np.argmax(np.array([*shares, np.diag(S_spin)]), axis=0))
+    return tuple(names[k] for k in np.argmax(shares, axis=0))
 
 
-def _stations(nodes: Sequence[Node], interfaces: Mapping[str, Interface], length: float) -> Stations:
+def _stations(nodes: Nodes, root: Interface, tip: Interface, length: float) -> Stations:
     """The nodes on the line from root to tip, ascending in x; root and tip where the body lies otherwise."""
-    on_axis = [node.at for node in nodes if np.abs(node.at.position[1:]).max() <= ON_AXIS * length]
-    ends = [interfaces["root"], interfaces["tip"]]
-    points = sorted(on_axis if len(on_axis) > 1 else ends, key=lambda at: float(at.position[0]))
-    kept = [points[0]]
-    kept += [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
-    if len(kept) < 2:
+    on_axis = [at for at in nodes.values() if np.abs(at.position[1:]).max() <= ON_AXIS * length]
+    points = sorted(on_axis if len(on_axis) > 1 else [root, tip], key=lambda at: float(at.position[0]))
+    stations = [points[0]]
+    stations += [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
+    if len(stations) < 2:
         raise InputError("nodes: expected root and tip at different x, found them at the same: turn the body's frame")
-    position, translation, rotation = (
-        np.array([vars(at)[key] for at in kept]) for key in ("position", "translation", "rotation")
-    )
-    return Stations(position, translation, rotation, np.zeros(len(kept)))
-
-
-def _line(interfaces: Mapping[str, Interface], n: int) -> PictureMesh:
-    ends = [interfaces["root"], interfaces["tip"]]
-    shapes = np.array([at.translation for at in ends]).reshape(2, 3, n)
-    return PictureMesh(np.array([at.position for at in ends]), np.array([[0, 1]], dtype=np.int64), shapes)
+    position, translation, rotation = (np.array([getattr(at, part) for at in stations]) for part in PARTS)
+    return Stations(position, translation, rotation, np.zeros(len(stations)))

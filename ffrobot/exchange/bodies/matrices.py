@@ -31,10 +31,9 @@ REMARKS = (
 def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     """The .npz file of a body, its nodes in the order of the remark, and what it does not carry."""
     nodes, numbers = nodes_of(body)
-    arrays = reduced_order(integrals_of(body))
-    arrays |= {
-        "modeBasis": np.concatenate([node.at.translation for node in nodes]),
-        "xRef": np.concatenate([node.at.position for node in nodes]),
+    arrays = reduced_order(integrals_of(body)) | {
+        "modeBasis": np.concatenate([at.translation for at in nodes.values()]),
+        "xRef": np.concatenate([at.position for at in nodes.values()]),
         "trigList": np.zeros((0, 3), dtype=np.int64),
         "postProcessingModes": np.array({}, dtype=object),
         "infoList": np.array([body.mode_count, len(nodes), 3, 4, 7, 7 + body.mode_count]),
@@ -48,25 +47,25 @@ def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     return content.getvalue(), (*REMARKS, f"numbers of nodes, from 0: {names}")
 
 
-def reduced_order(found: ShapeIntegrals) -> dict[str, Any]:
+def reduced_order(integrals: ShapeIntegrals) -> dict[str, Any]:
     """The constant matrices of ObjectFFRFreducedOrder."""
-    n, S, one = found.n_modes, found.S_bar_kl, np.eye(3)
-    center = as_floats(found.first_moment / found.mass)
+    n, S, one = integrals.n_modes, integrals.S_bar_kl, np.eye(3)
+    center = as_floats(integrals.first_moment / integrals.mass)
     tilde_tilde = np.einsum("ab,lm->lamb", one, np.trace(S)) - np.einsum("balm->lamb", S)
     return {
-        "massMatrixReduced": found.modal_mass,
-        "stiffnessMatrixReduced": found.stiffness,
-        "inertiaLocal": found.inertia,
-        "Mtt": found.mass * one,
-        "totalMass": found.mass,
+        "massMatrixReduced": integrals.modal_mass,
+        "stiffnessMatrixReduced": integrals.stiffness,
+        "inertiaLocal": integrals.inertia,
+        "Mtt": integrals.mass * one,
+        "totalMass": integrals.mass,
         "chiU": center,
         "chiUtilde": skew(center),
-        "mPsiTildePsi": found.spin_slope.transpose(1, 0, 2).reshape(3 * n, n),
+        "mPsiTildePsi": integrals.spin_slope.transpose(1, 0, 2).reshape(3 * n, n),
         "mPsiTildePsiTilde": tilde_tilde.reshape(3 * n, 3 * n),
-        "mPhitTPsi": found.S_bar,
-        "mPhitTPsiTilde": skew(found.S_bar.T).transpose(1, 0, 2).reshape(3, 3 * n),
-        "mXRefTildePsi": -found.spin,
-        "mXRefTildePsiTilde": (found.gyroscopic / 2).transpose(0, 2, 1).reshape(3, 3 * n),
+        "mPhitTPsi": integrals.S_bar,
+        "mPhitTPsiTilde": skew(integrals.S_bar.T).transpose(1, 0, 2).reshape(3, 3 * n),
+        "mXRefTildePsi": -integrals.spin,
+        "mXRefTildePsiTilde": (integrals.gyroscopic / 2).transpose(0, 2, 1).reshape(3, 3 * n),
     }
 
 

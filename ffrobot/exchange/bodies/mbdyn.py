@@ -9,7 +9,8 @@ which newer versions of MBDyn read. Read from these, else from the lumped masses
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -20,25 +21,25 @@ from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mesh.included import number_of
 from .integrals import (
     NOT_IN_THE_FILE,
-    Node,
     ShapeIntegrals,
-    about_center,
     integrals_of,
     modal_body,
     nodes_of,
     note,
     noted,
     slopes,
+    steiner,
     with_agreed_masses,
-)  # fmt: skip
+)
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
 TITLES = {
     2: "FINITE ELEMENT NODE LIST", 3: "INITIAL MODAL DISPLACEMENTS", 4: "INITIAL MODAL VELOCITIES",
-    5: "NODAL X COORDINATES", 6: "NODAL Y COORDINATES", 7: "NODAL Z COORDINATES", 9: "MODAL MASS MATRIX",
-    10: "MODAL STIFFNESS MATRIX", 12: "RIGID BODY INERTIA MATRIX", 13: "MODAL DAMPING MATRIX", 14: "INVARIANT 3",
-    15: "INVARIANT 4", 16: "INVARIANT 8", 17: "INVARIANT 5", 18: "INVARIANT 9",
+    5: "NODAL X COORDINATES", 6: "NODAL Y COORDINATES", 7: "NODAL Z COORDINATES", 8: "MODE SHAPES",
+    9: "MODAL MASS MATRIX", 10: "MODAL STIFFNESS MATRIX", 12: "RIGID BODY INERTIA MATRIX", 13: "MODAL DAMPING MATRIX",
+    14: "INVARIANT 3", 15: "INVARIANT 4", 16: "INVARIANT 8", 17: "INVARIANT 5", 18: "INVARIANT 9",
 }  # fmt: skip
+HEADER = ("** RECORD GROUP 1, HEADER", "**   REVISION.  NODES.  NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES.")
 REMARKS = (
     "records 14 to 18 carry the coupling with rigid motion: a version of MBDyn that does not read them takes record 12"
     " alone, without that coupling",
@@ -48,46 +49,41 @@ REMARKS = (
 
 def fem_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     """The .fem file of a body, and what to know of it."""
-    found, (nodes, numbers) = integrals_of(body), nodes_of(body)
-    n = found.n_modes
-    lines = [f"** {body.name}", f"** {note(body, numbers)}", "**",
-             "** RECORD GROUP 1, HEADER", "**   REVISION.  NODES.  NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES.",
-             f"REV0 {len(nodes)} {n} 0 0 0", "**"]  # fmt: skip
-    lines += _record(2, np.array([[node.number for node in nodes]]))
-    x = np.array([node.at.position for node in nodes])
-    columns = {3: np.zeros((n, 1)), 4: np.zeros((n, 1)), 5: x[:, :1], 6: x[:, 1:2], 7: x[:, 2:]}
-    lines += [line for number, rows in columns.items() for line in _record(number, rows)]
-    lines.append("** RECORD GROUP 8, MODE SHAPES")
-    for k in range(n):
-        lines.append(f"**    NORMAL MODE SHAPE # {k + 1}")
-        lines += _rows(np.array([[*node.at.translation[:, k], *node.at.rotation[:, k]] for node in nodes]))
-    lines.append("**")
-    return "\n".join([*lines, *_integral_lines(found)]) + "\n", REMARKS
+    integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
+    n, S = integrals.n_modes, integrals.S_bar_kl
+    x, y, z = np.array([at.position for at in nodes.values()]).T[:, :, None]
+    shapes = np.array([np.concatenate([at.translation, at.rotation]) for at in nodes.values()])
+    inv9 = S.swapaxes(2, 3) - np.einsum("ab,jk->abjk", np.eye(3), np.trace(S))
+    records: dict[int, Iterable[Iterable[float]]] = {
+        2: [nodes],
+        3: np.zeros((n, 1)),
+        4: np.zeros((n, 1)),
+        5: x,
+        6: y,
+        7: z,
+        8: [],
+        9: integrals.modal_mass,
+        10: integrals.stiffness,
+        12: [[integrals.mass], integrals.first_moment / integrals.mass, *integrals.about_center],
+        13: integrals.damping,
+        14: integrals.S_bar,
+        15: integrals.spin,
+        16: (integrals.gyroscopic / 2).transpose(0, 2, 1).reshape(3, 3 * n),
+        17: np.einsum("abc,bcjk->ajk", LEVI_CIVITA, S).reshape(3, n * n),
+        18: inv9.transpose(0, 2, 3, 1).reshape(3, 3 * n * n),
+    }
+    lines = [f"** {body.name}", f"** {note(body, numbers)}", "**", *HEADER, f"REV0 {len(nodes)} {n} 0 0 0", "**"]
+    for number, rows in records.items():
+        lines += [f"** RECORD GROUP {number}, {TITLES[number]}", *_lines(rows)]
+        for k in range(n) if number == 8 else ():
+            lines += [f"**    NORMAL MODE SHAPE # {k + 1}", *_lines(shapes[:, :, k])]
+        lines.append("**")
+    return "\n".join(lines) + "\n", REMARKS
 
 
-def _integral_lines(found: ShapeIntegrals) -> Iterator[str]:
-    n, S = found.n_modes, found.S_bar_kl
-    inv9 = np.einsum("abkj->abjk", S) - np.einsum("ab,jk->abjk", np.eye(3), np.trace(S))
-    yield from _record(9, found.modal_mass)
-    yield from _record(10, found.stiffness)
-    yield from _record(12, [[found.mass], found.first_moment / found.mass, *about_center(found)])
-    yield from _record(13, found.damping)
-    yield from _record(14, found.S_bar)
-    yield from _record(15, found.spin)
-    yield from _record(16, (found.gyroscopic / 2).transpose(0, 2, 1).reshape(3, 3 * n))
-    yield from _record(17, np.einsum("abc,bcjk->ajk", LEVI_CIVITA, S).reshape(3, n * n))
-    yield from _record(18, inv9.transpose(0, 2, 3, 1).reshape(3, 3 * n * n))
-
-
-def _record(number: int, rows: object) -> Iterator[str]:
-    yield f"** RECORD GROUP {number}, {TITLES[number]}"
-    yield from _rows(rows)
-    yield "**"
-
-
-def _rows(rows: object) -> Iterator[str]:
-    for row in rows:  # type: ignore[attr-defined]
-        yield " ".join(f"{value:d}" if isinstance(value, np.integer) else f"{value:.16e}" for value in row)
+def _lines(rows: Iterable[Iterable[float]]) -> Iterator[str]:
+    for row in rows:
+        yield " ".join(f"{value:d}" if isinstance(value, int) else f"{value:.16e}" for value in row)
 
 
 def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
@@ -105,70 +101,75 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     if rest or not modes:
         raise InputError(f"record 8: expected six numbers for each of {count} nodes and each mode, found {len(shapes)}")
     shapes = shapes.reshape(modes, count, 6)
-    M, K = (_numbers(records, k, modes**2).reshape(modes, modes) for k in (9, 10))
     remarks = [NOT_IN_THE_FILE]
-    D = _numbers(records, 13, modes**2).reshape(modes, modes) if 13 in records else np.zeros((modes, modes))
-    if 13 not in records:
-        remarks.append("no damping in the file: 0")
+    matrices = {"damping": np.zeros((modes, modes))}
+    for name_of, k in (("modal_mass", 9), ("stiffness", 10), ("damping", 13)):
+        if k in records:
+            matrices[name_of] = _numbers(records, k, modes**2).reshape(modes, modes)
+        else:
+            remarks.append("no damping in the file: 0")
     if {12, 14, 15, 16, 17, 18} <= records.keys():
-        found = _of_invariants(records, modes, M, K, D)
+        integrals = ShapeIntegrals(**_of_invariants(records, modes), **matrices)
     elif 11 in records:
-        found = _of_lumped_masses(_numbers(records, 11, 6 * count).reshape(count, 6), x, shapes, M, K, D)
+        masses = _numbers(records, 11, 6 * count).reshape(count, 6)
+        integrals = ShapeIntegrals(**_of_lumped_masses(masses, x, shapes), **matrices)
         remarks.append("integrals are sums over the lumped masses of record 11")
     else:
         raise InputError(
             "expected records 12 and 14 to 18, or record 11 (lumped masses), which couple modes with rigid motion,"
             f" found records {', '.join(map(str, sorted(records)))}"
         )
-    nodes = [
-        Node(label, Interface(place, phi[:3], phi[3:]))
+    nodes = {
+        label: Interface(place, phi[:3], phi[3:])
         for label, place, phi in zip(labels, x, shapes.transpose(1, 2, 0), strict=True)
-    ]
+    }
     condition, numbers = noted("\n".join(line for line in text.splitlines()[:5] if line.startswith("**")), nodes)
-    found, texts = with_agreed_masses(found)
-    return modal_body(name, found, nodes, numbers, condition), (*remarks, *texts)
+    integrals, texts = with_agreed_masses(integrals)
+    return modal_body(name, integrals, nodes, numbers, condition), (*remarks, *texts)
 
 
 def _records(text: str) -> dict[int, list[str]]:
     """The words of each record; comments and titles left out."""
-    found, current = dict[int, list[str]](), None
+    records, current = dict[int, list[str]](), None
     for line in text.splitlines():
         if match := GROUP.match(line.strip()):
-            current = found.setdefault(int(match[1]), [])
+            current = records.setdefault(int(match[1]), [])
         elif current is not None and not line.lstrip().startswith("**"):
             current += line.split()
-    if not {1, 2, 5, 6, 7, 8, 9, 10} <= found.keys():
-        raise InputError(
-            "expected a .fem file of MBDyn with records 1, 2 and 5 to 10, found"
-            f" {'records ' + ', '.join(map(str, sorted(found))) if found else 'no records'}"
-        )
-    return found
+    if not {1, 2, 5, 6, 7, 8, 9, 10} <= records.keys():
+        numbers = f"records {', '.join(map(str, sorted(records)))}" if records else "no records"
+        raise InputError(f"expected a .fem file of MBDyn with records 1, 2 and 5 to 10, found {numbers}")
+    return records
 
 
 def _numbers(records: dict[int, list[str]], number: int, count: int | None = None) -> Array:
-    found = np.array([number_of(word, f"record {number}") for word in records[number]])
-    if count is not None and len(found) != count:
-        raise InputError(f"record {number}: expected {count} numbers, found {len(found)}")
-    return found
+    values = np.array([number_of(word, f"record {number}") for word in records[number]])
+    if count is not None and len(values) != count:
+        raise InputError(f"record {number}: expected {count} numbers, found {len(values)}")
+    return values
 
 
-def _of_invariants(records: dict[int, list[str]], n: int, M: Array, K: Array, D: Array) -> ShapeIntegrals:
-    mass, *rest = _numbers(records, 12, 13)
-    center, about_center = np.array(rest[:3]), np.array(rest[3:]).reshape(3, 3)
-    J = about_center + mass * (center @ center * np.eye(3) - np.outer(center, center))
+def _of_invariants(records: dict[int, list[str]], n: int) -> dict[str, Any]:
+    rigid = _numbers(records, 12, 13)
+    mass, center = float(rigid[0]), rigid[1:4]
     inv3, inv4 = (_numbers(records, k, 3 * n).reshape(3, n) for k in (14, 15))
     inv8 = _numbers(records, 16, 9 * n).reshape(3, n, 3).transpose(0, 2, 1)
     inv5 = _numbers(records, 17, 3 * n * n).reshape(3, n, n)
     inv9 = _numbers(records, 18, 9 * n * n).reshape(3, n, n, 3).transpose(0, 3, 1, 2)
     S = (inv9 - np.einsum("ab,jk->abjk", np.eye(3), np.trace(inv9) / 2)).transpose(0, 1, 3, 2)
-    _, centrifugal = slopes(S)
-    return ShapeIntegrals(
-        mass, mass * center, inv3, J, inv8 + inv8.transpose(1, 0, 2), inv4, inv5.transpose(0, 2, 1), M, centrifugal,
-        K, D,
-    )  # fmt: skip
+    return {
+        "mass": mass,
+        "first_moment": mass * center,
+        "S_bar": inv3,
+        "inertia": rigid[4:].reshape(3, 3) + steiner(mass, center),
+        "inertia_slope": inv8 + inv8.transpose(1, 0, 2),
+        "spin": inv4,
+        "spin_slope": inv5.transpose(0, 2, 1),
+        "centrifugal_slope": slopes(S)[1],
+    }
 
 
-def _of_lumped_masses(masses: Array, x: Array, shapes: Array, M: Array, K: Array, D: Array) -> ShapeIntegrals:
+def _of_lumped_masses(masses: Array, x: Array, shapes: Array) -> dict[str, Any]:
     """Sums over nodes: masses (count, 6), places (count, 3), shapes (n, count, 6)."""
     if np.any(np.ptp(masses[:, :3], axis=1) > 1e-9 * np.abs(masses[:, :3]).max()):
         raise InputError("record 11: expected the same mass along x, y and z at each node, found others")
@@ -179,10 +180,14 @@ def _of_lumped_masses(masses: Array, x: Array, shapes: Array, M: Array, K: Array
     second = np.einsum("i,ia,ib->ab", m, x, x)
     I_bar = np.einsum("i,ia,nib->abn", m, x, Phi)
     S = np.einsum("i,jia,kib->abjk", m, Phi, Phi)
-    spin = np.einsum("abc,bcn->an", LEVI_CIVITA, I_bar) + np.einsum("ia,nia->an", J, turn)
-    slope = 2 * np.einsum("ccn,ab->abn", I_bar, np.eye(3)) - I_bar - I_bar.transpose(1, 0, 2)
-    spin_slope, centrifugal = slopes(S)
-    return ShapeIntegrals(
-        float(m.sum()), m @ x, np.einsum("i,nia->an", m, Phi),
-        np.trace(second) * np.eye(3) - second + np.diag(J.sum(axis=0)), slope, spin, spin_slope, M, centrifugal, K, D,
-    )  # fmt: skip
+    spin_slope, centrifugal_slope = slopes(S)
+    return {
+        "mass": float(m.sum()),
+        "first_moment": m @ x,
+        "S_bar": np.einsum("i,nia->an", m, Phi),
+        "inertia": np.trace(second) * np.eye(3) - second + np.diag(J.sum(axis=0)),
+        "inertia_slope": 2 * np.einsum("ccn,ab->abn", I_bar, np.eye(3)) - I_bar - I_bar.transpose(1, 0, 2),
+        "spin": np.einsum("abc,bcn->an", LEVI_CIVITA, I_bar) + np.einsum("ia,nia->an", J, turn),
+        "spin_slope": spin_slope,
+        "centrifugal_slope": centrifugal_slope,
+    }

@@ -9,18 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.rotations import skew
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...mesh.included import number_of
 from .integrals import (
     NOT_IN_THE_FILE,
-    Node,
     ShapeIntegrals,
     integrals_of,
     modal_body,
@@ -41,52 +41,48 @@ SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest; rad
 
 def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     """The SID_FEM file of a body, and what it does not carry."""
-    found, (nodes, numbers) = integrals_of(body), nodes_of(body)
-    lines = [f"{len(nodes):5d}{found.n_modes:5d}    : nodes, modes : {body.name} : {note(body, numbers)}", " part"]
+    integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
+    lines = [f"{len(nodes):5d}{integrals.n_modes:5d}    : nodes, modes : {body.name} : {note(body, numbers)}", " part"]
     lines += ["      new modal                        =", "           refmod"]
-    lines += [f"                mass                   = {fortran(found.mass)}",
-              f"                nelastq                = {found.n_modes:5d}"]  # fmt: skip
+    lines.append(f"                mass                   = {fortran(integrals.mass)}")
+    lines.append(f"                nelastq                = {integrals.n_modes:5d}")
     lines += [
         f"                ielastq ({k + 1:4d})         = Eigen Mode {k + 1:4d} : {value:12.6g} Hz"
         for k, value in enumerate(body.frequency)
     ]
     lines += ["           end refmod", "           frame"]
-    for node in nodes:
-        lines += _node_lines(node)
-    lines += ["           end frame", *_integral_lines(found), "      end modal", " end part"]
+    for number, at in nodes.items():
+        lines += _node_lines(number, at)
+    lines += ["           end frame", *_integral_lines(integrals), "      end modal", " end part"]
     return "\n".join(lines) + "\n", REMARKS
 
 
-def _node_lines(node: Node) -> Iterator[str]:
-    at, n = node.at, node.at.translation.shape[1]
-    yield f"                new node               = {node.number:5d}"
+def _node_lines(number: int, at: Interface) -> Iterator[str]:
+    yield f"                new node               = {number:5d}"
     yield "                     rframe            = body ref"
     yield from lines_of("origin", at.position[:, None], at.translation[:, :, None], 21)
     yield from lines_of("phi", at.translation, None, 21)
     yield from lines_of("psi", at.rotation, None, 21)
-    x, y, z = at.rotation
-    zero = np.zeros(n)
-    tilde = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(0, 2, 1)  # (row, mode, column)
-    yield from lines_of("AP", np.eye(3), tilde, 21)
+    yield from lines_of("AP", np.eye(3), skew(at.rotation.T).transpose(1, 0, 2), 21)  # (row, mode, column)
     yield "                end node"
 
 
-def _integral_lines(found: ShapeIntegrals) -> Iterator[str]:
-    n = found.n_modes
-    J, slope = found.inertia, found.inertia_slope
-    by_axis = 2 * np.concatenate(list(found.spin_slope), axis=1)  # G_e = 2∫ρΦᵀe~Φ = twice the slope of C_r
-    yield from lines_of("mdCM", found.first_moment[:, None], found.S_bar[:, :, None])
+def _integral_lines(integrals: ShapeIntegrals) -> Iterator[str]:
+    n = integrals.n_modes
+    J, slope = integrals.inertia, integrals.inertia_slope
+    by_axis = 2 * np.concatenate(list(integrals.spin_slope), axis=1)  # G_e = 2∫ρΦᵀe~Φ = twice the slope of C_r
+    yield from lines_of("mdCM", integrals.first_moment[:, None], integrals.S_bar[:, :, None])
     yield from lines_of("J", np.array([[J[k]] for k in ROWS]), np.array([slope[k] for k in ROWS])[:, :, None])
-    yield from lines_of("Ct", found.S_bar.T)
-    yield from lines_of("Cr", found.spin.T, found.spin_slope.transpose(1, 2, 0))
-    is_unit = np.array_equal(found.modal_mass, np.eye(n))
-    yield from lines_of("Me", found.modal_mass, structure=IDENTITY if is_unit else None)
-    yield from lines_of("Gr", found.gyroscopic.transpose(0, 2, 1).reshape(3, 3 * n))
+    yield from lines_of("Ct", integrals.S_bar.T)
+    yield from lines_of("Cr", integrals.spin.T, integrals.spin_slope.transpose(1, 2, 0))
+    is_unit = np.array_equal(integrals.modal_mass, np.eye(n))
+    yield from lines_of("Me", integrals.modal_mass, structure=IDENTITY if is_unit else None)
+    yield from lines_of("Gr", integrals.gyroscopic.transpose(0, 2, 1).reshape(3, 3 * n))
     yield from lines_of("Ge", by_axis)
-    yield from lines_of("Oe", found.centrifugal, found.centrifugal_slope.transpose(1, 2, 0))
+    yield from lines_of("Oe", integrals.centrifugal, integrals.centrifugal_slope.transpose(1, 2, 0))
     yield from lines_of("ksigma", np.zeros((n, 1)))
-    yield from lines_of("Ke", found.stiffness)
-    yield from lines_of("De", found.damping)
+    yield from lines_of("Ke", integrals.stiffness)
+    yield from lines_of("De", integrals.damping)
 
 
 def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
@@ -96,58 +92,57 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         InputError: it is no such file, or what it holds cannot be a body.
     """
     head, top = parse(text)
-    modal = _modal(top)
-    modes = int(modal["refmod"].number("nelastq"))
-    if modes < 1:
-        raise InputError(f"refmod: nelastq: expected at least one mode, found {modes}")
-    layout = layout_of(modal, modes)
-    found = _integrals(modal, layout)
-    nodes = [_node(section, layout) for section in modal["frame"].inside if section.name == "node"]
+    part = top["part"]
+    modal = Modal(next((one for one in part.inside if one.name == "modal"), None) or part["modal"])
+    integrals = _integrals(modal)
+    nodes = {int(node.number("number")): _interface(modal, node) for node in modal.nodes}
     if not nodes:
         raise InputError("frame: expected at least one node, found none")
     condition, numbers = noted(head, nodes)
-    agreed, texts = with_agreed_masses(found)
-    remarks = (NOT_IN_THE_FILE, *texts, *_turned_nodes(modal, layout), *_checks(modal, found, layout))
+    agreed, texts = with_agreed_masses(integrals)
+    remarks = (NOT_IN_THE_FILE, *texts, *_turned_nodes(modal), *_checks(modal, integrals))
     return modal_body(name, agreed, nodes, numbers, condition), remarks
 
 
-def _modal(top: Section) -> Section:
-    part = top["part"]
-    return next((section for section in part.inside if section.name == "modal"), None) or part["modal"]
+def _interface(modal: Modal, node: SidObject) -> Interface:
+    phi, psi = (modal.taylor(node[key], (3, modal.modes)).m0 for key in ("phi", "psi"))
+    return Interface(modal.taylor(node["origin"], (3, 1)).m0[:, 0], phi, psi)
 
 
-def _node(section: Section, layout: Layout) -> Node:
-    number = int(section.number("number"))
-    phi, psi = (taylor(section[key], layout, (3, layout.modes)).m0 for key in ("phi", "psi"))
-    return Node(number, Interface(taylor(section["origin"], layout, (3, 1)).m0[:, 0], phi, psi))
-
-
-def _turned_nodes(modal: Section, layout: Layout) -> Iterator[str]:
+def _turned_nodes(modal: Modal) -> Iterator[str]:
     """A line on nodes whose own axes, A_P, are not those of the body, which interfaces here have."""
-    nodes = ((node, part) for node in modal["frame"].inside for part in node.inside if part.name.lower() == "ap")
+    axes = ((node, part) for node in modal.nodes for part in node.inside if part.name.lower() == "ap")
     turned = [
-        node.keys["number"] for node, axes in nodes if np.abs(taylor(axes, layout, (3, 3)).m0 - np.eye(3)).max() > SAME
+        node.keys["number"] for node, part in axes if np.abs(modal.taylor(part, (3, 3)).m0 - np.eye(3)).max() > SAME
     ]
     if turned:
         yield f"AP: turned axes of nodes {', '.join(turned)} left out: joints there have those of the body"
 
 
-def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
-    n = layout.modes
-    mdCM, J = taylor(modal["mdCM"], layout, (3, 1)), taylor(modal["J"], layout, (6, 1), (3, 3))
-    Cr, Oe = taylor(modal["Cr"], layout, (n, 3)), taylor(modal["Oe"], layout, (n, 6))
-    Me, Ke, De = (taylor(modal[key], layout, (n, n)).m0 for key in ("Me", "Ke", "De"))
+def _integrals(modal: Modal) -> ShapeIntegrals:
+    n = modal.modes
+    mdCM, J, Cr, Oe = modal["mdCM", (3, 1)], modal["J", (6, 1), (3, 3)], modal["Cr", (n, 3)], modal["Oe", (n, 6)]
+    Me, Ke, De = (modal[key, (n, n)].m0 for key in ("Me", "Ke", "De"))
     J0, J1 = _inertia(J)
     slope = Cr.m1.transpose(2, 0, 1)
-    if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope, layout):
+    if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope):
         raise InputError(
             "Cr: expected m1 without a symmetric part, found one: the file has geometric stiffness among its integrals,"
             " which cannot be distinguished from them in Oe; write it without"
         )
     return ShapeIntegrals(
-        modal["refmod"].number("mass"), mdCM.m0[:, 0], mdCM.m1[:, :, 0], J0, J1, Cr.m0.T,
-        0.5 * (slope - slope.transpose(0, 2, 1)), Me, Oe.m1.transpose(2, 0, 1), Ke, De,
-    )  # fmt: skip
+        mass=modal.root["refmod"].number("mass"),
+        first_moment=mdCM.m0[:, 0],
+        S_bar=mdCM.m1[:, :, 0],
+        inertia=J0,
+        inertia_slope=J1,
+        spin=Cr.m0.T,
+        spin_slope=0.5 * (slope - slope.transpose(0, 2, 1)),
+        modal_mass=Me,
+        centrifugal_slope=Oe.m1.transpose(2, 0, 1),
+        stiffness=Ke,
+        damping=De,
+    )
 
 
 def _symmetric_part(slope: Array, Me: Array) -> Array | None:
@@ -157,15 +152,15 @@ def _symmetric_part(slope: Array, Me: Array) -> Array | None:
     return symmetric if np.abs(symmetric).max(initial=0.0) > 0.5 * LARGEST_ASYMMETRY * scale else None
 
 
-def _is_in_both(modal: Section, slope: Array, layout: Layout) -> bool:
+def _is_in_both(modal: Modal, slope: Array) -> bool:
     """Whether G_e has twice the symmetric part that C_r has: geometric stiffness would be in C_r alone."""
-    n, Ge = layout.modes, taylor(modal["Ge"], layout).m0
+    n, Ge = modal.modes, modal["Ge"].m0
     if Ge.shape != (n, 3 * n):
         return False
     layouts = (Ge.reshape(n, 3, n).transpose(1, 0, 2), Ge.reshape(n, n, 3).transpose(2, 0, 1))
-    wanted = slope + slope.transpose(0, 2, 1)
-    found = (0.5 * (each + each.transpose(0, 2, 1)) for each in layouts)
-    return any(np.abs(each - wanted).max() < SAME * np.abs(wanted).max() for each in found)
+    twice = slope + slope.transpose(0, 2, 1)
+    parts = (0.5 * (each + each.transpose(0, 2, 1)) for each in layouts)
+    return any(np.abs(part - twice).max() < SAME * np.abs(twice).max() for part in parts)
 
 
 def _inertia(J: Taylor) -> tuple[Array, Array]:
@@ -178,25 +173,25 @@ def _inertia(J: Taylor) -> tuple[Array, Array]:
     return J0, J1
 
 
-def _checks(modal: Section, found: ShapeIntegrals, layout: Layout) -> Iterator[str]:
-    """What the file says twice, held against itself: a line each where it differs."""
-    n = layout.modes
-    Gr = taylor(modal["Gr"], layout, (3, 3 * n)).m0
-    wanted = found.inertia_slope
-    layouts = (Gr.reshape(3, layout.modes, 3).transpose(0, 2, 1), Gr.reshape(3, 3, layout.modes))
-    scale = max(float(np.abs(wanted).max(initial=0.0)), 1e-300)
-    errors = [float(np.abs((each + each.transpose(1, 0, 2)) / 2 - wanted).max(initial=0.0)) for each in layouts]
+def _checks(modal: Modal, integrals: ShapeIntegrals) -> Iterator[str]:
+    """A line for each quantity that the file has twice, where the two differ."""
+    n = modal.modes
+    Gr = modal["Gr", (3, 3 * n)].m0
+    slope = integrals.inertia_slope
+    layouts = (Gr.reshape(3, n, 3).transpose(0, 2, 1), Gr.reshape(3, 3, n))
+    scale = max(float(np.abs(slope).max(initial=0.0)), 1e-300)
+    errors = [float(np.abs((each + each.transpose(1, 0, 2)) / 2 - slope).max(initial=0.0)) for each in layouts]
     if min(errors) > 1e-6 * scale:
         yield f"Gr: its symmetric part is off the slope of J by {min(errors) / scale:.2g} of its largest entry"
-    symmetric = _symmetric_part(taylor(modal["Cr"], layout).m1.transpose(2, 0, 1), found.modal_mass)
+    symmetric = _symmetric_part(modal["Cr"].m1.transpose(2, 0, 1), integrals.modal_mass)
     if symmetric is not None:
         yield (
             f"Cr, Ge: both have a symmetric part, {np.abs(symmetric).max():.2g} in m1 of Cr, which ∫ρΦᵀe~Φ cannot have"
             " and geometric stiffness would have in Cr alone: left out"
         )
     identities = (
-        ("Ct", taylor(modal["Ct"], layout, (n, 3)).m0, found.S_bar.T, "the slope of mdCM"),
-        ("Oe", taylor(modal["Oe"], layout).m0, found.centrifugal, "−½ and −1 times the slope of J"),
+        ("Ct", modal["Ct", (n, 3)].m0, integrals.S_bar.T, "the slope of mdCM"),
+        ("Oe", modal["Oe"].m0, integrals.centrifugal, "−½ and −1 times the slope of J"),
     )
     for name, given, expected, what in identities:
         error = float(np.abs(given - expected).max(initial=0.0))
@@ -217,17 +212,17 @@ class Taylor(NamedTuple):
 
 
 @dataclass
-class Section:
+class SidObject:
     """An object of the file: its keys, and the objects inside, by name and in order."""
 
     name: str
     keys: dict[str, str] = field(default_factory=dict)
-    inside: list[Section] = field(default_factory=list)
+    inside: list[SidObject] = field(default_factory=list)
 
-    def __getitem__(self, name: str) -> Section:
-        for section in self.inside:
-            if section.name.lower() == name.lower():
-                return section
+    def __getitem__(self, name: str) -> SidObject:
+        for one in self.inside:
+            if one.name.lower() == name.lower():
+                return one
         raise InputError(f"expected the object {name} in {self.name}, found none")
 
     def number(self, key: str) -> float:
@@ -237,100 +232,106 @@ class Section:
         return number_of(self.keys[key], f"{self.name}: {key}")
 
 
-def parse(text: str) -> tuple[str, Section]:
+def parse(text: str) -> tuple[str, SidObject]:
     """The first line, and the object `part` as a tree. Raises `InputError` where objects do not nest."""
     head, *lines = text.splitlines() or [""]
-    top = Section("file")
+    top = SidObject("file")
     stack = [top]
     for number, line in enumerate(lines, 2):
-        words, _, value = line.strip().partition("=")
-        words = words.strip()
+        words, _, value = (part.strip() for part in line.partition("="))
         if words == "end" or words.startswith("end "):
             if len(stack) == 1:
                 raise InputError(f'line {number}: expected an object to end, found "{shown(words)}" outside of all')
             stack.pop()
         elif not words:
             continue
-        elif value.strip() and not words.startswith("new "):
-            stack[-1].keys[words] = value.strip()
+        elif value and not words.startswith("new "):
+            stack[-1].keys[words] = value
         else:
-            name = words.removeprefix("new ").strip()
-            section = Section(name, {"number": value.strip()} if value.strip() else {})
-            stack[-1].inside.append(section)
-            stack.append(section)
+            inner = SidObject(words.removeprefix("new ").strip(), {"number": value} if value else {})
+            stack[-1].inside.append(inner)
+            stack.append(inner)
     if len(stack) > 1:
         raise InputError(f"expected `end {stack[-1].name}`, found the end of the file")
     return head, top
 
 
-class Layout(NamedTuple):
-    """Number of modes, and whether M1 is (row, column, mode) in place of (row, mode, column)."""
+class Modal:
+    """The object `modal`, whose matrices are read by name.
 
-    modes: int
-    mode_is_last: bool
+    Attributes:
+        root: the object.
+        modes: their number.
+        nodes: the objects of its frame.
+        mode_is_last: whether M1 is (row, column, mode) in place of (row, mode, column): mdCM has one column, so that a
+            third index above 1 is that of a mode.
+    """
+
+    def __init__(self, root: SidObject) -> None:
+        self.root, self.modes = root, int(root["refmod"].number("nelastq"))
+        if self.modes < 1:
+            raise InputError(f"refmod: nelastq: expected at least one mode, found {self.modes}")
+        thirds = (index[2] for order, index, _ in _entries(root["mdCM"]) if order and len(index) == 3)
+        self.nodes = [node for node in root["frame"].inside if node.name == "node"]
+        self.mode_is_last = any(third > 0 for third in thirds)
+
+    def __getitem__(self, key: str | tuple[Any, ...]) -> Taylor:
+        name, *sizes = [key] if isinstance(key, str) else key
+        return self.taylor(self.root[name], *sizes)
+
+    def taylor(self, matrix: SidObject, *sizes: tuple[int, int]) -> Taylor:
+        """The matrix of an object, which has one of these numbers of rows and columns; any where none is given."""
+        nrow, ncol = (int(matrix.number(key)) for key in ("nrow", "ncol"))
+        is_possible = nrow > 0 and ncol > 0 and nrow * ncol * (self.modes + 1) <= MOST
+        if not is_possible or (sizes and (nrow, ncol) not in sizes):
+            wanted = " or ".join(f"{rows} × {columns}" for rows, columns in sizes) or "rows × columns"
+            raise InputError(f"{matrix.name}: expected a matrix of {wanted}, found nrow = {nrow}, ncol = {ncol}")
+        terms = Taylor(np.zeros((nrow, ncol)), np.zeros((nrow, self.modes, ncol)))
+        structure = int(matrix.number("structure"))
+        if structure == SYMMETRIC and nrow != ncol:
+            raise InputError(f"{matrix.name}: expected a square matrix of structure {SYMMETRIC}, found {nrow} × {ncol}")
+        if structure == IDENTITY:
+            terms.m0[:] = np.eye(nrow, ncol)
+        for order, index, value in _entries(matrix):
+            if order and self.mode_is_last and len(index) == 3:
+                index = (index[0], index[2], index[1])
+            target = terms[order]
+            if len(index) != target.ndim or any(not 0 <= k < size for k, size in zip(index, target.shape, strict=True)):
+                at = ", ".join(str(k + 1) for k in index)
+                raise InputError(f"{matrix.name}: expected m{order} within {target.shape}, found m{order}({at})")
+            target[index] = value
+            if structure == SYMMETRIC:
+                target[index[::-1]] = value
+        return terms
 
 
-def taylor(section: Section, layout: Layout, *sizes: tuple[int, int]) -> Taylor:
-    """The matrix of an object, which has one of these numbers of rows and columns; any where none is given."""
-    modes = layout.modes
-    nrow, ncol = (int(section.number(key)) for key in ("nrow", "ncol"))
-    if not (nrow > 0 and ncol > 0 and nrow * ncol * (modes + 1) <= MOST) or (sizes and (nrow, ncol) not in sizes):
-        wanted = " or ".join(f"{rows} × {columns}" for rows, columns in sizes) or "rows × columns"
-        raise InputError(f"{section.name}: expected a matrix of {wanted}, found nrow = {nrow}, ncol = {ncol}")
-    found = Taylor(np.zeros((nrow, ncol)), np.zeros((nrow, modes, ncol)))
-    structure = int(section.number("structure"))
-    if structure == SYMMETRIC and nrow != ncol:
-        raise InputError(f"{section.name}: expected a square matrix of structure {SYMMETRIC}, found {nrow} × {ncol}")
-    if structure == IDENTITY:
-        found.m0[:] = np.eye(nrow, ncol)
-    for order, index, value in _entries(section):
-        if order and layout.mode_is_last and len(index) == 3:
-            index = (index[0], index[2], index[1])
-        target = found.m1 if order else found.m0
-        if len(index) != target.ndim or any(not 0 <= k < size for k, size in zip(index, target.shape, strict=False)):
-            at = ", ".join(str(k + 1) for k in index)
-            raise InputError(f"{section.name}: expected m{order} within {target.shape}, found m{order}({at})")
-        target[index] = value
-        if structure == SYMMETRIC:
-            target[index[::-1]] = value
-    return found
-
-
-def _entries(section: Section) -> Iterator[tuple[int, tuple[int, ...], float]]:
+def _entries(matrix: SidObject) -> Iterator[tuple[int, tuple[int, ...], float]]:
     """Order, indices from 0, value."""
-    for key, value in section.keys.items():
+    for key, value in matrix.keys.items():
         if match := ENTRY.fullmatch(key):
             try:
                 index = tuple(int(part) - 1 for part in match[2].split(","))
             except ValueError:
-                raise InputError(f'{section.name}: expected whole numbers in indices, found "{shown(key)}"') from None
-            yield int(match[1]), index, number_of(value, f"{section.name}: {key}")
-
-
-def layout_of(modal: Section, modes: int) -> Layout:
-    """How M1 is written: mdCM has one column, so that a third index above 1 is that of a mode."""
-    thirds = [index[2] for order, index, _ in _entries(modal["mdCM"]) if order and len(index) == 3]
-    return Layout(modes, any(third > 0 for third in thirds))
+                raise InputError(f'{matrix.name}: expected whole numbers in indices, found "{shown(key)}"') from None
+            yield int(match[1]), index, number_of(value, f"{matrix.name}: {key}")
 
 
 def lines_of(
     name: str, m0: Array, m1: Array | None = None, indent: int = 11, structure: int | None = None
 ) -> Iterator[str]:
     """The object `name` with M0 (rows, columns), and M1 (rows, modes, columns) where it is of first order."""
-    kind = 3 if structure is None else structure
-    if structure is None and not np.any(m0) and (m1 is None or not np.any(m1)):
-        kind = 0
-    modes = 0 if m1 is None else m1.shape[1]
+    terms = [m0] if m1 is None else [m0, m1]
+    if structure is None:
+        structure = 3 if any(np.any(term) for term in terms) else 0
+    sizes = {"nrow": m0.shape[0], "ncol": m0.shape[1], "nq": 0 if m1 is None else m1.shape[1], "nqn": 0}
     blank = " " * indent
     yield f"{blank}{name}"
-    for key, value in (("order", int(m1 is not None)), ("nrow", m0.shape[0]), ("ncol", m0.shape[1]),
-                       ("nq", modes), ("nqn", 0), ("structure", kind)):  # fmt: skip
+    for key, value in {"order": len(terms) - 1, **sizes, "structure": structure}.items():
         yield f"{blank}     {key:<22}= {value:5d}"
-    if kind != IDENTITY:
-        for order, matrix in enumerate([m0] if m1 is None else [m0, m1]):
-            for index in zip(*np.nonzero(matrix), strict=True):
-                at = ",".join(f"{k + 1:2d}" for k in index)
-                yield f"{blank}     {f'm{order}({at})':<22}= {fortran(matrix[index])}"
+    for order, term in enumerate(terms) if structure != IDENTITY else ():
+        for index in zip(*np.nonzero(term), strict=True):
+            at = ",".join(f"{k + 1:2d}" for k in index)
+            yield f"{blank}     {f'm{order}({at})':<22}= {fortran(term[index])}"
     yield f"{blank}end {name}"
 
 
