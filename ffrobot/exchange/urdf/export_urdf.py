@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,13 +24,18 @@ from ...mbs.posture.posture import robot_size
 from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_robot
 from ...scene.scene import Scene
-from .robot import Mimic, Names, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
+from .robot import Names, inertial_of
 from .scene import GRAVITY
 from .shape_masses import SLENDER, bars, beam_visuals
 
+logger = logging.getLogger(__name__)
 
-@dataclass(frozen=True)
-class Step:
+Element = ElementTree.Element
+ORIGIN = np.zeros(3)
+LIMITS = {"position_limit", "moment_limit", "speed_limit", "viscous_friction", "coulomb_friction"}
+
+
+class Step(NamedTuple):
     """One joint of a URDF.
 
     Attributes:
@@ -53,7 +58,7 @@ STEPS: Mapping[str, tuple[Step, ...]] = {
     "planar": (Step("planar", coordinate=-1),),
     "free": (Step("floating", coordinate=-1),),
     "cylindrical": (Step("revolute", 2, 0, "angle"), Step("prismatic", 2, 1, "way")),
-    "screw": (Step("revolute", 2, 0), Step("prismatic", 2, -1, "way")),
+    "screw": (Step("revolute"), Step("prismatic", 2, -1, "way")),
     "universal": (Step("revolute", 0, 0, "first"), Step("revolute", 1, 1, "second")),
     "spherical": (Step("revolute", 0, -1, "x"), Step("revolute", 1, -1, "y"), Step("revolute", 2, -1, "z")),
 }
@@ -70,11 +75,6 @@ def steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array
     triad = sign * joint.triads()[0 if backwards else 1]
     triad = np.where(np.abs(triad) < np.finfo(float).eps, 0.0, triad)  # axes of the scene without rounding
     return [(step, triad[:, step.axis]) for step in (reversed(steps) if backwards else steps)]
-
-
-def follows(joint: JointRecord, step: Step) -> float | None:
-    """Way per angle (m/rad) of a screw's step that goes along with its turn; None of others."""
-    return joint.rise if isinstance(joint, ScrewJoint) and step.coordinate < 0 else None
 
 
 def conversion_losses(
@@ -125,14 +125,6 @@ def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
         yield f"{quoted(lost)}: limits and friction of a planar joint left out"
 
 
-LIMITS = {"position_limit", "moment_limit", "speed_limit", "viscous_friction", "coulomb_friction"}
-
-
-logger = logging.getLogger(__name__)
-
-ORIGIN = np.zeros(3)
-
-
 def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
     """Text of the URDF, a few words on it, and what it does not carry.
 
@@ -147,18 +139,19 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
         )
     bodies = load_bodies(scene, lambda stage: logger.info("%s", stage))
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
-    made = UrdfOfScene(scene, loaded)
-    counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(made.tree.loops)} joints of {scene.name}"
-    return urdf_text(made.robot, made.visuals), counts, tuple(conversion_losses(scene, loaded, made.tree, made.size))
+    urdf = UrdfOfScene(scene, loaded)
+    counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(urdf.tree.loops)} joints of {scene.name}"
+    ElementTree.indent(urdf.root)
+    text = '<?xml version="1.0"?>\n' + ElementTree.tostring(urdf.root, encoding="unicode") + "\n"
+    return text, counts, tuple(conversion_losses(scene, loaded, urdf.tree, urdf.size))
 
 
 class UrdfOfScene:
     """A scene as a URDF: the frame of a link has the axes of its body, its origin at the joint that carries it.
 
     Attributes:
+        root: the element <robot>; joints have the coordinates of the scene where URDF has them.
         tree: of the scene.
-        robot: links and joints, with the coordinates of the scene where URDF has them.
-        visuals: by link.
         size: of the robot, m.
     """
 
@@ -169,27 +162,34 @@ class UrdfOfScene:
         self.tree, self.size = model.tree, robot_size(model)
         self._link_names = Names((GROUND, *(body.name for body in scene.body)))
         self._joint_names = Names(joint.name for joint in scene.joint)
-        self._links = {GROUND: UrdfLink(GROUND, None)}
-        self._joints = dict[str, UrdfJoint]()
-        self.visuals = dict[str, list[Primitive]]()
+        self.root, self._joints = Element("robot", name=scene.name), list[Element]()
+        _add(self.root, "link", name=GROUND)
         for node in self.tree.nodes:
             self._add_body(node)
         for node in self.tree.nodes:
             self._add_joint(node)
             self._add_frames(node)
-        self.robot = Robot(scene.name, self._links, self._joints, GROUND)
-
-    # Bodies
+        self.root.extend(self._joints)
 
     def _add_body(self, node: Node) -> None:
-        body, at = node.body, _anchor(node)
-        self._links[body.name] = UrdfLink(body.name, inertial_of(body, at))
-        modal = self._loaded[body.name].modal
+        link, at = _add(self.root, "link", name=node.body.name), _anchor(node)
+        part = inertial_of(node.body, at)
+        inertial, J = _add(link, "inertial"), part.inertia
+        _add_origin(inertial, part.center)
+        _add(inertial, "mass", value=part.mass)
+        _add(inertial, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
+        modal = self._loaded[node.body.name].modal
         if modal is not None and modal.kind == "beam":
-            self.visuals[body.name] = list(beam_visuals(modal, at))
+            shapes = beam_visuals(modal, at)
         else:
-            places = [place - at for place in _own_points(self._loaded[body.name]).values()]
-            self.visuals[body.name] = list(bars(places, self.size / SLENDER))
+            places = [place - at for place in _own_points(self._loaded[node.body.name]).values()]
+            shapes = bars(places, self.size / SLENDER)
+        for shape in shapes:
+            visual = _add(link, "visual")
+            _add_origin(visual, shape.origin.xyz, shape.origin.rpy)
+            keys = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}[shape.shape]
+            values = (_triple(shape.size),) if shape.shape == "box" else shape.size
+            _add(_add(visual, "geometry"), shape.shape, **dict(zip(keys, values, strict=True)))
 
     def _add_frames(self, node: Node) -> None:
         """Points that carry nothing, such as tools: links without mass."""
@@ -198,48 +198,58 @@ class UrdfOfScene:
         for point, place in _own_points(self._loaded[body.name]).items():
             if point not in taken and np.any(place - at):
                 name = self._link_names[f"{body.name}.{point}"]
-                self._links[name] = UrdfLink(name, None)
-                joint = self._joint_names[f"{name}.fixed"]
-                origin = Origin(three(place - at), three(rpy_of(body.points[point].triad)))
-                self._joints[joint] = UrdfJoint(joint, "fixed", body.name, name, origin)
-
-    # Joints
+                _add(self.root, "link", name=name)
+                triad = body.points[point].triad
+                self._joint(self._joint_names[f"{name}.fixed"], "fixed", body.name, name, place - at, rpy_of(triad))
 
     def _add_joint(self, node: Node) -> None:
         """The steps of a joint one after the other, with links without mass in between."""
-        joint, origin = node.joint, self._origin(node)
+        joint, (xyz, rpy) = node.joint, self._origin(node)
         parent = GROUND if node.inner.body < 0 else self.tree.nodes[node.inner.body].body.name
         steps = steps_outward(joint, node.backwards)
         own = node.body.points[node.outer.point].triad if node.outer.point else np.eye(3)
         for number, (step, axis) in enumerate(steps, 1):
             name = self._joint_names[f"{joint.name}.{step.label}"] if step.label else self._name(node)
-            child = node.body.name if number == len(steps) else self._link_names[f"{name}.link"]
-            self._links.setdefault(child, UrdfLink(child, None))
-            rise = follows(joint, step)
-            self._joints[name] = UrdfJoint(
-                name, self._type(joint, step), parent, child, origin, three(own @ axis), self._limits(joint, step),
-                _dynamics(joint, step), None if rise is None else Mimic(joint.name, rise, 0.0),
-            )  # fmt: skip
-            parent, origin = child, Origin()
+            child = node.body.name
+            if number < len(steps):
+                child = self._link_names[f"{name}.link"]
+                _add(self.root, "link", name=child)
+            has_end = step.coordinate >= 0 and np.all(np.isfinite(joint.position_limits[step.coordinate]))
+            kind = "continuous" if step.type == "revolute" and not has_end else step.type
+            element = self._joint(name, kind, parent, child, xyz, rpy)
+            if kind not in ("fixed", "floating"):
+                _add(element, "axis", xyz=_triple(own @ axis))
+            if limits := self._limits(joint, step):
+                _add(element, "limit", **limits)
+            if joint.frictions and step.coordinate >= 0:
+                friction = joint.frictions[step.coordinate]
+                _add(element, "dynamics", damping=friction.viscous, friction=friction.coulomb)
+            if isinstance(joint, ScrewJoint) and step.coordinate < 0:  # it goes along with the turn, m/rad
+                _add(element, "mimic", joint=joint.name, multiplier=joint.rise, offset=0.0)
+            parent, xyz, rpy = child, ORIGIN, ()
+
+    def _joint(
+        self, name: str, kind: str, parent: str, child: str, xyz: Sequence[float] | Array, rpy: Sequence[float]
+    ) -> Element:
+        self._joints.append(element := Element("joint", name=name, type=kind))
+        _add_origin(element, xyz, rpy)
+        _add(element, "parent", link=parent)
+        _add(element, "child", link=child)
+        return element
 
     def _name(self, node: Node) -> str:
         """That of the scene; a body without any joint gets one."""
         return node.joint.name if node.joint in self._scene.joint else self._joint_names[f"{node.body.name}.free"]
 
-    def _origin(self, node: Node) -> Origin:
-        """The child's link in the parent's where the coordinates are zero."""
+    def _origin(self, node: Node) -> tuple[Array, Sequence[float]]:
+        """Place and angles of the child's link in the parent's where the coordinates are zero."""
         at = node.inner.position
         if node.inner.body >= 0:
             carrier = self.tree.nodes[node.inner.body]
             at = carrier.body.points[node.inner.point].position - _anchor(carrier)
         if self.tree.tools.keys() & {*node.joint.between}:
-            return Origin(three(at), three(rpy_of(node.inner.triad @ node.outer.triad.T)))
-        rpy = rpy_of(node.joint.orientation.T) if node.backwards else node.joint.rpy
-        return Origin(three(at), three(rpy))
-
-    def _type(self, joint: JointRecord, step: Step) -> str:
-        has_end = step.coordinate >= 0 and np.all(np.isfinite(joint.position_limits[step.coordinate]))
-        return "continuous" if step.type == "revolute" and not has_end else step.type
+            return at, rpy_of(node.inner.triad @ node.outer.triad.T)
+        return at, rpy_of(node.joint.orientation.T) if node.backwards else node.joint.rpy
 
     def _limits(self, joint: JointRecord, step: Step) -> dict[str, float]:
         """URDF wants them of all joints but continuous ones: 0 stands for no limit of effort and velocity."""
@@ -251,17 +261,11 @@ class UrdfOfScene:
             limits = {"lower": low, "upper": high}
         elif step.type == "prismatic":
             limits = {"lower": -self.size, "upper": self.size}
-        motor = joint.motor_limits[step.coordinate] if joint.motor_limits and step.coordinate >= 0 else None
-        found = (np.inf, np.inf) if motor is None else (motor.moment, motor.speed)
-        effort, velocity = (value if np.isfinite(value) else 0.0 for value in found)
+        effort = velocity = 0.0
+        if joint.motor_limits and step.coordinate >= 0:
+            motor = joint.motor_limits[step.coordinate]
+            effort, velocity = (value if np.isfinite(value) else 0.0 for value in (motor.moment, motor.speed))
         return {**limits, "effort": effort, "velocity": velocity} if limits or effort or velocity else {}
-
-
-def _dynamics(joint: JointRecord, step: Step) -> dict[str, float]:
-    if not joint.frictions or step.coordinate < 0:
-        return {}
-    friction = joint.frictions[step.coordinate]
-    return {"damping": friction.viscous, "friction": friction.coulomb}
 
 
 def _anchor(node: Node) -> Array:
@@ -277,63 +281,17 @@ def _own_points(loaded: LoadedBody) -> dict[str, Array]:
     }
 
 
-Element = ElementTree.Element
-
-
-def urdf_text(robot: Robot, visuals: Mapping[str, Sequence[Primitive]]) -> str:
-    """The file, numbers with all their digits; `visuals` by link, in axes of the link."""
-    root = Element("robot", name=robot.name)
-    for link in robot.links.values():
-        element = ElementTree.SubElement(root, "link", name=link.name)
-        if link.inertial is not None:
-            inertial, J = _add(element, "inertial"), link.inertial.inertia
-            _add_origin(inertial, Origin(three(link.inertial.center)))
-            _add(inertial, "mass", value=link.inertial.mass)
-            _add(inertial, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
-        for visual in visuals.get(link.name, ()):
-            _add_visual(element, visual)
-    for joint in robot.joints.values():
-        _add_joint(root, joint)
-    ElementTree.indent(root)
-    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
 def _add(parent: Element, tag: str, **values: float | str) -> Element:
+    """A new element inside `parent`, its numbers with all their digits."""
     return ElementTree.SubElement(
         parent, tag, {key: value if isinstance(value, str) else repr(float(value)) for key, value in values.items()}
     )
 
 
-def _triple(values: Sequence[float]) -> str:
+def _triple(values: Sequence[float] | Array) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)  # no −0.0
 
 
-def _add_origin(parent: Element, origin: Origin) -> None:
-    if any(origin.xyz) or any(origin.rpy):
-        _add(parent, "origin", xyz=_triple(origin.xyz), rpy=_triple(origin.rpy))
-
-
-def _add_visual(link: Element, visual: Primitive) -> None:
-    element = _add(link, "visual")
-    _add_origin(element, visual.origin)
-    geometry = _add(element, "geometry")
-    if visual.shape == "box":
-        _add(geometry, "box", size=_triple(visual.size))
-    elif visual.shape == "cylinder":
-        _add(geometry, "cylinder", radius=visual.size[0], length=visual.size[1])
-    else:
-        _add(geometry, "sphere", radius=visual.size[0])
-
-
-def _add_joint(root: Element, joint: UrdfJoint) -> None:
-    element = _add(root, "joint", name=joint.name, type=joint.type)
-    _add_origin(element, joint.origin)
-    _add(element, "parent", link=joint.parent)
-    _add(element, "child", link=joint.child)
-    if joint.type not in ("fixed", "floating"):
-        _add(element, "axis", xyz=_triple(joint.axis))
-    for tag, values in (("limit", joint.limits), ("dynamics", joint.dynamics)):
-        if values:
-            _add(element, tag, **values)
-    if (mimic := joint.mimic) is not None:
-        _add(element, "mimic", joint=mimic.joint, multiplier=mimic.multiplier, offset=mimic.offset)
+def _add_origin(parent: Element, xyz: Sequence[float] | Array, rpy: Sequence[float] = ()) -> None:
+    if any(xyz) or any(rpy):
+        _add(parent, "origin", xyz=_triple(xyz), rpy=_triple(rpy or ORIGIN))
