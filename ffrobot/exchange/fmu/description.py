@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from io import BytesIO
 from itertools import count
+from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,6 +17,8 @@ from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
 from ...mbs.analysis.forward import Forward
 from .forward_model import UNITS, ForwardUnit, Variable
+
+Element, _add = ElementTree.Element, ElementTree.SubElement
 
 SOURCE = "linear.c"
 VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts as one
@@ -42,86 +44,111 @@ class Unit:
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
 
-    @cached_property
-    def derivatives(self) -> tuple[Variable, ...]:
-        """Of the states."""
-        return tuple(
-            Variable(f"der({each.name})", f"{each.unit}2" if each.unit.endswith("/s") else f"{each.unit}/s", "")
-            for each in self.states
-        )
-
-    @property
-    def variables(self) -> tuple[Variable, ...]:
-        """All, in the order of their value references: states, derivatives, inputs, outputs."""
-        return (*self.states, *self.derivatives, *self.inputs, *self.outputs)
-
 
 def model_description(unit: Unit, generator: str) -> bytes:
-    """The file, in UTF-8."""
-    root = _root(unit.name, unit.guid, unit.description, generator)
+    """The file, in UTF-8; value references are 0, 1, … of states, derivatives, inputs, outputs."""
     abilities = {
         "modelIdentifier": unit.identifier, "canNotUseMemoryManagementFunctions": "true",
         "canGetAndSetFMUstate": "true", "providesDirectionalDerivative": "true",
     }  # fmt: skip
     stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
-    for kind, more in (("ModelExchange", {"completedIntegratorStepNotNeeded": "true"}), ("CoSimulation", stepping)):
-        files = ElementTree.SubElement(ElementTree.SubElement(root, kind, abilities | more), "SourceFiles")
-        ElementTree.SubElement(files, "File", name=SOURCE)
-    groups = {"states": unit.states, "derivatives": unit.derivatives, "inputs": unit.inputs, "outputs": unit.outputs}
-    _add_variables(root, groups, _experiment(unit.model.A))
-    _structure(ElementTree.SubElement(root, "ModelStructure"), unit)
-    return _text(root)
+    kinds = {
+        "ModelExchange": abilities | {"completedIntegratorStepNotNeeded": "true"},
+        "CoSimulation": abilities | stepping,
+    }
+    derivatives = tuple(
+        Variable(f"der({each.name})", f"{each.unit}2" if each.unit.endswith("/s") else f"{each.unit}/s", "")
+        for each in unit.states
+    )
+    groups = {"states": unit.states, "derivatives": derivatives, "inputs": unit.inputs, "outputs": unit.outputs}
+    model, f, u = unit.model, len(unit.states), len(unit.inputs)
+    # FMI counts variables from 1; columns of [A B] and [C D] are states, then inputs.
+    columns = np.array([*range(1, f + 1), *range(2 * f + 1, 2 * f + 1 + u)])
+
+    def unknowns(first: int, matrix: Array) -> dict[int, list[int]]:
+        return {first + k: columns[row != 0].tolist() for k, row in enumerate(matrix)}
+
+    outputs = unknowns(2 * f + 1 + u, np.hstack([model.C, model.D]))
+    rates = unknowns(f + 1, np.hstack([model.A, model.B]))
+    structure = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": rates | outputs}
+    root = _root(unit.name, unit.guid, unit.description, generator)
+    for kind, attributes in kinds.items():
+        _add(_add(_add(root, kind, attributes), "SourceFiles"), "File", {"name": SOURCE})
+    return _finished(root, groups, _experiment(unit.model.A), count(), structure)
 
 
 def forward_description(unit: ForwardUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
     """That of a forward motion under held inputs, in UTF-8; outputs follow the state alone, no input."""
     about = "motion from the initial state under piecewise constant inputs; gravity and friction act as in the scene"
     root = _root(name, unit.data.guid, about, generator)
-    stepping = {
-        "canHandleVariableCommunicationStepSize": "true", "canNotUseMemoryManagementFunctions": "true",
-        "canGetAndSetFMUstate": "true",
-    }  # fmt: skip
-    ElementTree.SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **stepping})
+    _add(
+        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
+        canNotUseMemoryManagementFunctions="true", canGetAndSetFMUstate="true",
+    )  # fmt: skip
     experiment = {"startTime": "0", "stopTime": f"{analysis.last_time:g}", "stepSize": f"{analysis.output_step:g}"}
-    _add_variables(root, {"inputs": unit.inputs, "outputs": unit.outputs}, experiment, unit.references)
-    structure, first = ElementTree.SubElement(root, "ModelStructure"), len(unit.inputs) + 1
-    for group in ("Outputs", "InitialUnknowns"):
-        element = ElementTree.SubElement(structure, group)
-        for index in range(first, first + len(unit.outputs)):
-            ElementTree.SubElement(element, "Unknown", index=str(index), dependencies="")
-    return _text(root)
+    unknowns: dict[int, list[int]] = {len(unit.inputs) + k: [] for k in range(1, len(unit.outputs) + 1)}
+    groups = {"inputs": unit.inputs, "outputs": unit.outputs}
+    structure = {"Outputs": unknowns, "InitialUnknowns": unknowns}
+    return _finished(root, groups, experiment, unit.references, structure)
 
 
-def _root(name: str, guid: str, description: str, generator: str) -> ElementTree.Element:
-    return ElementTree.Element(
+def _root(name: str, guid: str, description: str, generator: str) -> Element:
+    return Element(
         "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=guid, description=description,
         generationTool=generator, variableNamingConvention="flat", numberOfEventIndicators="0",
     )  # fmt: skip
 
 
-def _text(root: ElementTree.Element) -> bytes:
+ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
+    "states": {"causality": "local", "initial": "exact"},
+    "derivatives": {"causality": "local", "initial": "calculated"},
+    "inputs": {"causality": "input"},
+    "outputs": {"causality": "output", "initial": "calculated"},
+}
+"""Of the variables of each group."""
+
+
+def _finished(
+    root: Element,
+    groups: Mapping[str, tuple[Variable, ...]],
+    experiment: dict[str, str],
+    references: Iterable[int],
+    structure: Mapping[str, Mapping[int, list[int]]],
+) -> bytes:
+    """The file with units, log, experiment, variables and structure, in the order that FMI wants.
+
+    `references` are those of the variables; `structure` has by group the dependencies of variables, from 1.
+    """
+    definitions, units = _add(root, "UnitDefinitions"), {one.unit for group in groups.values() for one in group}
+    for name, exponents in UNITS.items():
+        if name in units:
+            definition = _add(definitions, "Unit", {"name": name})
+            if exponents:
+                _add(definition, "BaseUnit", {key: str(n) for key, n in exponents.items()})
+    _add(_add(root, "LogCategories"), "Category", {"name": "logStatusError"})
+    _add(root, "DefaultExperiment", experiment)
+    variables, numbers = _add(root, "ModelVariables"), iter(references)
+    for group, members in groups.items():
+        for k, each in enumerate(members, 1):
+            attributes = {"name": each.name, "valueReference": str(next(numbers))}
+            if each.description:
+                attributes["description"] = each.description
+            variable = _add(
+                variables, "ScalarVariable", {**attributes, "variability": "continuous", **ATTRIBUTES[group]}
+            )
+            real = _add(variable, "Real", {"unit": each.unit})
+            if group in ("states", "inputs"):
+                real.set("start", "0")
+            if group == "derivatives":
+                real.set("derivative", str(k))  # states are the first variables
+    parent = _add(root, "ModelStructure")
+    for group, unknowns in structure.items():
+        element = _add(parent, group)
+        for index, dependencies in sorted(unknowns.items()):
+            _add(element, "Unknown", {"index": str(index), "dependencies": " ".join(map(str, dependencies))})
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"
-
-
-def _add_variables(
-    root: ElementTree.Element,
-    groups: Mapping[str, tuple[Variable, ...]],
-    experiment: dict[str, str],
-    references: Iterable[int] | None = None,
-) -> None:
-    """Units, log, experiment and variables, in the order that FMI wants; `references`: of variables, or 0, 1, 2, …."""
-    definitions, used = ElementTree.SubElement(root, "UnitDefinitions"), {v.unit for of in groups.values() for v in of}
-    for name, exponents in UNITS.items():
-        if name in used:
-            definition = ElementTree.SubElement(definitions, "Unit", name=name)
-            if exponents:
-                ElementTree.SubElement(definition, "BaseUnit", {key: str(n) for key, n in exponents.items()})
-    ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
-    ElementTree.SubElement(root, "DefaultExperiment", experiment)
-    numbers = count() if references is None else iter(references)
-    _variables(ElementTree.SubElement(root, "ModelVariables"), groups, numbers)
 
 
 def _experiment(A: Array) -> dict[str, str]:
@@ -131,47 +158,6 @@ def _experiment(A: Array) -> dict[str, str]:
     vibrations = angular[angular > VIBRATION * max(np.abs(poles).max(), 1.0)]
     stop = float(f"{10 * 2 * np.pi / vibrations.min():.1g}") if len(vibrations) else 1.0
     return {"startTime": "0", "stopTime": f"{stop:g}", "stepSize": f"{stop / 1000:g}"}
-
-
-def _variables(
-    parent: ElementTree.Element, groups: Mapping[str, tuple[Variable, ...]], references: Iterator[int]
-) -> None:
-    attributes: Mapping[str, Mapping[str, str]] = {
-        "states": {"causality": "local", "initial": "exact"},
-        "derivatives": {"causality": "local", "initial": "calculated"},
-        "inputs": {"causality": "input"},
-        "outputs": {"causality": "output", "initial": "calculated"},
-    }
-    for group, variables in groups.items():
-        fixed = attributes[group]
-        for k, each in enumerate(variables, 1):
-            words = {"description": each.description} if each.description else {}
-            number = {"valueReference": str(next(references))}
-            named = {"name": each.name, **number, **words, "variability": "continuous", **fixed}
-            variable = ElementTree.SubElement(parent, "ScalarVariable", named)
-            real = ElementTree.SubElement(variable, "Real", unit=each.unit)
-            if group in ("states", "inputs"):
-                real.set("start", "0")
-            if group == "derivatives":
-                real.set("derivative", str(k))  # states are the first variables
-
-
-def _structure(parent: ElementTree.Element, unit: Unit) -> None:
-    model, f = unit.model, len(unit.states)
-    # FMI counts variables from 1; columns of [A B] and [C D] are states, then inputs.
-    columns = np.array([*range(1, f + 1), *range(2 * f + 1, 2 * f + 1 + len(unit.inputs))])
-    outputs = _unknowns(2 * f + 1 + len(unit.inputs), np.hstack([model.C, model.D]), columns)
-    derivatives = _unknowns(f + 1, np.hstack([model.A, model.B]), columns)
-    groups = {"Outputs": outputs, "Derivatives": derivatives, "InitialUnknowns": sorted([*derivatives, *outputs])}
-    for group, unknowns in groups.items():
-        element = ElementTree.SubElement(parent, group)
-        for index, dependencies in unknowns:
-            on = " ".join(map(str, dependencies))
-            ElementTree.SubElement(element, "Unknown", index=str(index), dependencies=on)
-
-
-def _unknowns(first: int, matrix: Array, columns: Array) -> list[tuple[int, Iterable[int]]]:
-    return [(first + k, columns[row != 0].tolist()) for k, row in enumerate(matrix)]
 
 
 LONGEST = 60  # characters of a name in the identifier
@@ -184,6 +170,12 @@ PLATFORMS: Mapping[tuple[str, str], tuple[str, str]] = {
     ("win32", "AMD64"): ("win64", ".dll"),
 }
 """By system and processor: FMI 2.0's name of the platform, and the end of a library's name there."""
+
+
+def guid_of(numbers: str, variables: Iterable[Variable]) -> str:
+    """Return the same for the same numbers and names of variables."""
+    names = "\n".join(each.name for each in variables)
+    return f"{{{uuid5(NAMESPACE_URL, numbers + names)}}}"
 
 
 def identifier_of(scene: str, analysis: str) -> str:

@@ -6,7 +6,6 @@ import logging
 import platform
 import sys
 from pathlib import Path
-from uuid import NAMESPACE_URL, uuid5
 
 from ...common.errors import InputError, quoted
 from ...common.version import VERSION
@@ -22,7 +21,7 @@ from ...run.solve import prepare_scene
 from ...run.watcher import Watcher
 from ...scene.load import load_scene
 from ...scene.scene import Scene
-from .description import PLATFORMS, forward_description, identifier_of, zipped
+from .description import PLATFORMS, forward_description, guid_of, identifier_of, zipped
 from .forward_model import AXES, ForwardUnit, forward_unit, has_own_coordinates, voltages_of_patches
 
 logger = logging.getLogger(__name__)
@@ -45,8 +44,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
     if place is None:
         raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
     model, unit = _unit(scene, chosen)
-    names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
-    unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
+    unit.data.guid = guid_of(unit.data.to_bytes().hex(), (*unit.inputs, *unit.outputs))
     identifier, (folder, suffix) = identifier_of(scene.name, chosen.name), place
     library = Path(str(_core.__file__)).with_name(LIBRARY)
     content = {
@@ -73,25 +71,18 @@ def _unit(scene: Scene, analysis: Forward) -> tuple[Model, ForwardUnit]:
     return model, forward_unit(model, voltages, prepared.links, analysis, AXES[:2] if scene.is_planar else AXES)
 
 
-def _silent(model: Model) -> list[str]:
-    """Joints whose coordinates are no outputs: those at which loops are cut, and those that are turned freely."""
-    own = {node.joint.name for node in model.tree.nodes if has_own_coordinates(node)}
-    nodes = [node.joint for node in model.tree.nodes]
-    return [joint.name for joint in (*nodes, *model.tree.loops) if joint.units and joint.name not in own]
-
-
 def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
-    found = {each.name: each for each in scene.analysis}
-    if name is not None and name not in found:
-        raise InputError(f'{path}: --analysis: expected one of {quoted(found)}, found "{name}"')
+    analyses = {each.name: each for each in scene.analysis}
+    if name is not None and name not in analyses:
+        raise InputError(f'{path}: --analysis: expected one of {quoted(analyses)}, found "{name}"')
     fitting = (each for each in scene.analysis if isinstance(each, Forward) and each.actuation is None)
     if (chosen := next((each for each in fitting if name in (None, each.name)), None)) is not None:
         return chosen
     wanted = 'an analysis of kind "forward" without actuation, whose motors are the inputs of the FMU'
     if name is None:
         raise InputError(f"{path}: --analysis: expected {wanted}, found none")
-    kind = getattr(found[name], "kind", "?")
-    what = f'kind "{kind}"' + (" with actuation" if isinstance(found[name], Forward) else "")
+    kind = getattr(analyses[name], "kind", "?")
+    what = f'kind "{kind}"' + (" with actuation" if isinstance(analyses[name], Forward) else "")
     raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')
 
 
@@ -100,8 +91,9 @@ def _check(path: Path, scene: Scene) -> None:
         raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
     for body in scene.body:
         if body.pieces is not None:
-            key = f'{path}: body "{body.name}": pieces'
-            raise InputError(f"{key}: expected none of a scene for an FMU, found {body.pieces}")
+            raise InputError(
+                f'{path}: body "{body.name}": pieces: expected none of a scene for an FMU, found {body.pieces}'
+            )
     if scene.geometric_stiffening == "auto":
         raise InputError(
             f'{path}: geometric_stiffening: expected true or false of a scene for an FMU, found "auto", by which the'
@@ -112,10 +104,12 @@ def _check(path: Path, scene: Scene) -> None:
 
 
 def _remarks(model: Model, unit: ForwardUnit, folder: str) -> list[str]:
-    found = [f"inputs are constant over a communication step; binary for {folder} alone, without sources"]
+    remarks = [f"inputs are constant over a communication step; binary for {folder} alone, without sources"]
     if not unit.inputs:
-        found.append("there are no inputs: no joint has a motor, no link patches")
-    if silent := _silent(model):
-        found.append(f"{quoted(silent)}: no outputs of their coordinates, as they are none of the state")
-    found += hanging_joints(model, State(unit.data.q, unit.data.v))
-    return [*found, "limits of motors and patches do not act"]
+        remarks.append("there are no inputs: no joint has a motor, no link patches")
+    # Those at which loops are cut, and those that are turned freely.
+    silent = [node.joint for node in model.tree.nodes if not has_own_coordinates(node)] + list(model.tree.loops)
+    if names := [joint.name for joint in silent if joint.units]:
+        remarks.append(f"{quoted(names)}: no outputs of their coordinates, as they are none of the state")
+    remarks += hanging_joints(model, State(unit.data.q, unit.data.v))
+    return [*remarks, "limits of motors and patches do not act"]

@@ -54,13 +54,12 @@ class Variable:
 
 def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
     """Unit of each coordinate of the joints of a scene, by "NAME", or "NAME 1", "NAME 2" of joints with several."""
-    found = {}
+    units = {}
     for joint in scene.get("joint", ()):
         record = JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
-        units = record.units or record.guess_units
-        for number, unit in enumerate(units, 1):
-            found[f"{joint['name']} {number}" if len(units) > 1 else str(joint["name"])] = unit
-    return found
+        of_joint = record.units or record.guess_units
+        units |= {_numbered(joint["name"], k, len(of_joint)): unit for k, unit in enumerate(of_joint, 1)}
+    return units
 
 
 def linear_variables(
@@ -201,13 +200,18 @@ def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
         columns, sign = model.columns(joint.name), node.sign
         for k, (column, unit) in enumerate(zip(columns, joint.units, strict=True), 1):
             name, entry = _numbered(joint.name, k, len(columns)), node.q.start + int(column) - node.v.start
-            yield Variable(f"joint/{name}", unit, f"coordinate of joint {name}"), _core.LinearOutput([entry], [sign])
-            rate = Variable(f"joint/{name}/rate", f"{unit}/s", f"rate of joint {name}")
-            yield rate, _core.LinearOutput([tree.n_q + int(column)], [sign])
+            entries = (entry, tree.n_q + int(column))
+            yield from _with_rate(f"joint/{name}", f"joint {name}", unit, entries, sign)
     for gear in tree.gears:
-        name, q, v = gear.joint.joint.name, gear.motor.q.start, tree.n_q + gear.motor.v.start
-        yield Variable(f"motor/{name}", "rad", f"coordinate of the motor of {name}"), _core.LinearOutput([q], [1.0])
-        yield Variable(f"motor/{name}/rate", "rad/s", f"rate of the motor of {name}"), _core.LinearOutput([v], [1.0])
+        name, entries = gear.joint.joint.name, (gear.motor.q.start, tree.n_q + gear.motor.v.start)
+        yield from _with_rate(f"motor/{name}", f"the motor of {name}", "rad", entries, 1.0)
+
+
+def _with_rate(
+    name: str, of: str, unit: str, entries: tuple[int, int], sign: float
+) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+    yield Variable(name, unit, f"coordinate of {of}"), _core.LinearOutput([entries[0]], [sign])
+    yield Variable(f"{name}/rate", f"{unit}/s", f"rate of {of}"), _core.LinearOutput([entries[1]], [sign])
 
 
 def has_own_coordinates(node: Node) -> bool:

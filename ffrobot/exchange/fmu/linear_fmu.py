@@ -11,7 +11,6 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from uuid import NAMESPACE_URL, uuid5
 
 import numpy as np
 from scipy.linalg import matrix_balance
@@ -21,7 +20,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.version import VERSION
 from ...results.file import Results
-from .description import PLATFORMS, SOURCE, Unit, identifier_of, model_description, zipped
+from .description import PLATFORMS, SOURCE, Unit, guid_of, identifier_of, model_description, zipped
 from .forward_model import joint_units, linear_variables
 
 
@@ -48,7 +47,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     model = models[0]
     _check(path, name, model)
     unit = make_unit(str(scene["name"]), name, model, joint_units(scene))
-    files = sources(unit)
+    files = {SOURCE: (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8"), HEADER: _header(unit)}
     compiled = binary(unit, files)
     content = {"modelDescription.xml": model_description(unit, f"ffrobot {VERSION}")}
     content |= {f"sources/{file}": text.encode() for file, text in files.items()}
@@ -64,14 +63,16 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
 def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str, str]) -> Unit:
     """Names and variables of the FMU of a model; `units` of the joints' coordinates."""
     states, inputs, outputs = linear_variables(model, units)
-    names = "\n".join(each.name for each in (*states, *inputs, *outputs))
     return Unit(
         identifier=identifier_of(scene, analysis),
         name=f"{scene}, {analysis}",
         description=f"linear model about t = {model.time:g} s; all values are deviations from the configuration there",
-        guid=f"{{{uuid5(NAMESPACE_URL, numbers(model) + names)}}}",
-        model=model, states=states, inputs=inputs, outputs=outputs,
-    )  # fmt: skip
+        guid=guid_of(numbers(model), (*states, *inputs, *outputs)),
+        model=model,
+        states=states,
+        inputs=inputs,
+        outputs=outputs,
+    )
 
 
 def _check(path: Path, analysis: str, model: LinearModel) -> None:
@@ -86,11 +87,6 @@ def _check(path: Path, analysis: str, model: LinearModel) -> None:
 
 HEADER = "model.h"
 COMPILERS = ("cc", "gcc", "clang")
-
-
-def sources(unit: Unit) -> dict[str, str]:
-    """Text of each source file by name."""
-    return {SOURCE: (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8"), HEADER: _header(unit)}
 
 
 def numbers(model: LinearModel) -> str:
