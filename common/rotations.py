@@ -164,3 +164,8 @@ def rotation(theta: float) -> Array:
 def in_3d(vectors: Array) -> Array:
     """(…, 3) of `vectors` (…, 2) of the plane z = 0; longer ones as they are."""
     return vectors if vectors.shape[-1] > 2 else np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)
+
+
+def point_inertia(mass: float, place: Array) -> Array:
+    """Inertia (3, 3) about the origin, kg·m², of a point mass (kg) at `place` (3,), m."""
+    return as_floats(mass * (place @ place * np.eye(3) - np.outer(place, place)))

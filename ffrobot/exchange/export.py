@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -39,17 +39,16 @@ Content = str | bytes | Mapping[str, bytes]
 """Of a file, or the files of a folder by name."""
 
 
-@dataclass(frozen=True)
-class Exported:
-    """What was written where, in a few words, and what to know of it."""
+class Exported(NamedTuple):
+    """The file written, a few words on its content, and remarks."""
 
     path: Path
     what: str
     remarks: tuple[str, ...]
 
 
-class Made(NamedTuple):
-    """What a file is to hold, a few words on it, remarks, the analysis that it is of ("" of none)."""
+class FileContent(NamedTuple):
+    """Content of a file, a few words on it, remarks, and the analysis that it is of ("" of none)."""
 
     content: Content
     what: str
@@ -57,49 +56,41 @@ class Made(NamedTuple):
     analysis: str = ""
 
 
-Make = Callable[[Path, str | None, Side], Made]
-"""Of a file, of an analysis of it where one is named, and of a side of compliant gears."""
 Converted = tuple[Content, tuple[str, ...]]
 """A content, and remarks on what it does not carry."""
+Make = Callable[[Path, str | None, Side], FileContent]
+"""Of a file, of an analysis of it where one is named, and of a side of compliant gears."""
 
 
-def _of_motion(convert: Callable[[RobotMotion], Converted], what: str) -> Make:
-    """From the motion in a results file; `what` tells how much it is."""
-
-    def make(path: Path, analysis: str | None, side: Side) -> Made:
-        motion = robot_motion(path, analysis, side)
-        content, remarks = convert(motion)
-        counted = what.format(joints=len(motion.joints), points=len(motion.time))
-        return Made(content, f"{counted} of {motion.analysis}", remarks, motion.analysis)
-
-    return make
+def _motion(convert: Callable[[RobotMotion], Converted], what: str, *of: Any) -> FileContent:
+    motion = robot_motion(*of)
+    content, remarks = convert(motion)
+    counted = what.format(joints=len(motion.joints), points=len(motion.time))
+    return FileContent(content, f"{counted} of {motion.analysis}", remarks, motion.analysis)
 
 
-def _of_body(convert: Callable[[ModalBody], Converted]) -> Make:
-    def make(path: Path, analysis: str | None, side: Side) -> Made:
-        body = read_modal_body(path)
-        content, remarks = convert(body)
-        return Made(content, f"{body.name}, {body.modes_in_words}", remarks)
-
-    return make
+def _body(convert: Callable[[ModalBody], Converted], path: Path, *_: Any) -> FileContent:
+    body = read_modal_body(path)
+    content, remarks = convert(body)
+    return FileContent(content, f"{body.name}, {body.modes_in_words}", remarks)
 
 
 FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
     "results": {
-        "csv": (".csv", _of_motion(lambda motion: (csv_text(motion), motion.remarks), "{joints} joints")),
-        "joint-trajectory": (".joint-trajectory.json", _of_motion(joint_trajectory_text, "{points} points")),
-        "rosbag2": (".rosbag2", _of_motion(joint_trajectory_bag, "a JointTrajectory with {points} points")),
-        "fmu": (".fmu", lambda path, analysis, _: Made(*linear_fmu(path, analysis))),
+        "csv": (".csv", partial(_motion, lambda motion: (csv_text(motion), motion.remarks), "{joints} joints")),
+        "joint-trajectory": (".joint-trajectory.json", partial(_motion, joint_trajectory_text, "{points} points")),
+        "rosbag2": (".rosbag2", partial(_motion, joint_trajectory_bag, "a JointTrajectory with {points} points")),
+        "fmu": (".fmu", lambda path, analysis, _: FileContent(*linear_fmu(path, analysis))),
     },
     "a scene": {
-        "urdf": (".urdf", lambda path, *_: Made(*scene_as_urdf(path))),
-        "fmu": (".fmu", lambda path, analysis, _: Made(*forward_fmu(path, analysis))),
+        "urdf": (".urdf", lambda path, *_: FileContent(*scene_as_urdf(path))),
+        "fmu": (".fmu", lambda path, analysis, _: FileContent(*forward_fmu(path, analysis))),
     },
     "a modal body": {
-        "sid": (".SID_FEM", _of_body(sid_text)),
-        "mbdyn": (".fem", _of_body(fem_text)),
-        "craig-bampton": (".craig-bampton.npz", _of_body(craig_bampton_file)),
-        "exudyn": (".exudyn.npz", _of_body(exudyn_file)),
+        "sid": (".SID_FEM", partial(_body, sid_text)),
+        "mbdyn": (".fem", partial(_body, fem_text)),
+        "craig-bampton": (".craig-bampton.npz", partial(_body, craig_bampton_file)),
+        "exudyn": (".exudyn.npz", partial(_body, exudyn_file)),
     },
 }
 """Formats of each kind of file: end of the new file's name, and what makes its content."""
@@ -205,6 +196,7 @@ def import_body(path: Path, output: Path) -> Exported:
 
 
 UNITS = {"revolute": "rad", "prismatic": "m"}
+LIMITS = ("moment_limit", "speed_limit", "viscous_friction", "coulomb_friction")
 
 
 def print_import(imported: Imported, console: Console) -> None:
@@ -216,7 +208,7 @@ def print_import(imported: Imported, console: Console) -> None:
         f"{robot.name}: {len(robot.links)} links and {len(robot.joints)} joints, of which {len(scene['body'])} bodies"
         f" and {len(moving)} joints move; {mass:.6g} kg in rigid bodies",
         soft_wrap=True,
-    )  # fmt: skip
+    )
     table = plain_table("joint", "type", "range", "moment or force", "speed", "damping", "friction")
     for joint in moving:
         low_high = joint.get("position_limit")
@@ -224,9 +216,8 @@ def print_import(imported: Imported, console: Console) -> None:
             joint["name"],
             joint["type"],
             f"{low_high[0]:.4g} … {low_high[1]:.4g} {UNITS[joint['type']]}" if low_high else "–",
-            *(f"{joint[key]:.4g}" if key in joint else "–"
-              for key in ("moment_limit", "speed_limit", "viscous_friction", "coulomb_friction")),
-        )  # fmt: skip
+            *(f"{joint[key]:.4g}" if key in joint else "–" for key in LIMITS),
+        )
     console.print(table)
     if imported.masses:
         _print_masses(imported, console)
@@ -251,13 +242,18 @@ def _print_masses(imported: Imported, console: Console) -> None:
         inertial = imported.robot.links[each.link].inertial
         mass = inertial.mass if inertial is not None else 0.0
         table.add_row(
-            each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}",
-            f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}",
-        )  # fmt: skip
+            each.link,
+            "closed" if each.is_closed else "open",
+            f"{mass:.4g}",
+            f"{each.volume:.3g}",
+            f"{each.density:.4g}",
+            f"{each.inertia_ratio:.3g}",
+            f"{each.center_distance:.2g}",
+        )
     console.print()
     console.print(table)
     console.print(
         "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
         " --flexible names a file",
         soft_wrap=True,
-    )  # fmt: skip
+    )

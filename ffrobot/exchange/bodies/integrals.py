@@ -19,6 +19,7 @@ from scipy.linalg import eigh
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
+from ...common.rotations import point_inertia
 from ...common.tables import shown
 from ...common.version import VERSION
 from ...fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
@@ -108,7 +109,7 @@ class ShapeIntegrals:
     @property
     def about_center(self) -> Array:
         """Inertia (3, 3) about the center of mass, kg·m²."""
-        return as_floats(self.inertia - steiner(self.mass, self.first_moment / self.mass))
+        return as_floats(self.inertia - point_inertia(self.mass, self.first_moment / self.mass))
 
     def transformed(self, T: Array) -> ShapeIntegrals:
         """The same in modal coordinates p, q = T p."""
@@ -123,11 +124,6 @@ class ShapeIntegrals:
             stiffness=T.T @ self.stiffness @ T,
             damping=T.T @ self.damping @ T,
         )
-
-
-def steiner(mass: float, center: Array) -> Array:
-    """(3, 3) inertia of a point mass at `center` (3,) about the origin."""
-    return as_floats(mass * (center @ center * np.eye(3) - np.outer(center, center)))
 
 
 def integrals_of(body: ModalBody) -> ShapeIntegrals:

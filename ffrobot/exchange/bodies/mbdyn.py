@@ -16,6 +16,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.rotations import point_inertia
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mesh.included import number_of
@@ -28,7 +29,6 @@ from .integrals import (
     note,
     noted,
     slopes,
-    steiner,
     with_agreed_masses,
 )
 
@@ -161,7 +161,7 @@ def _of_invariants(records: dict[int, list[str]], n: int) -> dict[str, Any]:
         "mass": mass,
         "first_moment": mass * center,
         "S_bar": inv3,
-        "inertia": rigid[4:].reshape(3, 3) + steiner(mass, center),
+        "inertia": rigid[4:].reshape(3, 3) + point_inertia(mass, center),
         "inertia_slope": inv8 + inv8.transpose(1, 0, 2),
         "spin": inv4,
         "spin_slope": inv5.transpose(0, 2, 1),

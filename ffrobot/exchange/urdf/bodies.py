@@ -15,7 +15,7 @@ from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint
 
 
 @dataclass(eq=False)
-class Body:
+class MergedLinks:
     """Links that move as one: `top` carries the others, and its axes are those of the body, unless it is flexible.
 
     Attributes:
@@ -39,6 +39,11 @@ class Body:
             self.inertial = self.inertial + inertial.seen_from(place)
 
     @property
+    def weighs(self) -> bool:
+        """Whether it has mass."""
+        return self.flexible or self.inertial.mass > 0
+
+    @property
     def label(self) -> str:
         """What messages call it."""
         fixed = [name for name in self.members if name != self.top]
@@ -52,9 +57,9 @@ class Mechanism:
     `body_of` has the body of each link; `remarks` say what was left out.
     """
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[MergedLinks, ...]
     joints: tuple[UrdfJoint, ...]
-    body_of: Mapping[str, Body]
+    body_of: Mapping[str, MergedLinks]
     remarks: tuple[str, ...]
 
 
@@ -69,8 +74,8 @@ def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool 
     Raises:
         InputError: a body that moves has no mass but carries others, or an inertia that no body has.
     """
-    ground = Body(robot.root, stands_still=True)
-    bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, Body]()
+    ground = MergedLinks(robot.root, stands_still=True)
+    bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, MergedLinks]()
     if robot.root in flexible:
         joints.append(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))  # the parent is no link
         bodies.append(_start(robot, robot.root, flexible, body_of))
@@ -87,24 +92,20 @@ def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool 
             bodies.append(_start(robot, joint.child, flexible, body_of))
     kept, carried, remarks = _with_mass(bodies, joints, body_of)
     if not kept:
-        raise InputError(_without_mass(robot))
+        if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
+            raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}", found none')
+        raise InputError(
+            "expected links with mass, found no <inertial> with one in the whole file: it was made for viewers. Add"
+            " <inertial> to its links, from CAD or a data sheet, take a description of the robot for dynamics, or"
+            " estimate masses by --density"
+        )
     remarks += _fixed(kept) if fix_inertia else []
     _check_inertias(kept)
     return Mechanism(tuple(kept), tuple(carried), body_of, tuple(remarks))
 
 
-def _without_mass(robot: Robot) -> str:
-    if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
-        return f'expected a link with mass that moves on "{shown(robot.root)}", found none'
-    return (
-        "expected links with mass, found no <inertial> with one in the whole file: it was made for viewers. Add"
-        " <inertial> to its links, from CAD or a data sheet, take a description of the robot for dynamics, or estimate"
-        " masses by --density"
-    )
-
-
-def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, Body]) -> Body:
-    body = Body(link, flexible=link in flexible)
+def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, MergedLinks]) -> MergedLinks:
+    body = MergedLinks(link, flexible=link in flexible)
     body.add(robot, link, flexible.get(link, HERE))
     body_of[link] = body
     return body
@@ -112,25 +113,22 @@ def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict
 
 def _outward(robot: Robot) -> list[UrdfJoint]:
     """All joints, those nearer the root first, else in the order of the file."""
-    order, todo = list[UrdfJoint](), [robot.root]
-    while todo:
-        found = robot.joints_of(todo.pop(0))
-        order += found
-        todo += [joint.child for joint in found]
-    return order
+    joints = robot.joints_of(robot.root)
+    for joint in joints:  # which grows
+        joints += robot.joints_of(joint.child)
+    return joints
 
 
 def _with_mass(
-    bodies: list[Body], joints: list[UrdfJoint], body_of: Mapping[str, Body]
-) -> tuple[list[Body], list[UrdfJoint], list[str]]:
+    bodies: list[MergedLinks], joints: list[UrdfJoint], body_of: Mapping[str, MergedLinks]
+) -> tuple[list[MergedLinks], list[UrdfJoint], list[str]]:
     """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
-    weighs = {id(body): body.flexible or body.inertial.mass > 0 for body in bodies}
-    below = dict(weighs)
+    below = {body for body in bodies if body.weighs}
     for joint in reversed(joints):
-        if joint.parent in body_of and below[id(body_of[joint.child])]:
-            below[id(body_of[joint.parent])] = True
-    kept = [body for body in bodies if not body.stands_still and below[id(body)]]
-    bare = [body for body in kept if not weighs[id(body)]]
+        if joint.parent in body_of and body_of[joint.child] in below:
+            below.add(body_of[joint.parent])
+    kept = [body for body in bodies if not body.stands_still and body in below]
+    bare = [body for body in kept if not body.weighs]
     if bare:
         raise InputError(
             "\n".join(
@@ -142,9 +140,9 @@ def _with_mass(
     remarks = [
         f'joint "{shown(joint.name)}" and link "{shown(joint.child)}" left out: nothing there has mass'
         for joint in joints
-        if not below[id(body_of[joint.child])]
+        if body_of[joint.child] not in below
     ]
-    return kept, [joint for joint in joints if below[id(body_of[joint.child])]], remarks
+    return kept, [joint for joint in joints if body_of[joint.child] in below], remarks
 
 
 def least_change(inertia: Array) -> Array:
@@ -161,7 +159,7 @@ def least_change(inertia: Array) -> Array:
     return (fixed + fixed.T) / 2
 
 
-def _fixed(bodies: list[Body]) -> list[str]:
+def _fixed(bodies: list[MergedLinks]) -> list[str]:
     remarks = []
     for body in bodies:
         before = body.inertial.inertia
@@ -183,8 +181,8 @@ def is_possible(inertia: Array) -> bool:
     return bool(moments[2] <= moments[0] + moments[1] + ROUNDING * np.abs(inertia).max())
 
 
-def _check_inertias(bodies: list[Body]) -> None:
-    found = []
+def _check_inertias(bodies: list[MergedLinks]) -> None:
+    errors = []
     for body in bodies:
         if body.flexible:
             continue
@@ -195,6 +193,6 @@ def _check_inertias(bodies: list[Body]) -> None:
             least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
             is_mended = not is_possible(body.inertial.inertia) and least >= -ROUNDING * largest
             way = ": --fix-inertia makes the least change" if is_mended else ""
-            found.append(f"{body.label}: <inertia>: {error}{way}")
-    if found:
-        raise InputError("\n".join(found))
+            errors.append(f"{body.label}: <inertia>: {error}{way}")
+    if errors:
+        raise InputError("\n".join(errors))

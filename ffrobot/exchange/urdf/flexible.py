@@ -14,19 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.errors import InputError, did_you_mean
 from ...common.tables import shown
 from ...common.toml_files import load_toml
 from ...fe_models.link_file import read_link
 from ...fe_models.link_source import LinkTable
 from ...mesh.checks import METRES
-from ...mesh.inspection import PartFace, inspect_part
+from ...mesh.inspection import inspect_part
 from .robot import Names, Place, Robot, UrdfJoint
 
 ON_AXIS = 1e-6  # of the length: how far a joint may be off the axis of a beam
 SAME_LENGTH = 1e-6  # relative
-_ENDS = ("root", "tip")
 SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of swing
 
 
@@ -68,9 +67,8 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
         raise InputError(f"{source}: expected a link file, found no [geometry]")
     beyond = robot.joints_of(name)
     tip = max(beyond, key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
-    axes = _axes(robot, name, tip)
+    axes, remarks = _axes(robot, name, tip), list[str]()
     place = Place(np.zeros(3), axes.T)
-    remarks = list[str]()
     length = _set_length(geometry, tip, name, source, remarks)
     keys["name"] = str(keys.get("name", stem))
     part = _place_part(geometry, axes, source, remarks)
@@ -146,54 +144,57 @@ def _interfaces(
         elif np.linalg.norm(x) <= ON_AXIS * length:
             point_of[joint.name] = "root"
         else:
-            point_of[joint.name] = names[joint.name]
-            if point_of[joint.name] not in taken:
-                tables.append(
-                    {"name": point_of[joint.name]} | _position(keys, x, length, f'{label}: joint "{joint.name}"')
-                )
+            point_of[joint.name] = point = names[joint.name]
+            if point not in taken:
+                position = _position(keys, x, length, f'{label}: joint "{joint.name}"')
+                tables.append({"name": point, "position": position})
     if tables:
         keys["interface"] = tables
     return point_of
 
 
-def _axes_of_joints(robot: Robot, name: str, point_of: Mapping[str, str], place: Place) -> dict[str, Axis]:
-    moving = [joint for joint in robot.joints.values() if joint.type in ("revolute", "continuous")]
-    found = dict[str, Axis]()
-    for joint in moving:
+def _axes_of_joints(robot: Robot, name: str, point_of: Mapping[str, str], place: Place) -> dict[str, JointAxis]:
+    axes = dict[str, JointAxis]()
+    for joint in robot.joints.values():
+        if joint.type not in ("revolute", "continuous"):
+            continue
         if joint.child == name:
-            found["root"] = Axis(joint.name, place.d, place.C @ np.array(joint.axis))
+            axes["root"] = JointAxis(joint.name, place.d, place.C @ np.array(joint.axis))
         elif joint.parent == name:
-            at, axis = np.array(joint.origin.xyz), joint.origin.place.C @ np.array(joint.axis)
-            found.setdefault(point_of[joint.name], Axis(joint.name, place.d + place.C @ at, place.C @ axis))
-    return found
+            at = place @ joint.origin.place
+            axes.setdefault(point_of[joint.name], JointAxis(joint.name, at.d, at.C @ np.array(joint.axis)))
+    return axes
 
 
-def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, Axis], length: float) -> list[str]:
+def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, JointAxis], length: float) -> list[str]:
     """Make bores the interfaces of joints that the link file itself has no table for; what to say of them."""
     tables = [table for table in keys.get("interface", ()) if isinstance(table, dict)]
-    own = {table.get("name") for table in tables if "normal" in table or "group" in table or table.get("name") in _ENDS}
+    own = {
+        table.get("name")
+        for table in tables
+        if "normal" in table or "group" in table or table.get("name") in ("root", "tip")
+    }
     wanted = {name: joint for name, joint in joints.items() if name not in own}
     if not wanted:
         return []
-    found = list(bores_at(keys["geometry"], part, wanted, length))
-    matched = {table["name"]: table for table, _ in found}
-    kept = [table for table in tables if table.get("name") not in matched]
-    if matched:
-        keys["interface"] = [*matched.values(), *kept]
-    return [remark for _, remark in found]
+    bores = list(bores_at(keys["geometry"], part, wanted, length))
+    if bores:
+        matched = {table["name"]: table for table, _ in bores}
+        keys["interface"] = [*matched.values(), *(table for table in tables if table.get("name") not in matched)]
+    return [remark for _, remark in bores]
 
 
-def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> dict[str, Any]:
+def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> float | list[float]:
     """Of a beam the distance from the root, of a solid the point, whose nearest face is taken."""
     if keys["geometry"].get("kind", "beam") == "solid":
-        return {"position": x.tolist()}
+        return as_list(x)
     off = float(np.linalg.norm(x[1:]))
     if off > ON_AXIS * length or not 0 < x[0] < length:
         raise InputError(
             f"{label}: expected a joint on the line between the ends of the beam, found it {off:.4g} m off, at"
             f" {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in the URDF"
         )
-    return {"position": float(x[0])}
+    return float(x[0])
 
 
 PARALLEL = 1e-4  # 1 − cosine between the axes of a bore and of its joint
@@ -202,7 +203,7 @@ CENTERED = 1e-6  # of the length: how far the center of the bore is from the joi
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class JointAxis:
     """A joint of the link: its `name`, `point` (3,) m and `direction` (3,) in axes of the link file."""
 
     name: str
@@ -211,7 +212,7 @@ class Axis:
 
 
 def bores_at(
-    geometry: Mapping[str, Any], part: Path, joints: Mapping[str, Axis], length: float
+    geometry: Mapping[str, Any], part: Path, joints: Mapping[str, JointAxis], length: float
 ) -> Iterator[tuple[dict[str, Any], str]]:
     """A table `interface` and a remark for each of `joints`, by the interface's name, that a bore of `part` is around.
 
@@ -221,31 +222,27 @@ def bores_at(
         InputError: the part cannot be read.
     """
     unit = geometry.get("unit", "m")
-    found = inspect_part(part, unit)
-    x, y = (np.array(geometry.get(key, default), dtype=float) for key, default in _AXES.items())
+    faces = inspect_part(part, unit).faces
+    x = np.array(geometry.get("x_axis", (1.0, 0.0, 0.0)), dtype=float)
+    y = np.array(geometry.get("y_axis", (0.0, 1.0, 0.0)), dtype=float)
     z = np.cross(x, y) / np.linalg.norm(np.cross(x, y))
     x /= np.linalg.norm(x)
     C = np.stack([x, np.cross(z, x), z])
     origin = METRES[unit] * np.array(geometry.get("origin", (0.0, 0.0, 0.0)))
-    bores = [(face, C @ (face.center - origin), C @ face.direction) for face in found.faces if face.kind == "bore"]
+    bores = [(face, C @ (face.center - origin), C @ face.direction) for face in faces if face.kind == "bore"]
     for interface, joint in joints.items():
         axis = joint.direction / np.linalg.norm(joint.direction)
-        around = [bore for bore in bores if _is_around(*bore, joint.point, axis)]
+        around = []
+        for face, center, direction in bores:
+            off = joint.point - center
+            across = float(np.linalg.norm(off - (off @ direction) * direction))
+            if 1 - abs(float(direction @ axis)) < PARALLEL and across < CONCENTRIC * (face.radius or 0.0):
+                around.append((abs(float(off @ axis)), face, center, direction))
         if not around:
             continue
-        face, center, direction = min(around, key=lambda bore: abs(float((bore[1] - joint.point) @ axis)))
-        off = abs(float((center - joint.point) @ axis))
+        off, face, center, direction = min(around, key=lambda bore: bore[0])
         more = f", whose center is {1000 * off:.4g} mm along the axis from the joint" if off > CENTERED * length else ""
         yield (
             {"name": interface, "position": center.tolist(), "normal": direction.tolist()},
             f'joint "{shown(joint.name)}" is in a bore of radius {1000 * (face.radius or 0.0):.4g} mm{more}',
         )
-
-
-_AXES = {"x_axis": (1.0, 0.0, 0.0), "y_axis": (0.0, 1.0, 0.0)}
-
-
-def _is_around(face: PartFace, center: Array, direction: Array, point: Array, axis: Array) -> bool:
-    off = point - center
-    across = float(np.linalg.norm(off - (off @ direction) * direction))
-    return 1 - abs(float(direction @ axis)) < PARALLEL and across < CONCENTRIC * (face.radius or 0.0)

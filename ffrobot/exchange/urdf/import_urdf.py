@@ -20,7 +20,7 @@ from ...mbs.model.body import Body, from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
 from .read import read_urdf
-from .robot import Inertial, MeshFile, Names, Robot, inertial_of
+from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of
 from .scene import SceneOfRobot
 from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
 
@@ -33,7 +33,10 @@ class Replaced:
     def __init__(self, robot: Robot, link: FlexibleLink, folder: Path) -> None:
         """The link file will be in `folder`, which need not be there yet. Raises what stage 1 raises."""
         self.name = link.name
-        table = LinkTable(_with_whole_path(link.keys, folder), folder / link.file_name)
+        geometry = dict(link.keys["geometry"])
+        if isinstance(file := geometry.get("file"), str):
+            geometry["file"] = str((folder / file).resolve())
+        table = LinkTable({**link.keys, "geometry": geometry}, folder / link.file_name)
         self.body: Body = from_modal_body(link.name, cached_modal_body(table).body)
         inertial = robot.links[link.name].inertial
         self.before = None if inertial is None else inertial.seen_from(link.place)
@@ -41,9 +44,9 @@ class Replaced:
 
     def remark(self) -> str:
         """Mass, center and inertia before and after, a line."""
-        if self.before is None or self.before.mass == 0:
-            return f'link "{shown(self.name)}": the URDF has no mass for it; now {_words(self.after)}'
-        return f'link "{shown(self.name)}": {_words(self.before)} in the URDF; now {_words(self.after)}'
+        has_mass = self.before is not None and self.before.mass != 0
+        before = f"{_words(self.before)} in the URDF" if has_mass else "the URDF has no mass for it"
+        return f'link "{shown(self.name)}": {before}; now {_words(self.after)}'
 
     def rest(self) -> tuple[dict[str, Any] | None, list[str]]:
         """Keys of the payload that makes up for the difference, but `point` without its body; and remarks.
@@ -54,12 +57,12 @@ class Replaced:
         Raises:
             InputError: the flexible link has more mass than that of the URDF.
         """
-        before, after = self.before, self.after
-        mass = (0.0 if before is None else before.mass) - after.mass
-        if before is None or mass < -SAME * after.mass:
+        before, after = self.before or MASSLESS, self.after
+        mass = before.mass - after.mass
+        if mass < -SAME * after.mass:
             raise InputError(
                 f'--keep-rest: link "{shown(self.name)}": expected a link file with less mass than the URDF,'
-                f" found {after.mass:.6g} kg of {0.0 if before is None else before.mass:.6g} kg"
+                f" found {after.mass:.6g} kg of {before.mass:.6g} kg"
             )
         if mass <= SAME * after.mass:
             return None, []
@@ -74,13 +77,6 @@ class Replaced:
             return keys | {"inertia": symmetric.tolist()}, [about]
         moments = ", ".join(f"{moment:.3g}" for moment in np.linalg.eigvalsh(inertia))
         return keys, [f"{about}, as a point mass: its moments of inertia would be {moments} kg m², which no body has"]
-
-
-def _with_whole_path(keys: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    geometry = dict(keys["geometry"])
-    if isinstance(file := geometry.get("file"), str):
-        geometry["file"] = str((folder / file).resolve())
-    return {**keys, "geometry": geometry}
 
 
 def _words(inertial: Inertial) -> str:
@@ -213,7 +209,10 @@ def import_urdf(
         keys = {**scene.keys, **({"payload": payloads} if payloads else {})}
         remarks += [*about_rest, *about_meshes, *_remarks_on_scale(robot)]
         files = {SCENE: _scene_text(urdf, keys, remarks)}
-        files |= {link.file_name: _link_text(urdf, link) for link in links.values()}
+        for link in links.values():
+            axes = "x from the joint that carries it to the next, y in its plane of swing"
+            head = _comment(f'Link "{link.name}" of {urdf.name}: {axes}.')
+            files[link.file_name] = f"{head}\n\n{toml_text(link.keys)}"
         written = _write(folder, files, force=force)
         return Imported(robot, keys, tuple(links.values()), tuple(remarks), tuple(masses), written)
 
@@ -221,24 +220,17 @@ def import_urdf(
 def _scene(
     urdf: Path, robot: Robot, links: Mapping[str, FlexibleLink], folder: Path, *, fix_inertia: bool
 ) -> SceneOfRobot:
+    shapes = (shape for link in robot.links.values() for shape in link.visual)
+    paths = {shape.filename: mesh_path(shape.filename, urdf) for shape in shapes if isinstance(shape, MeshFile)}
+    meshes = {name: os.path.relpath(path, folder.resolve()) for name, path in paths.items() if path is not None}
     try:
         places = {name: link.place for name, link in links.items()}
-        scene = SceneOfRobot(
-            robot, mechanism(robot, places, fix_inertia=fix_inertia), links, _meshes(robot, urdf, folder)
-        )
+        scene = SceneOfRobot(robot, mechanism(robot, places, fix_inertia=fix_inertia), links, meshes)
     except InputError as error:
         raise InputError("\n".join(f"{urdf}: {line}" for line in str(error).splitlines())) from None
     if beyond := list(beyond_limits(dict(scene.keys))):
         raise InputError("\n".join(f"{urdf}: {line}" for line in beyond))
     return scene
-
-
-def _meshes(robot: Robot, urdf: Path, folder: Path) -> dict[str, str]:
-    """Files of meshes to be seen that are there, from `folder` on, by the names that the URDF has for them."""
-    shapes = (shape for link in robot.links.values() for shape in link.visual)
-    names = dict.fromkeys(shape.filename for shape in shapes if isinstance(shape, MeshFile))
-    found = ((name, mesh_path(name, urdf)) for name in names)
-    return {name: os.path.relpath(path, folder.resolve()) for name, path in found if path is not None}
 
 
 def _compared(
@@ -273,11 +265,6 @@ def _scene_text(urdf: Path, keys: Mapping[str, Any], remarks: list[str]) -> str:
 def _comment(text: str) -> str:
     """A comment of one line, whatever names in `text` hold."""
     return "# " + "".join(c if c.isprintable() else "_" for c in text)
-
-
-def _link_text(urdf: Path, link: FlexibleLink) -> str:
-    head = f'Link "{link.name}" of {urdf.name}: x from the joint that carries it to the next, y in its plane of swing.'
-    return f"{_comment(head)}\n\n{toml_text(link.keys)}"
 
 
 def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:

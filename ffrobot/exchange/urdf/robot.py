@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import chain, count
 from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.keys import LONGEST_NAME
-from ...common.rotations import of_rpy
+from ...common.rotations import of_rpy, point_inertia
 from ...mbs.model.body import Body
 
 Numbers3 = tuple[float, float, float]
@@ -80,8 +81,7 @@ class Inertial:
         center = as_floats((self.mass * self.center + other.mass * other.center) / mass)
         inertia = self.inertia + other.inertia
         for part in (self, other):
-            r = part.center - center
-            inertia = inertia + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
+            inertia = inertia + point_inertia(part.mass, part.center - center)
         return Inertial(mass, center, inertia)
 
 
@@ -93,9 +93,9 @@ def inertial_of(body: Body, anchor: Array) -> Inertial:
 
     J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
     """
-    m, c = body.mass, body.first_moment / body.mass
-    J: Array = body.inertia - m * (c @ c * np.eye(3) - np.outer(c, c))
-    return Inertial(m, c - anchor, (J + J.T) / 2)
+    center = body.first_moment / body.mass
+    J: Array = body.inertia - point_inertia(body.mass, center)
+    return Inertial(body.mass, center - anchor, (J + J.T) / 2)
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ FORBIDDEN = str.maketrans({"/": "_", ".": "_"})
 
 
 class Names:
-    """Names in one list, each once: the same for the same original, with the fewest changes that the rules ask for.
+    """Names in one list, each once: the same for the same original, as `common.keys.check_name` allows them.
 
     Attributes:
         changed: originals whose name is another one now.
@@ -194,23 +194,14 @@ class Names:
 
     def __getitem__(self, original: str) -> str:
         if original not in self._of:
-            self._of[original] = self._free(_allowed(original))
+            name = "".join(c if c.isprintable() else "_" for c in original.translate(FORBIDDEN)).strip() or "_"
+            name = name[: LONGEST_NAME - 4] if len(name) > LONGEST_NAME else name
+            candidates = chain([name], (f"{name}_{number}" for number in count(2)))
+            self._of[original] = next(candidate for candidate in candidates if candidate not in self._taken)
+            self._taken.add(self._of[original])
         return self._of[original]
 
     @property
     def changed(self) -> dict[str, str]:
         """The new name of each original that could not stay."""
         return {original: name for original, name in self._of.items() if original != name}
-
-    def _free(self, name: str) -> str:
-        candidate, number = name, 2
-        while candidate in self._taken:
-            candidate, number = f"{name}_{number}", number + 1
-        self._taken.add(candidate)
-        return candidate
-
-
-def _allowed(name: str) -> str:
-    """Without what `common.keys.check_name` refuses."""
-    printable = "".join(c if c.isprintable() else "_" for c in name.translate(FORBIDDEN)).strip()
-    return printable[: LONGEST_NAME - 4] if len(printable) > LONGEST_NAME else printable or "_"

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.errors import quoted
 from ...common.rotations import rpy_of
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
-from .bodies import Body, Mechanism
+from .bodies import Mechanism, MergedLinks
 from .flexible import FlexibleLink
 from .robot import HERE, MeshFile, Names, Origin, Primitive, Robot, UrdfJoint, three
 
@@ -34,19 +34,19 @@ class SceneOfRobot:
     """A scene made from a robot: `keys` of the file, and `remarks` on what it does not keep of the URDF."""
 
     def __init__(
-        self, robot: Robot, found: Mechanism, flexible: Mapping[str, FlexibleLink], meshes: Mapping[str, str]
+        self, robot: Robot, mechanism: Mechanism, flexible: Mapping[str, FlexibleLink], meshes: Mapping[str, str]
     ) -> None:
         """`meshes` are files from the folder of the scene on, by the names that the URDF has for them."""
-        self.robot, self.found, self.flexible, self.meshes = robot, found, flexible, meshes
-        self.remarks = [*robot.remarks, *found.remarks]
+        self.robot, self.mechanism, self.flexible, self.meshes = robot, mechanism, flexible, meshes
+        self.remarks = [*robot.remarks, *mechanism.remarks]
         self.bodies, self.joints = Names((GROUND,)), Names()
-        self.points = {body.top: Names((ORIGIN,)) for body in found.bodies}
-        joints = [self._joint(joint) for joint in found.joints]  # first: they name points
+        self.points = {body.top: Names((ORIGIN,)) for body in mechanism.bodies}
+        joints = [self._joint(joint) for joint in mechanism.joints]  # first: they name points
         self.keys: dict[str, Any] = {
-            "name": self._title(),
+            "name": " ".join("".join(c if c.isprintable() else " " for c in robot.name).split())[:100] or "robot",
             "space": "spatial",
             "gravity": GRAVITY,
-            "body": [self._body(body) for body in found.bodies],
+            "body": [self._body(body) for body in mechanism.bodies],
             "joint": joints,
         }
         if tools := list(self._tool_records()):
@@ -55,45 +55,43 @@ class SceneOfRobot:
         changed = self.bodies.changed | self.joints.changed
         self.remarks += [f'"{shown(old)}" is called "{new}" in the scene' for old, new in changed.items()]
 
-    def _title(self) -> str:
-        return " ".join("".join(c if c.isprintable() else " " for c in self.robot.name).split())[:100] or "robot"
-
     def _remark_on_ground(self) -> None:
-        still = [name for name, body in self.found.body_of.items() if body.stands_still]
+        still = [name for name, body in self.mechanism.body_of.items() if body.stands_still]
         mass = sum(inertial.mass for name in still if (inertial := self.robot.links[name].inertial) is not None)
         if still:
-            names = ", ".join(f'"{shown(name)}"' for name in still)
+            names = quoted(map(shown, still))
             said = "are fixed to the ground and are" if len(still) > 1 else "is fixed to the ground and is"
             self.remarks.append(f"{names} (mass {mass:g} kg) {said} no body of the scene")
 
-    # Bodies
-
-    def _body(self, body: Body) -> dict[str, Any]:
+    def _body(self, body: MergedLinks) -> dict[str, Any]:
         name = self.bodies[body.top]
         if body.flexible:
             return {"name": name, "link": self.flexible[body.top].file_name}
         points = {ORIGIN: [0.0, 0.0, 0.0]}
         of_body = self.points[body.top]
-        for joint in self.found.joints:
-            if self.found.body_of.get(joint.parent) is body:
+        for joint in self.mechanism.joints:
+            if self.mechanism.body_of.get(joint.parent) is body:
                 points[of_body[joint.name]] = _numbers((body.members[joint.parent] @ joint.origin.place).d)
         for link, place in body.members.items():  # frames of tools and sensors keep their names
             if link != body.top and link not in self._tools(body):
                 points[self._frame(body, link)] = _numbers(place.d)
         inertial = body.inertial
+        J = (inertial.inertia + inertial.inertia.T) / 2  # symmetric to the last digit
+        is_principal = not np.any(J - np.diag(np.diag(J)))
+        inertia = _numbers(np.diag(J)) if is_principal else [_numbers(row) for row in J]
         rigid = {
             "mass": inertial.mass,
             "center": _numbers(inertial.center),
-            "inertia": _tensor(inertial.inertia),
+            "inertia": inertia,
             "points": points,
         }
         if visuals := list(self._visuals(body)):
             rigid["visual"] = visuals
         return {"name": name, "rigid": rigid}
 
-    def _tools(self, body: Body) -> list[str]:
+    def _tools(self, body: MergedLinks) -> list[str]:
         """Links of a rigid body that carries no other: its frames with axes of their own, ends of fixed joints."""
-        carries = any(self.found.body_of.get(joint.parent) is body for joint in self.found.joints)
+        carries = any(self.mechanism.body_of.get(joint.parent) is body for joint in self.mechanism.joints)
         if carries or body.flexible or body.stands_still:
             return []
         return [
@@ -102,17 +100,17 @@ class SceneOfRobot:
             if link != body.top and not self.robot.joints_of(link) and not np.array_equal(place.C, np.eye(3))
         ]
 
-    def _frame(self, body: Body, link: str) -> str:
+    def _frame(self, body: MergedLinks, link: str) -> str:
         return self.points[body.top][f"link {link}" if link in self.robot.joints else link]
 
     def _tool_records(self) -> Iterator[dict[str, Any]]:
-        for body in self.found.bodies:
+        for body in self.mechanism.bodies:
             for link in self._tools(body):
                 place, keys = body.members[link], {"name": self._frame(body, link)}
                 keys |= {"point": f"{self.bodies[body.top]}.{ORIGIN}"}
                 yield {**keys, "at": _numbers(place.d), "rpy": rpy_of(place.C)}
 
-    def _visuals(self, body: Body) -> Iterator[dict[str, Any]]:
+    def _visuals(self, body: MergedLinks) -> Iterator[dict[str, Any]]:
         """Shapes of all its links, in the body's axes; meshes as far as their files are there."""
         for link, place in body.members.items():
             for shape in (part for whole in self.robot.links[link].visual for part in _shown(whole)):
@@ -133,10 +131,8 @@ class SceneOfRobot:
                     keys["rpy"] = rpy
                 yield keys
 
-    # Joints
-
     def _joint(self, joint: UrdfJoint) -> dict[str, Any]:
-        parent, child = self.found.body_of.get(joint.parent), self.found.body_of[joint.child]
+        parent, child = self.mechanism.body_of.get(joint.parent), self.mechanism.body_of[joint.child]
         place = joint.origin.place if parent is None else parent.members[joint.parent] @ joint.origin.place
         keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE[joint.type]}
         on_ground = parent is None or parent.stands_still
@@ -155,7 +151,7 @@ class SceneOfRobot:
         self._remark_on_mimic(joint)
         return keys | self._limits(joint) | self._friction(joint)
 
-    def _point(self, body: Body, joint: UrdfJoint) -> str:
+    def _point(self, body: MergedLinks, joint: UrdfJoint) -> str:
         if body.flexible:
             return self.flexible[body.top].point_of[joint.name]
         return self.points[body.top][joint.name]
@@ -192,7 +188,7 @@ class SceneOfRobot:
                 f'{name} follows "{shown(mimic.joint)}", which is fixed: its position is {mimic.offset:g}; give it a'
                 " trajectory of that value"
             )
-        elif leader not in self.found.joints:
+        elif leader not in self.mechanism.joints:
             self.remarks.append(f'{name} follows "{shown(mimic.joint)}", which is left out: give it its own trajectory')
         else:
             self.remarks.append(
@@ -228,11 +224,3 @@ def _shown(shape: MeshFile | Primitive) -> Iterator[MeshFile | Primitive]:
 
 def _numbers(vector: Iterable[float]) -> list[float]:
     return [float(value) + 0.0 for value in vector]  # no −0.0
-
-
-def _tensor(inertia: Array) -> list[Any]:
-    """[xx, yy, zz] where the axes are principal, else three rows; symmetric to the last digit."""
-    J = (inertia + inertia.T) / 2
-    if not np.any(J - np.diag(np.diag(J))):
-        return _numbers(np.diag(J))
-    return [_numbers(row) for row in J]
