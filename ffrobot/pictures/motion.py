@@ -16,14 +16,14 @@ import numpy as np
 from ..common.arrays import Array, Indices
 from ..common.rotations import in_3d, of_quaternion
 from ..mbs.fields.field_types import GROUND
-from ..mbs.scene.topology import Edge, Topology, spanning_forest
+from ..mbs.scene.topology import Edge, spanning_forest
 from ..results.file import Results
 from ..results.joints import joint_type
 
 VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MovingBody:
     """A body over T outputs; global axes but where it says so.
 
@@ -78,28 +78,36 @@ class MovingBody:
 
 def moving_bodies(results: Results, analysis: str, frames: Indices) -> list[MovingBody]:
     """All bodies at the outputs `frames`, each after the one that carries it."""
-    found: dict[str, MovingBody] = {}
-    for name, carrier in topology(results.scene).carriers.items():
+    joints = results.scene.get("joint", [])
+    edges = [Edge(tuple(joint["between"]), int(not joint_type(joint).locates)) for joint in joints]
+    names = [body["name"] for body in results.scene["body"]]
+    bodies: dict[str, MovingBody] = {}
+    for name, carrier in spanning_forest(names, edges).carriers.items():
         body = _moving_body(results, analysis, name, frames)
-        shift = np.zeros_like(body.position)
+        shift = body.shift
         if carrier is not None and carrier.own in body.point_names:
-            shift -= body.global_deflection(carrier.own)
-        parent = None if carrier is None else found.get(carrier.parent)
+            shift = shift - body.global_deflection(carrier.own)
+        parent = None if carrier is None else bodies.get(carrier.parent)
         if carrier is not None and parent is not None and carrier.other in parent.point_names:
-            shift += parent.shift + parent.global_deflection(carrier.other)
-        found[name] = replace(body, shift=shift)
-    return list(found.values())
+            shift = shift + parent.shift + parent.global_deflection(carrier.other)
+        bodies[name] = replace(body, shift=shift)
+    return list(bodies.values())
 
 
 def _moving_body(results: Results, analysis: str, name: str, frames: Indices) -> MovingBody:
     group, points = f"{analysis}/bodies/{name}", f"{analysis}/points"
-    position, orientation = in_3d(results[f"{group}/position"][frames]), _orientation(results, group, frames)
+    position = in_3d(results[f"{group}/position"][frames])
+    if results.has(f"{group}/quaternion"):
+        orientation = results[f"{group}/quaternion"][frames]
+    else:  # in a plane, of the angle θ
+        half, zero = 0.5 * results[f"{group}/angle"][frames], np.zeros(len(frames))
+        orientation = np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
     labels = [label for label in results.names(points) if label.startswith(f"{name}.")]
 
     def of_all(dataset: str, columns: int) -> Array:
         names = [f"{points}/{label}/{dataset}" for label in labels]
-        found = [in_3d(results[name][frames]) for name in names if results.has(name)]
-        return np.stack(found, axis=1) if found else np.zeros((len(frames), 0, columns))
+        histories = [in_3d(results[name][frames]) for name in names if results.has(name)]
+        return np.stack(histories, axis=1) if histories else np.zeros((len(frames), 0, columns))
 
     deflection, reached, sections = of_all("deflection", 3), of_all("position", 3), of_all("quaternion", 4)
     # x = Aᵀ (r − R) − Φ p, the same at all outputs
@@ -107,17 +115,16 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
     along = np.argsort(at[:, 0], kind="stable")
     modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
     return MovingBody(
-        name, position, orientation, modal, tuple(labels[i] for i in along), at[along], deflection[:, along],
-        sections[:, along] if sections.size else sections, np.zeros_like(position),
-    )  # fmt: skip
-
-
-def _orientation(results: Results, group: str, frames: Indices) -> Array:
-    """(T, 4) of the frame of a body; of the angle θ in a plane, (cos θ/2, 0, 0, sin θ/2)."""
-    if results.has(f"{group}/quaternion"):
-        return results[f"{group}/quaternion"][frames]
-    half = 0.5 * results[f"{group}/angle"][frames]
-    return np.stack([np.cos(half), np.zeros_like(half), np.zeros_like(half), np.sin(half)], axis=-1)
+        name=name,
+        position=position,
+        orientation=orientation,
+        modal=modal,
+        point_names=tuple(labels[i] for i in along),
+        points=at[along],
+        deflection=deflection[:, along],
+        sections=sections[:, along] if sections.size else sections,
+        shift=np.zeros_like(position),
+    )
 
 
 def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
@@ -129,13 +136,6 @@ def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array
         if side in body.point_names:
             return of_quaternion(body.sections[:, body.point_names.index(side)]) if body.sections.size else body.axes
     return np.broadcast_to(np.eye(3), (outputs, 3, 3))
-
-
-def topology(scene: Mapping[str, Any]) -> Topology:
-    """Which joint carries which body, of a scene as a results file has it."""
-    joints = scene.get("joint", [])
-    edges = [Edge(tuple(joint["between"]), int(not joint_type(joint).locates)) for joint in joints]
-    return spanning_forest([body["name"] for body in scene["body"]], edges)
 
 
 def size_of(bodies: Sequence[MovingBody]) -> float:
@@ -159,7 +159,7 @@ PLACES = ("x", "y", "z")  # components of trajectories that are places
 
 
 @dataclass(frozen=True)
-class Target:
+class PointTarget:
     """Where a point should be: the `columns` (0 for x, 1 for y, 2 for z) of its position, (T, m) in m."""
 
     trajectory: str
@@ -170,17 +170,17 @@ class Target:
     @property
     def places(self) -> Array:
         """(T, 3) m, zero where it specifies nothing."""
-        found = np.zeros((len(self.wanted), 3))
-        found[:, self.columns] = self.wanted
-        return found
+        places = np.zeros((len(self.wanted), 3))
+        places[:, self.columns] = self.wanted
+        return places
 
 
-def targets(results: Results, analysis: str) -> list[Target]:
+def targets(results: Results, analysis: str) -> list[PointTarget]:
     """The target of every trajectory of a point, over the first outputs of the analysis.
 
     A forward analysis does not hold trajectories: its targets are those of the analysis its actuation comes from.
     """
-    found = []
+    followed = []
     time = results.time(analysis)
     holders = (analysis, str(results.attributes(analysis).get("actuation", "")))
     for trajectory in results.scene.get("trajectory", []):
@@ -192,8 +192,9 @@ def targets(results: Results, analysis: str) -> list[Target]:
         if np.allclose(time[:common], results.time(holder)[:common], rtol=0, atol=1e-12):
             components = [str(c) for c in results.attributes(groups[holder])["components"]]
             columns = tuple(PLACES.index(c) for c in components if c in PLACES)
-            found.append(Target(trajectory["name"], trajectory["point"], columns, wanted[:common, : len(columns)]))
-    return found
+            wanted = wanted[:common, : len(columns)]
+            followed.append(PointTarget(trajectory["name"], trajectory["point"], columns, wanted))
+    return followed
 
 
 @dataclass(frozen=True)
@@ -230,7 +231,7 @@ def tool_marker(point: str, bodies: Sequence[MovingBody]) -> Marker:
     return Marker(point, position, exaggeration, axes)
 
 
-def tool_markers(targets: Iterable[Target], bodies: Sequence[MovingBody]) -> list[Marker]:
+def tool_markers(targets: Iterable[PointTarget], bodies: Sequence[MovingBody]) -> list[Marker]:
     """Of each point that follows a path, once."""
     return [tool_marker(point, bodies) for point in dict.fromkeys(target.point for target in targets)]
 

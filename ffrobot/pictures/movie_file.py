@@ -39,20 +39,11 @@ class MovieOptions:
 
 def _moving_analysis(results: Results, wanted: str | None) -> str:
     moving = [name for name in results.analyses if len(results.time(name)) > 1]
-    if wanted is None and moving:
-        return moving[0]
-    if wanted not in moving:
-        found = "none" if wanted is None else f'"{wanted}"{did_you_mean(wanted, moving)}'
+    if (wanted is None and not moving) or (wanted is not None and wanted not in moving):
+        other = "none" if wanted is None else f'"{wanted}"{did_you_mean(wanted, moving)}'
         names = f" ({', '.join(moving)})" if moving else ""
-        raise InputError(f"{results.path}: movie: expected an analysis that goes through time{names}, found {found}")
-    return wanted
-
-
-def check_movie(path: Path) -> None:
-    """Refuse, before frames are drawn, what cannot become a movie. Raises `InputError`, `SolveError`."""
-    check_ending(path, "movie", (".gif", ".mp4"))
-    if path.suffix.lower() == ".mp4":
-        ffmpeg()
+        raise InputError(f"{results.path}: movie: expected an analysis that goes through time{names}, found {other}")
+    return wanted or moving[0]
 
 
 def movie_outputs(time: NDArray[np.float64], seconds: float) -> Indices:
@@ -78,11 +69,14 @@ def make_movie(results_path: Path, path: Path, options: MovieOptions | None, dra
     """
     options = options or MovieOptions()
     notes: list[str] = []
-    check_movie(path)
+    check_ending(path, "movie", (".gif", ".mp4"))
+    is_gif = path.suffix.lower() == ".gif"
+    if not is_gif:
+        ffmpeg()  # before frames are drawn
     with Results(results_path) as results:
         analysis = _moving_analysis(results, options.analysis)
         outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
-        image = _gif_image if path.suffix.lower() == ".gif" else mp4_image
+        image = _gif_image if is_gif else mp4_image
         frames = draw(results, analysis, outputs, shown, options.scale, notes)
         write_atomically(path, image(frames), "movie", make_folder=True)
     return list(dict.fromkeys(notes))
@@ -102,7 +96,7 @@ def _gif_image(frames: Iterable[Frame]) -> bytes:
 
 def mp4_image(frames: Iterable[Frame]) -> bytes:
     """H.264 in MP4 as every browser and slide program shows it: even sizes, 4:2:0, its index at the front."""
-    remaining: Iterator[Frame] = iter(frames)
+    remaining = iter(frames)
     first = next(remaining)
     height, width = first.shape[:2]
     with tempfile.TemporaryDirectory() as place:
@@ -132,8 +126,8 @@ def mp4_image(frames: Iterable[Frame]) -> bytes:
 
 def ffmpeg() -> str:
     """The program that makes MP4: the one on the PATH, or that of imageio-ffmpeg. Raises `SolveError`."""
-    if found := shutil.which("ffmpeg"):
-        return found
+    if program := shutil.which("ffmpeg"):
+        return program
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 

@@ -99,12 +99,15 @@ def coarsened(points: Array, triangles: Integers, limit: int) -> tuple[Indices, 
         return used, inverse.reshape(-1, 3)
     extent = np.ptp(points[used], axis=0)
     low, high = 0.0, float(extent.max())
-    found = _clustered(points[used], inverse.reshape(-1, 3), np.minimum(high, extent / LAYERS))
+    kept, coarse = _clustered(points[used], inverse.reshape(-1, 3), np.minimum(high, extent / LAYERS))
     for _ in range(12):
         size = 0.5 * (low + high)
         trial = _clustered(points[used], inverse.reshape(-1, 3), np.minimum(size, extent / LAYERS))
-        low, high, found = (size, high, found) if len(trial[1]) > limit else (low, size, trial)
-    return used[found[0]], found[1]
+        if len(trial[1]) > limit:
+            low = size
+        else:
+            high, (kept, coarse) = size, trial
+    return used[kept], coarse
 
 
 def _clustered(points: Array, triangles: Integers, size: Array) -> tuple[Indices, Integers]:
@@ -177,8 +180,8 @@ class Shape:
     def placed(self, s: float = 1.0) -> Array:
         """Where its points are (T, p, 3), m, with deflections s times as large and joints shut."""
         rest = self.body.placed(np.broadcast_to(self.points, (len(self.coordinates), *self.points.shape)))
-        found: Array = rest + s * self.deflection
-        return found if s == 1.0 else found + (s - 1.0) * self.body.shift[:, None]
+        places: Array = rest + s * self.deflection
+        return places if s == 1.0 else places + (s - 1.0) * self.body.shift[:, None]
 
 
 def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
@@ -189,21 +192,19 @@ def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
     if body.modal is None and (visual := visual_surface(results, body.name, notes)) is not None:
         points, triangles = visual
         return Shape(body, points, np.zeros((*points.shape, 0)), np.zeros((len(body.position), 0)), triangles)
-    found = _modal_body(results, body, notes)
-    if found is None:
+    link = _modal_body(results, body, notes)
+    if link is None or body.modal is None:
         return point_shape(body)
-    mesh = body_surface(found)
-    assert body.modal is not None
+    mesh = body_surface(link)
     return Shape(body, mesh.points, mesh.mode_shapes, body.modal, mesh.cells)
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
     """The line through the stations of a flexible body; otherwise as `surface_shape`."""
-    found = _modal_body(results, body, notes)
-    if found is None:
+    link = _modal_body(results, body, notes)
+    if link is None or body.modal is None:
         return point_shape(body)
-    stations, k = found.stations, len(found.stations.position)
-    assert body.modal is not None
+    stations, k = link.stations, len(link.stations.position)
     cells = np.stack([np.arange(k - 1), np.arange(1, k)], 1)
     return Shape(body, stations.position, stations.translation, body.modal, cells)
 

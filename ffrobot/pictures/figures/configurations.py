@@ -81,8 +81,10 @@ def _new(results: Results, title: str, points: Array) -> tuple[Figure, list[Scen
     level, name = (FRONT, "from the front") if extent[0] >= extent[1] else (SIDE, "from the side")
     views = []
     for place, heading, view in (
-        (grid[:, 0], title, SPACE), (grid[0, 1], "from above", PLANE), (grid[1, 1], name, level),
-    ):  # fmt: skip
+        (grid[:, 0], title, SPACE),
+        (grid[0, 1], "from above", PLANE),
+        (grid[1, 1], name, level),
+    ):
         views.append(SceneAxes(picture.add_subplot(place), view))
         views[-1].axes.set_title(heading, loc="left")
     return picture, views

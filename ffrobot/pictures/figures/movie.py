@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -13,11 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from ...common.arrays import Array, Indices, Integers
+from ...common.arrays import Array, Indices
 from ...results.file import Results
 from ..motion import (
     Marker,
-    Target,
+    PointTarget,
     ground_places,
     joint_markers,
     moving_bodies,
@@ -50,101 +49,76 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
 def _frames(
     results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
 ) -> Iterator[Frame]:
-    scene = _moving_scene(results, analysis, outputs, scale, notes)
-    exaggerated = "" if scene.scale == 1.0 else f", deformations × {scene.scale:g}"
-    picture = _Picture(results, f"{results.name}: {analysis}{exaggerated}", results.time(analysis)[outputs], scene)
+    picture = _Picture(results, analysis, outputs, scale, notes)
     for k in shown:
         yield picture.at(int(k))
 
 
-@dataclass(frozen=True)
-class Scene:
-    """All that moves, over T outputs, as far exaggerated as it is drawn; lengths in m, global axes.
-
-    Attributes:
-        size: largest extent of the robot over all outputs.
-        scale: of deflections.
-        points: (T, p, 3) of the surfaces of all bodies.
-        triangles: (t, 3) on these.
-        joints: of these, `axes` (T, a, 2, 3) are the ends of the lines along their axes.
-        tools: (T, 3 k, 2, 3) ends of the axes x, y, z of each of k sections that follow paths.
-        paths: the paths wanted, and (T, 3) where each point is in truth.
-    """
-
-    size: float
-    scale: float
-    points: Array
-    triangles: Integers
-    joints: Array
-    axes: Array
-    tools: Array
-    paths: Sequence[tuple[Target, Array]]
-
-
-def _moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
-    bodies = moving_bodies(results, analysis, frames)
-    size = size_of(bodies)
-    if scale is None:
-        scale = visible_exaggeration(size, max(float(np.abs(b.deflection).max(initial=0.0)) for b in bodies))
-    points, triangles, count = [], [], 0
-    for body in bodies:
-        shape = thickened(surface_shape(results, body, notes), BAR * size)
-        kept, cells = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
-        points.append(shape.placed(scale)[:, kept])
-        triangles.append(cells + count)
-        count += len(kept)
-    wanted, T, reach = targets(results, analysis), len(frames), AXIS_LENGTH * size
-    joints = joint_markers(results.scene, bodies)
-    return Scene(
-        size=size,
-        scale=scale,
-        points=np.concatenate(points, axis=1),
-        triangles=np.concatenate(triangles),
-        joints=np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3)),
-        axes=_ends(joints, scale, (-reach, reach), T),
-        tools=_ends(tool_markers(wanted, bodies), scale, (0.0, TOOL_LENGTH * size), T),
-        paths=[(target, tool_marker(target.point, bodies).position) for target in wanted],
-    )
-
-
 def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], outputs: int) -> Array:
     """(T, a, 2, 3) of lines along all directions of markers, from one distance (m) to the other."""
-    found = [
+    lines = [
         marker.exaggerated(scale)[:, None, None] + np.array(reach)[:, None] * marker.directions[:, :, None]
         for marker in markers
     ]
-    return np.concatenate([np.zeros((outputs, 0, 2, 3)), *found], axis=1)
+    return np.concatenate([np.zeros((outputs, 0, 2, 3)), *lines], axis=1)
 
 
 class _Picture:
-    """Axes on which a scene is painted anew for every frame, over a background that is drawn once."""
+    """Axes on which a scene is painted anew for every frame, over a background that is drawn once.
 
-    def __init__(self, results: Results, title: str, time: Array, scene: Scene) -> None:
-        self.scene, self.time, self.is_plane = scene, time, results.space.is_plane
+    Over T outputs, as far exaggerated as it is drawn, m, global axes: `points` (T, p, 3) of the surfaces of all bodies
+    with `triangles` (t, 3) on these, `joints` (T, j, 3), the ends of their `axes` (T, a, 2, 3) and of the axes x, y, z
+    of sections that follow paths, `tools` (T, 3 k, 2, 3); where each point with a path is in truth, `places` (T, 3).
+    """
+
+    def __init__(
+        self, results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
+    ) -> None:
+        self.time, self.is_plane = results.time(analysis)[outputs], results.space.is_plane
         self.view = PLANE if self.is_plane else SPACE
+        bodies = moving_bodies(results, analysis, outputs)
+        self.size = size_of(bodies)
+        if scale is None:
+            scale = visible_exaggeration(self.size, max(float(np.abs(b.deflection).max(initial=0.0)) for b in bodies))
+        points, triangles, count = [], [], 0
+        for body in bodies:
+            shape = thickened(surface_shape(results, body, notes), BAR * self.size)
+            kept, cells = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
+            points.append(shape.placed(scale)[:, kept])
+            triangles.append(cells + count)
+            count += len(kept)
+        self.points, self.triangles = np.concatenate(points, axis=1), np.concatenate(triangles)
+        joints, T, reach = joint_markers(results.scene, bodies), len(outputs), AXIS_LENGTH * self.size
+        self.joints = np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3))
+        self.axes_of_joints = _ends(joints, scale, (-reach, reach), T)
+        wanted = targets(results, analysis)
+        self.tools = _ends(tool_markers(wanted, bodies), scale, (0.0, TOOL_LENGTH * self.size), T)
+        self.places = [tool_marker(target.point, bodies).position for target in wanted]
+
         figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         self.canvas, self.axes = FigureCanvasAgg(figure), figure.subplots()
-        self.axes.set_title(title, loc="left")
-        self._draw_still(results)
+        exaggerated = "" if scale == 1.0 else f", deformations × {scale:g}"
+        self.axes.set_title(f"{results.name}: {analysis}{exaggerated}", loc="left")
+        self._draw_still(results, wanted)
         literal(figure)
         self.canvas.draw()  # also lays the figure out, once
         self.background = self.canvas.copy_from_bbox(figure.bbox)
         self.clock = self.axes.set_title("", loc="right")
         self.surface = PolyCollection([], linewidths=0.3)
         self.lines = LineCollection([], linewidths=1.0)
-        self.joints = self.axes.plot([], [], "o", color=AXIS, markersize=3)[0]
-        self.taken = [self.axes.plot([], [], color=TAKEN, linewidth=1.0)[0] for _ in scene.paths]
+        self.marks = self.axes.plot([], [], "o", color=AXIS, markersize=3)[0]
+        self.taken = [self.axes.plot([], [], color=TAKEN, linewidth=1.0)[0] for _ in wanted]
         for collection in (self.surface, self.lines):
             self.axes.add_collection(collection, autolim=False)
 
-    def _draw_still(self, results: Results) -> None:
+    def _draw_still(self, results: Results, paths: Sequence[PointTarget]) -> None:
         """The ground, the paths wanted, room for all that moves; labels of x and y, or directions."""
         self.axes.plot(*projected(ground_places([results.scene]), self.view).T, "^", color=GROUND, markersize=10)
-        for target, _ in self.scene.paths:
+        for target in paths:
             if target.columns == results.space.translations:
                 wanted = projected(target.places, self.view)
                 self.axes.plot(*wanted.T, color=WANTED, linestyle="--", linewidth=0.8)
-        for places in (self.scene.points, self.scene.axes, self.scene.tools):
+        for places in (self.points, self.axes_of_joints, self.tools):
             self.axes.update_datalim(projected(places, self.view).reshape(-1, 2))
         self.axes.set_aspect("equal", adjustable="datalim")
         self.axes.margins(MARGIN)
@@ -154,25 +128,25 @@ class _Picture:
             self.axes.set_ylabel("y (m)")
         else:
             self.axes.set_axis_off()
-            directions(self.axes, DIRECTIONS * self.scene.size, self.view)
+            directions(self.axes, DIRECTIONS * self.size, self.view)
 
     def at(self, k: int) -> Frame:
         """The frame of output k: what faces away is left out, far triangles are painted first, near ones hide them."""
-        points, view = self.scene.points[k], self.view
-        triangles = self.scene.triangles[normals(points, self.scene.triangles) @ view.viewer > 0.0]
+        points, view = self.points[k], self.view
+        triangles = self.triangles[normals(points, self.triangles) @ view.viewer > 0.0]
         colors = lit(points, triangles, np.array(matplotlib.colors.to_rgb(FACE)), view)
         order = np.argsort((points @ view.viewer)[triangles].mean(axis=1), kind="stable")
         # An array is drawn faster than the list of corners that Matplotlib's types ask for.
         self.surface.set_verts(cast(Sequence[Array], projected(points, view)[triangles[order]]))
         self.surface.set(facecolors=colors[order], edgecolors=colors[order])
-        axes, tools = self.scene.axes[k], self.scene.tools[k]
+        axes, tools = self.axes_of_joints[k], self.tools[k]
         self.lines.set_segments(list(projected(np.concatenate([axes, tools]), view)))
         self.lines.set_colors([AXIS] * len(axes) + [TOOL_COLORS[j % 3] for j in range(len(tools))])
-        self.joints.set_data(*projected(self.scene.joints[k], view).T)
-        for line, (_, places) in zip(self.taken, self.scene.paths, strict=True):
+        self.marks.set_data(*projected(self.joints[k], view).T)
+        for line, places in zip(self.taken, self.places, strict=True):
             line.set_data(*projected(places[: k + 1], view).T)
         self.clock.set_text(f"t = {self.time[k]:.3f} s")
         self.canvas.restore_region(self.background)
-        for artist in (self.surface, *self.taken, self.lines, self.joints, self.clock):
+        for artist in (self.surface, *self.taken, self.lines, self.marks, self.clock):
             self.axes.draw_artist(artist)
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()

@@ -42,6 +42,7 @@ from .style import (
     normals,
     projected,
     shades,
+    sides,
     style,
 )
 
@@ -57,7 +58,7 @@ FACE, GHOST = "#cfdce8", "#9a9a9a"
 def draw_mesh(body: ModalBody) -> Figure:
     """The mesh with its interfaces, and of a solid a close-up of the end at the root."""
     points, cells = body.mesh.points, body.mesh.cells
-    edges = body.mesh.edges if body.mesh.edges is not None else _sides(cells)
+    edges = body.mesh.edges if body.mesh.edges is not None else np.sort(sides(cells), axis=1)
     views = [(cells, f"{body.name}: mesh")]
     near = cells[np.all(points[cells, 0] <= CLOSE_UP * body.stations.height.max(), axis=1)]
     if cells.shape[1] > 2 and 0 < len(near) < len(cells) and np.ptp(points[near, 0]) > 0.0:
@@ -156,17 +157,11 @@ def _draw_cells(
 def _edge_depth(cells: Integers, depth: Array, edges: Integers) -> tuple[Integers, Array]:
     """Those of `edges` (e, 2) that are sides of cells, and the depth of the nearer of the cells with that side."""
     size = cells.max() + 1
-    keys, place = np.unique(_sides(cells) @ [size, 1], return_inverse=True)
+    keys, place = np.unique(np.sort(sides(cells), axis=1) @ [size, 1], return_inverse=True)
     nearest = np.full(len(keys), -np.inf)
     np.maximum.at(nearest, place, np.repeat(depth, cells.shape[1]))
     inside = edges[np.isin(np.sort(edges, axis=1) @ [size, 1], keys)]
     return inside, nearest[np.searchsorted(keys, np.sort(inside, axis=1) @ [size, 1])]
-
-
-def _sides(cells: Integers) -> Integers:
-    """(c v, 2) the sides of all cells, ascending in each: those that two cells share are listed twice."""
-    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
-    return np.asarray(np.sort(sides, axis=1), dtype=np.int64)
 
 
 def _outline(points: Array, cells: Integers, viewer: Array) -> Integers:
@@ -175,7 +170,7 @@ def _outline(points: Array, cells: Integers, viewer: Array) -> Integers:
     if corners == 2:
         return cells
     normal = normals(points, cells)
-    edges = _sides(cells)
+    edges = np.sort(sides(cells), axis=1)
     owner = np.repeat(np.arange(len(cells)), corners)
     order = np.lexsort(edges.T)
     edges, owner = edges[order], owner[order]
@@ -218,16 +213,16 @@ def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> Non
 def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, results: Results) -> None:
     time, values = curve_points(results, curve, figure.scale)
     axes.margins(x=0)
-    if is_crowded(values, figure.limits):
+    count, at_limit = values.shape[1], is_at_limit(values, figure.limits)
+    if count > MANY and at_limit.mean() > OFTEN:  # the last line would hide the others
         _draw_map(axes, time, values, curve.label, figure)
         return
-    if len(time) > 1 and (at := is_at_limit(values, figure.limits).any(axis=1)).any():
+    if len(time) > 1 and at_limit.any():
         label = None if axes.collections else "at a limit"
         look: dict[str, Any] = {"color": LIMIT, "alpha": SHADE, "linewidth": 0, "label": label}
-        axes.fill_between(time, 0.0, 1.0, where=at, transform=axes.get_xaxis_transform(), **look)
-    count = values.shape[1]
+        axes.fill_between(time, 0.0, 1.0, where=at_limit.any(axis=1), transform=axes.get_xaxis_transform(), **look)
     if count == 1:
-        axes.plot(time, values[:, 0], label=curve.label, **line_style(k, len(values), alone=len(figure.curves) == 1))
+        _plot(axes, figure, k, time, values[:, 0])
         return
     for column, color in enumerate(shades(count)):
         label = f"{curve.label} {column + 1}" if count <= NAMED or column in (0, count - 1) else None
@@ -240,11 +235,6 @@ def is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
     near = np.isclose(values[..., None], limits or np.inf, rtol=NEAR, atol=0.0)
     is_within = np.abs(values).max(initial=0.0) <= (1.0 + NEAR) * np.abs(limits).max(initial=0.0)
     return np.asarray(near.any(axis=-1) & is_within)
-
-
-def is_crowded(values: Array, limits: tuple[float, ...]) -> bool:
-    """Whether many columns of values (T, n) go from limit to limit, so that the last line hides the others."""
-    return values.shape[1] > MANY and bool(limits) and bool(is_at_limit(values, limits).mean() > OFTEN)
 
 
 def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: FigureRecord) -> None:
@@ -262,10 +252,14 @@ def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: Figure
     axes.figure.colorbar(picture, ax=axes, label=figure.y_label)
 
 
+def _plot(axes: Axes, figure: FigureRecord, k: int, x: Array, y: Array) -> None:
+    axes.plot(x, y, label=figure.curves[k].label, **line_style(k, len(x), alone=len(figure.curves) == 1))
+
+
 def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
     for k, curve in enumerate(figure.curves):
-        x, values = curve_points(results, curve, figure.scale)
-        axes.plot(x, values[:, 0], label=curve.label, **line_style(k, len(x), alone=len(figure.curves) == 1))
+        speed, values = curve_points(results, curve, figure.scale)
+        _plot(axes, figure, k, speed, values[:, 0])
     if len(limits := motor_limits(results, figure)):
         axes.plot(*limits.T, color=LIMIT, linestyle="--", label="limits")
     axes.set_xlabel(figure.x_label)
@@ -327,13 +321,11 @@ def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS, 
     check_folder(folder)
     _check_formats(formats)
     body = read_modal_body(path)
+    written: list[Path] = []
     with style():
-        wanted = chosen({"mesh": draw_mesh, "modes": draw_modes}, only)
-        return [
-            path
-            for name, draw_it in wanted.items()
-            for path in write_figure(literal(draw_it(body)), folder, name, formats)
-        ]
+        for name, draw_it in chosen({"mesh": draw_mesh, "modes": draw_modes}, only).items():
+            written += write_figure(literal(draw_it(body)), folder, name, formats)
+    return written
 
 
 def plot_results(
@@ -381,11 +373,10 @@ def chosen(figures: Mapping[str, T], only: Sequence[str]) -> dict[str, T]:
                 f"--only: expected the name of a figure, or a pattern that fits one ({quoted(figures)}), found"
                 f' "{pattern}"{did_you_mean(pattern, figures)}'
             )
-    patterns = only or ["*"]
     return {
         name: figure
         for name, figure in figures.items()
-        if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+        if not only or any(fnmatch.fnmatchcase(name, pattern) for pattern in only)
     }
 
 

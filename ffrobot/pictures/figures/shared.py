@@ -6,10 +6,10 @@ import csv
 import hashlib
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
@@ -24,13 +24,6 @@ from ...results.joints import joint_coordinates
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
-def _file_name(value: str) -> str:
-    if not FILE_NAME.fullmatch(value):
-        raise ValueError(f'expected a name of letters, digits, "_", "-" and ".", found "{value}"')
-    return value
-
-
-FileName = Annotated[str, AfterValidator(_file_name)]
 Range = tuple[float, float]
 
 
@@ -60,7 +53,7 @@ class FigureRecord(Record):
     of the robot; "placement" the patches of such an analysis.
     """
 
-    name: FileName
+    name: str
     """Name of the files, without suffix."""
     title: str = ""
     """Title above the axes."""
@@ -90,6 +83,13 @@ class FigureRecord(Record):
     """Range of the vertical axis; by default that of the data."""
     limits: tuple[float, ...] = Field(default=())
     """Values of horizontal lines, such as a voltage limit; in units of the axis."""
+
+    @field_validator("name")
+    @classmethod
+    def _file_name(cls, value: str) -> str:
+        if not FILE_NAME.fullmatch(value):
+            raise ValueError(f'expected a name of letters, digits, "_", "-" and ".", found "{value}"')
+        return value
 
     @model_validator(mode="after")
     def _consistent(self) -> FigureRecord:

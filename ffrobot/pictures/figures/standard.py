@@ -40,12 +40,12 @@ def standard_figures(results: Results, runs: int | None = None) -> tuple[FigureR
 
 def _drawn(results: Results, of: Figures, runs: int | None = None) -> tuple[FigureRecord, ...]:
     """The figures of `of`, without histories of a single instant: static analyses have numbers, no curves."""
-    found: list[FigureRecord] = []
+    drawn: list[FigureRecord] = []
     for record in chain.from_iterable(figures(results) for figures in of):
         curves = tuple(curve for curve in record.curves if len(results.time(curve.data)) > 1)
         if curves or not record.curves:
-            found += _apart(record.model_copy(update={"curves": curves}), runs)
-    return tuple(found)
+            drawn += _apart(record.model_copy(update={"curves": curves}), runs)
+    return tuple(drawn)
 
 
 def _apart(record: FigureRecord, runs: int | None) -> list[FigureRecord]:
@@ -59,20 +59,15 @@ def _apart(record: FigureRecord, runs: int | None) -> list[FigureRecord]:
             parts.setdefault("", []).append(curve)
     if len(parts) < 2 or (runs or max(map(len, parts.values()))) <= TOGETHER:
         return [record]
-    return [
-        record.model_copy(update={
-            "name": file_name(record.name, axis), "title": f"{record.title}, {axis}", "curves": tuple(curves),
-        })
-        for axis, curves in parts.items()
-    ]  # fmt: skip
+    apart = []
+    for axis, curves in parts.items():
+        name, title = file_name(record.name, axis), f"{record.title}, {axis}"
+        apart.append(record.model_copy(update={"name": name, "title": title, "curves": tuple(curves)}))
+    return apart
 
 
 def _histories(
-    name: Sequence[str],
-    title: str,
-    curves: Iterable[Curve],
-    y_label: str,
-    **more: Any,
+    name: Sequence[str], title: str, curves: Iterable[Curve], y_label: str, **more: Any
 ) -> Iterator[FigureRecord]:
     if drawn := tuple(curves):
         yield FigureRecord(name=file_name(*name), title=title, curves=drawn, y_label=y_label, **more)
@@ -127,46 +122,40 @@ def _angles(results: Results) -> Iterator[FigureRecord]:
 
 def _largest_deflections(results: Results) -> Iterator[FigureRecord]:
     """Of the point of each body that deflects most in any analysis."""
-    found: dict[str, tuple[float, str]] = {}
+    largest: dict[str, tuple[float, str]] = {}
     for point in bending_points(results):
         size = max(np.abs(results[curve.data]).max() for curve in curves_of(results, f"points/{point}/deflection"))
         body = point.split(".")[0]
-        found[body] = max(found.get(body, (0.0, "")), (float(size), point))
-    for _, point in found.values():
-        yield from _deflection(results, point)
+        largest[body] = max(largest.get(body, (0.0, "")), (float(size), point))
+    yield from _deflections(results, [point for _, point in largest.values()])
 
 
-def _deflections(results: Results) -> Iterator[FigureRecord]:
-    for point in bending_points(results):
-        yield from _deflection(results, point)
-
-
-def _deflection(results: Results, point: str) -> Iterator[FigureRecord]:
+def _deflections(results: Results, points: Iterable[str] | None = None) -> Iterator[FigureRecord]:
     """By axes of the body; components that are zero but for round-off are left out."""
-    found = curves_of(results, f"points/{point}/deflection")
-    largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in found], axis=0)
-    shown = [k for k in range(len(largest)) if largest[k] > SEEN * largest.max()]
-    curves = (Curve(data=f"{c.data}[{k}]", label=f"{c.label}, {AXES[k]}") for c in found for k in shown)
-    # A single curve has no legend that names its axis.
-    where = f" along {AXES[shown[0]]} of the body" if len(shown) == 1 else ", axes of the body"
-    title = f"deflection of {point}{where}"
-    yield from _histories(("deflection", point), title, curves, "deflection (mm)", scale=1e3)
+    for point in bending_points(results) if points is None else points:
+        whole = curves_of(results, f"points/{point}/deflection")
+        largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in whole], axis=0)
+        shown = [k for k in range(len(largest)) if largest[k] > SEEN * largest.max()]
+        curves = (Curve(data=f"{c.data}[{k}]", label=f"{c.label}, {AXES[k]}") for c in whole for k in shown)
+        # A single curve has no legend that names its axis.
+        where = f" along {AXES[shown[0]]} of the body" if len(shown) == 1 else ", axes of the body"
+        title = f"deflection of {point}{where}"
+        yield from _histories(("deflection", point), title, curves, "deflection (mm)", scale=1e3)
 
 
 def _modes(results: Results) -> Iterator[FigureRecord]:
     """Modal coordinates, and the modal forces that patches would have to supply; where motors suffice, none."""
+    quantities = (
+        ("modal", "modal coordinates", "modal coordinate (m·√kg)"),
+        ("modal_force", "required modal forces", "modal force (N/√kg)"),
+    )
     for analysis in results.analyses:
-        of_motors = results.attributes(analysis)["kind"] == "motors-only"
+        of_motors = results.attributes(analysis)["kind"] == "motors-only"  # forces are round-off
         for body in results.names(f"{analysis}/bodies"):
-            for dataset, title, y_label in (
-                ("modal", "modal coordinates", "modal coordinate (m·√kg)"),
-                ("modal_force", "required modal forces", "modal force (N/√kg)"),
-            ):
+            for dataset, title, y_label in quantities[:1] if of_motors else quantities:
                 data = f"{analysis}/bodies/{body}/{dataset}"
-                if of_motors and dataset == "modal_force":
-                    continue  # round-off
-                found = curves_of(results, f"bodies/{body}/{dataset}")
-                sizes = {each.data: np.abs(results.data(each.data)).max(initial=0.0) for each in found}
+                curves = curves_of(results, f"bodies/{body}/{dataset}")
+                sizes = {each.data: np.abs(results.data(each.data)).max(initial=0.0) for each in curves}
                 if sizes.get(data, 0.0) > ROUND_OFF * max(sizes.values(), default=0.0):
                     curve, of = Curve(data=data, label="mode"), f"{title} of {body}, {analysis}"
                     yield from _histories((dataset, analysis, body), of, [curve], y_label)
@@ -252,8 +241,8 @@ def _torque_speed(results: Results, joint: str, coordinate: Coordinate) -> Itera
 
 def _stresses(results: Results) -> Iterator[FigureRecord]:
     for body in members(results, "stress"):
-        found = (point for a in results.analyses for point in results.names(f"{a}/stress/{body}/points"))
-        places = [(f"points/{point}/von_mises", point) for point in dict.fromkeys(found)]
+        points = (point for a in results.analyses for point in results.names(f"{a}/stress/{body}/points"))
+        places = [(f"points/{point}/von_mises", point) for point in dict.fromkeys(points)]
         for dataset, where in (*places, ("surface/von_mises_max", "surface")):
             curves = curves_of(results, f"stress/{body}/{dataset}")
             title = f"stress in {body}, {'largest on its surface' if where == 'surface' else where} (von Mises)"
@@ -326,7 +315,14 @@ def _responses_of(results: Results, analysis: str) -> Iterator[FigureRecord]:
 
 Figures = tuple[Callable[[Results], Iterator[FigureRecord]], ...]
 MAIN: Figures = (
-    _configurations, _paths, _tip_errors, _actuators, _largest_deflections, _stresses, _voltages, _linear,
-)  # fmt: skip
+    _configurations,
+    _paths,
+    _tip_errors,
+    _actuators,
+    _largest_deflections,
+    _stresses,
+    _voltages,
+    _linear,
+)
 OTHERS: Figures = (_angles, _deflections, _modes, _trajectory_forces, _joints, _energies, _responses)
 """In this order."""

@@ -1,9 +1,4 @@
-"""How figures look: the width of a printed column, colors that everyone can tell apart.
-
-Parallel projection on plain axes: where points are on the page, how bright surfaces are, which way the axes go.
-
-True proportions of long thin bodies, which matplotlib's own third dimension squeezes into a cube.
-"""
+"""How figures look, and parallel projection on plain axes: matplotlib's third dimension squeezes thin bodies."""
 
 from __future__ import annotations
 
@@ -60,7 +55,7 @@ class Ticks(ScalarFormatter):
 
     def get_offset(self) -> str:
         """The power of ten of all labels, "×10⁻⁵"."""
-        return re.sub(r"1e([−\d]+)$", lambda found: "×10" + found[1].translate(SUPERSCRIPTS), super().get_offset())
+        return re.sub(r"1e([−\d]+)$", lambda power: "×10" + power[1].translate(SUPERSCRIPTS), super().get_offset())
 
 
 def style() -> AbstractContextManager[None]:
@@ -143,8 +138,13 @@ def projected(points: Array, view: View) -> Array:
 def normals(points: Array, cells: Integers) -> Array:
     """(c, 3) unit normals of triangles or quadrilaterals; zero where a cell has no area."""
     first = points[cells[:, 0]]
-    found = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
-    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300))
+    areas = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
+    return np.asarray(areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300))
+
+
+def sides(cells: Integers) -> Integers:
+    """(c v, 2) the sides of all cells: those that two cells share are listed twice."""
+    return np.asarray(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), dtype=np.int64)
 
 
 def lit(points: Array, cells: Integers, colors: Array, view: View) -> Array:
@@ -164,18 +164,14 @@ def directions(axes: Axes, size: float, view: View) -> None:
         dx, dy = size * projected(axis, view)
         axes.annotate("", (x + dx, y + dy), (x, y), arrowprops={"arrowstyle": "->", "linewidth": 0.6, "shrinkB": 0})
         axes.annotate(name, (x + 1.35 * dx, y + 1.35 * dy), ha="center", va="center", fontsize=7)
-    length = round_below(BAR * (right - left))
+    longest = BAR * (right - left)
+    power = 10.0 ** np.floor(np.log10(longest))
+    length = float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= longest * (1.0 + 1e-9)))
     bar = np.array([x + 3.0 * size, y]) + np.array([[0.0, 0.0], length * projected(np.eye(3)[0], view)])
     axes.plot(*bar.T, color=EDGE, linewidth=1.5, solid_capstyle="butt")
     axes.annotate(f" {length:g} m", bar[1], va="center", fontsize=7)
     axes.update_datalim([(x - 0.6 * size, y - 0.6 * size), *bar])
     axes.autoscale_view()
-
-
-def round_below(value: float) -> float:
-    """The next of …, 0.1, 0.2, 0.5, 1, … not above a positive value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
 
 
 FACING = 1e-3  # component of a unit normal towards the viewer from which on a cell is drawn
@@ -206,7 +202,11 @@ class SceneAxes:
             self._lines(seen[cells], color, width)
         elif cells.shape[1] > 2:
             front = cells[normals(points, cells) @ self.view.viewer > FACING]
-            self.axes.add_artist(PathPatch(_covered(seen[front]), color=color, alpha=FILL, linewidth=0))
+            # One path around all faces fills neighbors once, without a line between them.
+            count, corners = front.shape
+            codes = np.tile([Path.MOVETO, *[Path.LINETO] * (corners - 1), Path.CLOSEPOLY], count)
+            covered = Path(seen[np.column_stack([front, front[:, :1]])].reshape(-1, 2), codes)
+            self.axes.add_artist(PathPatch(covered, color=color, alpha=FILL, linewidth=0))
             self._lines(seen[_ends(front)], color, 0.5 * width)
 
     def _lines(self, ends: Array, color: Any, width: float) -> None:
@@ -230,15 +230,7 @@ class SceneAxes:
             directions(self.axes, ARROWS * float(np.ptp(points, axis=0).max()), self.view)
 
 
-def _covered(faces: Array) -> Path:
-    """One path around all faces (c, v, 2), so that neighbors are filled once, without a line between them."""
-    count, corners = faces.shape[:2]
-    codes = np.tile([Path.MOVETO, *[Path.LINETO] * (corners - 1), Path.CLOSEPOLY], count)
-    return Path(np.concatenate([faces, faces[:, :1]], axis=1).reshape(-1, 2), codes)
-
-
 def _ends(cells: Integers) -> Integers:
     """(e, 2) the edges that one cell alone has: around what cells cover, and around their openings."""
-    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
-    number = int(cells.max(initial=0)) + 1
+    edges, number = sides(cells), int(cells.max(initial=0)) + 1
     return np.asarray(edges[~np.isin(edges @ [number, 1], edges @ [1, number])], dtype=np.int64)

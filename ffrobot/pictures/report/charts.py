@@ -10,7 +10,7 @@ from html import escape
 from itertools import pairwise
 from os.path import abspath
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,17 +19,12 @@ from ...results.file import Results
 from ...results.verdict import ROUND_OFF
 from ..figures.shared import Curve, FigureRecord, curve_points, file_name, motor_limits
 from ..figures.standard import standard_figures
-from ..motion import Target, targets
+from ..motion import PointTarget, targets
 from ..projection import COLORS, LIMIT
 
 
-@dataclass(frozen=True)
-class Run:
-    """One analysis of one results file.
-
-    Attributes:
-        label: of the run; `source` tells the file, and is empty where there is only one.
-    """
+class AnalysisRun(NamedTuple):
+    """One analysis of one results file; `source` tells the file, and is empty where there is only one."""
 
     results: Results
     analysis: str
@@ -64,10 +59,10 @@ def distinct_parts(paths: Sequence[Path]) -> list[str]:
     return [f"{label} ({k + 1})" for k, label in enumerate(labels)]
 
 
-def runs(files: Sequence[Results]) -> list[Run]:
+def runs(files: Sequence[Results]) -> list[AnalysisRun]:
     """Every analysis of every file, in order."""
     return [
-        Run(results, analysis, source)
+        AnalysisRun(results, analysis, source)
         for results, source in zip(files, sources(files), strict=True)
         for analysis in results.analyses
     ]
@@ -199,7 +194,8 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
 
     Beside others, a run that diverged waits for a click on its name: they would be flat.
     """
-    charts = {chart.name: chart for chart in _path_errors(files)}
+    charts = _path_errors(files)
+    has_errors = bool(charts)
     looks = {(run.source, run.analysis): (k, _waiting(run)) for k, run in enumerate(runs(files))}
     together = len(looks) if len(files) > 1 else None
     for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
@@ -207,14 +203,24 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
         for record in records.values():
             if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories
                 continue
-            if record.name == "tip_error" and any(chart.name.startswith("error_") for chart in charts.values()):
+            if record.name == "tip_error" and has_errors:
                 continue  # the distance from the path again
             is_path = record.kind == "path"
             x_label = "x (m)" if is_path else record.x_label
             empty = Chart(record.name, record.title, record.y_label, x_label, limits=record.limits, equal_axes=is_path)
             chart = charts.setdefault(record.name, empty)
             for curve, look in _looks(record, source, looks, len(chart.traces)):
-                _add(chart, results, record, curve, source, look, DASHES[number % len(DASHES)])
+                label = f"{source}: {curve.label}" if source else curve.label
+                if is_path:
+                    chart.add(label, *results.data(curve.data)[:, :2].T, **look)
+                    continue
+                x, values = curve_points(results, curve, record.scale)
+                if values.shape[1] == 1:
+                    chart.add(label, x, values[:, 0], **look)
+                    continue
+                for k, color in enumerate(shades(values.shape[1])):
+                    line = {"color": color, "width": 1, "dash": DASHES[number % len(DASHES)]}
+                    chart.add(f"{label} {k + 1}", x, values[:, k], line=line)
             if record.joint is not None and len(limits := motor_limits(results, record)):
                 chart.add(f"{source}: limits" if source else "limits", *limits.T, line=_limit_style())
     return list(charts.values())
@@ -265,44 +271,25 @@ def _looks(
         parts[name] += 1
 
 
-def _waiting(run: Run) -> dict[str, str]:
+def _waiting(run: AnalysisRun) -> dict[str, str]:
     return {"visible": "legendonly"} if run.results.attributes(run.analysis)["status"] == "diverged" else {}
 
 
-def _add(
-    chart: Chart, results: Results, record: FigureRecord, curve: Curve, source: str, look: dict[str, Any], dash: str
-) -> None:
-    """Add what `curve` draws: one line, or a shade for each column of its dataset."""
-    label = f"{source}: {curve.label}" if source else curve.label
-    if record.kind == "path":
-        values = results.data(curve.data)
-        chart.add(label, values[:, 0], values[:, 1], **look)
-        return
-    x, values = curve_points(results, curve, record.scale)
-    if values.shape[1] == 1:
-        chart.add(label, x, values[:, 0], **look)
-    else:
-        for k, color in enumerate(shades(values.shape[1])):
-            line = {"color": color, "width": 1, "dash": dash}
-            chart.add(f"{label} {k + 1}", x, values[:, k], line=line)
-
-
-def _path_errors(files: Sequence[Results]) -> list[Chart]:
-    """Distance of every point with a trajectory from where it should be."""
+def _path_errors(files: Sequence[Results]) -> dict[str, Chart]:
+    """Distance of every point with a trajectory from where it should be, by the names of the charts."""
     charts: dict[str, Chart] = {}
     for k, run in enumerate(runs(files)):
         time = run.results.time(run.analysis)
         for target in targets(run.results, run.analysis) if len(time) > 1 else ():
-            name, title = target.trajectory, f"distance of {target.point} from its path"
-            empty = Chart(file_name("error", name), title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF))
-            chart = charts.setdefault(name, empty)
+            name, title = file_name("error", target.trajectory), f"distance of {target.point} from its path"
+            chart = charts.setdefault(name, Chart(name, title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF)))
             error = path_error(run, target)
             look = style(len(chart.traces), k) | (_waiting(run) if chart.traces else {})
             chart.add(run.label, time[: len(error)], 1e3 * error, **look)
-    return list(charts.values())
+    return charts
 
 
-def path_error(run: Run, target: Target) -> Array:
+def path_error(run: AnalysisRun, target: PointTarget) -> Array:
     """Distance (T,) in m between a point and its target, in the components that the target has."""
     reached = run.results.data(f"{run.analysis}/points/{target.point}/position")[:, target.columns]
     return np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)

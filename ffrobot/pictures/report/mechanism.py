@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..figures.shared import file_name
 from ..motion import (
     Marker,
     MovingBody,
-    Target,
+    PointTarget,
     ground_places,
     joint_markers,
     moving_bodies,
@@ -25,7 +26,7 @@ from ..motion import (
 )
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH, UP, VIEWER
 from ..shapes import AMPLITUDE, body_surface, coarsened, drawn_mode, surface_shape, thickened, triangles_of
-from .charts import Chart, Run, encoded, plain, shades
+from .charts import AnalysisRun, Chart, encoded, plain, shades
 
 MAX_FRAMES = 2000
 ABOVE = 0.1  # of the mechanism's size: how far before the bodies of a planar scene its joints and paths are drawn
@@ -35,7 +36,7 @@ PLAYING_SECONDS = 8.0
 SLOWEST = 1e-3  # the slider's end
 
 
-def mechanism(runs: Sequence[Run]) -> tuple[dict[str, Any], list[str]]:
+def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
     """What the script of the page draws of several runs, and notes on what could not be drawn as it is.
 
     Each run has a color of its own; planar scenes are seen along z.
@@ -79,12 +80,12 @@ def mechanism(runs: Sequence[Run]) -> tuple[dict[str, Any], list[str]]:
     return data, list(dict.fromkeys(notes))
 
 
-def _frames(run: Run) -> Indices:
+def _frames(run: AnalysisRun) -> Indices:
     outputs = len(run.results.time(run.analysis))
     return np.unique(np.linspace(0, outputs - 1, min(outputs, MAX_FRAMES)).astype(np.intp))
 
 
-def _run_data(run: Run, bodies: list[MovingBody], size: float, notes: list[str]) -> dict[str, Any]:
+def _run_data(run: AnalysisRun, bodies: list[MovingBody], size: float, notes: list[str]) -> dict[str, Any]:
     wanted = targets(run.results, run.analysis)
     return {
         "bodies": [_body_data(run, body, BAR * size, notes) for body in bodies],
@@ -94,7 +95,7 @@ def _run_data(run: Run, bodies: list[MovingBody], size: float, notes: list[str])
     }
 
 
-def _body_data(run: Run, body: MovingBody, bar: float, notes: list[str]) -> dict[str, Any]:
+def _body_data(run: AnalysisRun, body: MovingBody, bar: float, notes: list[str]) -> dict[str, Any]:
     shape = thickened(surface_shape(run.results, body, notes), bar)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
     return {
@@ -111,17 +112,17 @@ def _body_data(run: Run, body: MovingBody, bar: float, notes: list[str]) -> dict
 
 def _marker_data(marker: Marker) -> dict[str, Any]:
     """Position, exaggeration (T, 3) and k directions (T, 3 k)."""
-    count = marker.directions.shape[1]
+    number = marker.directions.shape[1]
     return {
         "name": plain(marker.name),
         "position": encoded(marker.position),
         "exaggeration": encoded(marker.exaggeration),
-        "directions": encoded(marker.directions.reshape(len(marker.position), 3 * count)),
-        "count": count,
+        "directions": encoded(marker.directions.reshape(len(marker.position), 3 * number)),
+        "count": number,
     }
 
 
-def _path_data(run: Run, target: Target) -> dict[str, Any]:
+def _path_data(run: AnalysisRun, target: PointTarget) -> dict[str, Any]:
     data: dict[str, Any] = {"name": plain(target.point)}
     if target.columns == run.results.space.translations:
         frames = _frames(run)
@@ -144,7 +145,7 @@ FINEST = 32767  # a displacement of 1
 
 
 @dataclass(frozen=True)
-class LinkModes:
+class ModesOnPage:
     """A modal body of the page, with the labels of the bodies that it serves."""
 
     labels: tuple[str, ...]
@@ -152,13 +153,12 @@ class LinkModes:
     charts: tuple[Chart, ...]
 
     @property
-    def rows(self) -> list[tuple[Any, ...]]:
+    def rows(self) -> Iterator[tuple[Any, ...]]:
         """Number, family, frequency (Hz) and damping ratio of each mode."""
-        body = self.body
-        return [(k + 1, body.family[k], body.frequency[k], body.damping_ratio[k]) for k in range(body.mode_count)]
+        return zip(count(1), self.body.family, self.body.frequency, self.body.damping_ratio)
 
 
-def link_modes(runs: Sequence[Run]) -> list[LinkModes]:
+def link_modes(runs: Sequence[AnalysisRun]) -> list[ModesOnPage]:
     """The modal bodies behind the runs, each once; those whose file is not found are left out."""
     users: dict[str, list[str]] = {}
     bodies: dict[str, ModalBody] = {}
@@ -170,7 +170,7 @@ def link_modes(runs: Sequence[Run]) -> list[LinkModes]:
                 continue  # the mechanism's notes say so
             users.setdefault(file.sha256, []).append(f"{run.source}: {name}" if run.source else name)
     return [
-        LinkModes(tuple(dict.fromkeys(users[key])), body, tuple(_charts(body, f"modes{k}")))
+        ModesOnPage(tuple(dict.fromkeys(users[key])), body, tuple(_charts(body, f"modes{k}")))
         for k, (key, body) in enumerate(bodies.items())
     ]
 
@@ -194,7 +194,7 @@ def _charts(body: ModalBody, prefix: str) -> list[Chart]:
     return charts
 
 
-def surface_modes(links: Sequence[LinkModes]) -> dict[str, Any]:
+def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
     """What the script of the page draws; links whose surface is not known are left out."""
     surfaces = [(link, body_surface(link.body)) for link in links]
     entries = [
@@ -205,17 +205,17 @@ def surface_modes(links: Sequence[LinkModes]) -> dict[str, Any]:
     return {"links": entries, "up": UP.tolist(), "viewer": VIEWER.tolist()}
 
 
-def _entry(link: LinkModes, points: Array, triangles: Integers, shapes: Array) -> dict[str, Any]:
+def _entry(link: ModesOnPage, points: Array, triangles: Integers, shapes: Array) -> dict[str, Any]:
     """Points (p, 3) in m, triangles (t, 3), and modes (m, p, 3) of which the largest displacement is 1."""
     body, (kept, triangles) = link.body, coarsened(points, triangles, LINK_TRIANGLES)
-    count = min(body.mode_count, MODES)
+    shown = min(body.mode_count, MODES)
     # Scaled on all points, so that a mode does not depend on which of them are kept.
-    modes = [drawn_mode(shapes[:, :, k], 1.0).displacement[kept] / AMPLITUDE for k in range(count)]
+    modes = [drawn_mode(shapes[:, :, k], 1.0).displacement[kept] / AMPLITUDE for k in range(shown)]
     return {
         "label": ", ".join(link.labels),
         "points": encoded(points[kept]),
         "triangles": encoded(triangles, "i4"),
         "modes": encoded(np.round(FINEST * np.array(modes)), "i2"),
-        "names": [f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(count)],
+        "names": [f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(shown)],
         "amplitude": AMPLITUDE * body.length / FINEST,
     }

@@ -25,7 +25,7 @@ from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
 from ..studies.study import Study, read_study, study_files
-from .charts import Chart, Run, folded, history_charts, path_error, runs, sources
+from .charts import AnalysisRun, Chart, folded, history_charts, path_error, runs, sources
 from .mechanism import link_modes, mechanism, surface_modes
 
 
@@ -44,16 +44,20 @@ def _named(first: str, rows: Iterable[tuple[str, Cells]]) -> Table:
     return Table(heading, [(name, *cells.values()) for name, cells in named])
 
 
-def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], runs: Sequence[Run]) -> Table:
+def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], runs: Sequence[AnalysisRun]) -> Table:
     return _named(first, ((run.label, cells) for run in runs for cells in cells_of(run.results, run.analysis)))
 
 
-def _analyses_table(runs: Sequence[Run], verdicts: Sequence[RunVerdict]) -> Table:
-    pairs = zip(runs, verdicts, strict=True)
-    return _named("analysis", ((run.label, analysis_cells(run.results, one.verdict)) for run, one in pairs))
+def _analyses(results: Results, analysis: str) -> Iterator[Cells]:
+    yield analysis_cells(results, results.verdict[analysis])
 
 
-def _warnings_table(runs: Sequence[Run]) -> Table:
+def _loops(results: Results, analysis: str) -> Iterator[Cells]:
+    if results.has(f"{analysis}/control/commands"):
+        yield loop_cells(read_metrics(results.attributes(f"{analysis}/control")))
+
+
+def _warnings_table(runs: Sequence[AnalysisRun]) -> Table:
     rows = [
         (run.label, kind, text)
         for kind, attribute in (("warning", "warnings"), ("note", "notes"))
@@ -63,31 +67,35 @@ def _warnings_table(runs: Sequence[Run]) -> Table:
     return Table(("analysis", "", "text"), rows)
 
 
-def _bending_table(runs: Sequence[Run]) -> Table:
-    heading = ("analysis", "link", "deflection (% of length)", "rotation (rad)", "foreshortening (mm)",
-               "change of stiffness (%)", "error of points (% of length)", "of moments (% of peak)")  # fmt: skip
-    scaled = (("largest_deflection", 100), ("largest_rotation", 1), ("foreshortening", 1e3), ("stiffness_change", 100),
-              ("position_error", 100), ("relative_error", 100))  # fmt: skip
+def _bending_table(runs: Sequence[AnalysisRun]) -> Table:
+    columns = {
+        "deflection (% of length)": ("largest_deflection", 100),
+        "rotation (rad)": ("largest_rotation", 1),
+        "foreshortening (mm)": ("foreshortening", 1e3),
+        "change of stiffness (%)": ("stiffness_change", 100),
+        "error of points (% of length)": ("position_error", 100),
+        "of moments (% of peak)": ("relative_error", 100),
+    }
     rows = []
     for run in runs:
         for body in run.results.names(f"{run.analysis}/bodies"):
             about = run.results.attributes(f"{run.analysis}/bodies/{body}")
             if "largest_deflection" in about:
-                rows.append((run.label, body, *(f"{float(f'{scale * about[key]:.2g}'):g}" for key, scale in scaled)))
-    return Table(heading, rows)
+                cells = (f"{float(f'{scale * about[key]:.2g}'):g}" for key, scale in columns.values())
+                rows.append((run.label, body, *cells))
+    return Table(("analysis", "link", *columns), rows)
 
 
-def peaks_table(runs: Sequence[Run]) -> Table:
+def peaks_table(runs: Sequence[AnalysisRun]) -> Table:
     """The largest absolute value of what a reader asks for first, in every run."""
-    found = ((run.label, *peak) for run in runs for peak in _peaks(run))
-    rows = [(label, what, value, f"{at:.4g}") for label, what, value, at in found]
+    rows = [(run.label, what, value, f"{at:.4g}") for run in runs for what, value, at in _peaks(run)]
     return Table(("analysis", "largest", "value", "at (s)"), rows)
 
 
-def _peaks(run: Run) -> Iterator[tuple[str, str, float]]:
+def _peaks(run: AnalysisRun) -> Iterator[tuple[str, str, float]]:
     """(quantity, its largest size, when it has that) of a run."""
     results, analysis = run.results, run.analysis
-    for target in targets(run.results, run.analysis):
+    for target in targets(results, analysis):
         error = path_error(run, target)
         most, at = largest(results.time(analysis)[: len(error)], error)
         yield f"distance of {target.point} from its path", millimeters(most), at
@@ -152,34 +160,22 @@ class RunVerdict:
         return [line.strip() for line in list(self.verdict.lines())[1:]]
 
 
-def verdicts(runs: Sequence[Run]) -> list[RunVerdict]:
-    """Of all runs, in order."""
-    return [RunVerdict(run.label, run.results.verdict[run.analysis]) for run in runs]
-
-
-def _loops_table(runs: Sequence[Run]) -> Table:
-    closed = (run for run in runs if run.results.has(f"{run.analysis}/control/commands"))
-    metrics = ((run.label, run.results.attributes(f"{run.analysis}/control")) for run in closed)
-    return _named("closed loop", ((label, loop_cells(read_metrics(about))) for label, about in metrics))
-
-
-def _zeros_table(runs: Sequence[Run]) -> Table:
+def _zeros_table(runs: Sequence[AnalysisRun]) -> Table:
     rows = []
     for run in runs:
         group = f"{run.analysis}/zero_dynamics"
         if run.results.has(group):
             about, zeros = run.results.attributes(group), run.results[f"{group}/zeros"]
-            at_rest = " at rest; what grows on the way does too little to matter"
-            phase = f"minimum phase{at_rest if is_unstable(zeros @ (1.0, 1.0j)).any() else ''}"
-            kind = phase if about["minimum_phase"] else "not minimum phase: stable inversion"
+            kind = "minimum phase" if about["minimum_phase"] else "not minimum phase: stable inversion"
+            if about["minimum_phase"] and is_unstable(zeros @ (1.0, 1.0j)).any():
+                kind += " at rest; what grows on the way does too little to matter"
             largest, least = zeros[..., 0].max(), abs(zeros[..., 0]).min()
             rows.append((run.label, kind, f"{about['factor']:.3g}", f"{largest:.4g}", number(least)))
-    heading = ("motors only", "zeros along the path", "share of the vibration in the output", "largest real part (1/s)",
-               "nearest to the axis (1/s)")  # fmt: skip
-    return Table(heading, rows)
+    quantities = ("share of the vibration in the output", "largest real part (1/s)", "nearest to the axis (1/s)")
+    return Table(("motors only", "zeros along the path", *quantities), rows)
 
 
-def placements_table(runs: Sequence[Run]) -> Table:
+def placements_table(runs: Sequence[AnalysisRun]) -> Table:
     """Where searches place patches, against as many spread evenly."""
     rows = []
     for run in runs:
@@ -194,8 +190,9 @@ def placements_table(runs: Sequence[Run]) -> Table:
     return Table(("placement", "on", "by", "centers (m)", "optimum", "evenly spaced"), rows)
 
 
-TABLES: Mapping[str, Callable[[Sequence[Run]], Table]] = {
-    "loops": _loops_table,
+TABLES: Mapping[str, Callable[[Sequence[AnalysisRun]], Table]] = {
+    "analyses": partial(_of_cells, "analysis", _analyses),
+    "loops": partial(_of_cells, "closed loop", _loops),
     "zeros": _zeros_table,
     "placements": placements_table,
     "warnings": _warnings_table,
@@ -219,10 +216,10 @@ def write_report(paths: Sequence[Path], path: Path) -> None:
     written or Plotly is not installed.
     """
     check_ending(path, "output", (".html", ".htm"))
-    found = [(p, study_files(p)) for p in paths]
-    studies = [(file, read_study(file)) for _, files in found for file in files]
+    files = {p: study_files(p) for p in paths}
+    studies = [(file, read_study(file)) for p in paths for file in files[p]]
     with ExitStack() as stack:
-        results = [stack.enter_context(Results(p)) for p, files in found if not files]
+        results = [stack.enter_context(Results(p)) for p in paths if not files[p]]
         write_atomically(path, report(results, studies).encode(), "report")
 
 
@@ -274,34 +271,28 @@ def _study_part(study: Study) -> dict[str, Any]:
 
 def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     all_runs = runs(files)
-    is_plane = _is_plane(files)
+    planes = {results.space.is_plane: results.path for results in files}
+    if len(planes) == 2:
+        raise InputError(
+            f"report: expected results all of planar or all of 3D scenes, found {planes[False]} of a 3D and"
+            f" {planes[True]} of a planar one: write a report of each"
+        )
     moving, notes = mechanism(all_runs)
-    modes, histories, answers = link_modes(all_runs), history_charts(files), verdicts(all_runs)
+    modes, histories = link_modes(all_runs), history_charts(files)
     shapes = surface_modes(modes)
     content = {
         "mechanism": _script_data(moving),
-        "is_plane": is_plane,
+        "is_plane": True in planes,
         "shapes": shapes["links"],
         "modes_3d": _script_data(shapes),
         "histories": folded(histories),
         "modes": modes,
-        "analyses": _analyses_table(all_runs, answers),
-        "verdicts": answers,
+        "verdicts": [RunVerdict(run.label, run.results.verdict[run.analysis]) for run in all_runs],
         **{name: table(all_runs) for name, table in TABLES.items()},
         "notes": notes,
         "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
     }
     return content, [*histories, *(chart for link in modes for chart in link.charts)]
-
-
-def _is_plane(files: Sequence[Results]) -> bool:
-    kinds = {results.space.is_plane: results.path for results in files}
-    if len(kinds) == 2:
-        raise InputError(
-            f"report: expected results all of planar or all of 3D scenes, found {kinds[False]} of a 3D and"
-            f" {kinds[True]} of a planar one: write a report of each"
-        )
-    return True in kinds
 
 
 def _script_data(value: object) -> str:

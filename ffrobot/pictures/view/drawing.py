@@ -52,12 +52,18 @@ def _draw_motion(job: dict[str, Any]) -> None:
     everything = np.concatenate([shown.points for _, shown in grids])
     name = SHOWN[job["color"]][0]
     largest = max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids)
-    limit, bar = round_above(largest), BAR | {"title": f"{name}\n"} if largest > 0.0 else None
+    # The next round number, of a few digits that quarters of it have too; 1 for zero.
+    power = 10.0 ** np.floor(np.log10(largest)) if largest > 0.0 else 1.0
+    limit = float(power * ROUND[np.searchsorted(ROUND, largest / power * (1.0 - 1e-9))])
+    bar = BAR | {"title": f"{name}\n"} if largest > 0.0 else None
     for _, shown in grids:
         shown[name] = np.where(_is_bare(grids, name), np.nan, shown[name])
     size = float(np.ptp(everything, axis=0).max()) or 1.0
     view = SPACE if job["in_space"] else LINK
-    window = _window(MOVIE_SIZE if job["movie"] else SIZE, everything, view)
+    widest, height = MOVIE_SIZE if job["movie"] else SIZE
+    wide, high, _ = np.ptp(everything @ np.stack(view, axis=1), axis=0)
+    needed = (1.0 - BAR_ROOM) * wide / max(high, 1e-9 * wide, 1e-300)
+    window = 2 * round(0.5 * min(widest, max(NARROWEST, needed) * height)), height  # no wider than what is seen needs
     for k, (grid, shown) in enumerate(grids):
         plotter = pyvista.Plotter(off_screen=True, window_size=window)
         if job["scale"] != 1.0 and not job["movie"]:
@@ -79,13 +85,6 @@ def _exaggerated(job: dict[str, Any], step: int) -> tuple[Any, Any]:
     values = grid[job["color"]]
     shown[name] = unit * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
     return grid, shown
-
-
-def _window(size: tuple[int, int], points: Array, view: View) -> tuple[int, int]:
-    """Width and height in pixels: as high as `size`, no wider than it and than what is seen needs."""
-    wide, high, _ = np.ptp(points @ np.stack(view, axis=1), axis=0)
-    needed = (1.0 - BAR_ROOM) * wide / max(high, 1e-9 * wide, 1e-300)
-    return 2 * round(0.5 * min(size[0], max(NARROWEST, needed) * size[1])), size[1]
 
 
 def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
@@ -115,14 +114,6 @@ def _draw_modes(job: dict[str, Any]) -> None:
         _finish(plotter, name, shown.points, LINK)
     plotter.screenshot(job["path"])
     plotter.close()
-
-
-def round_above(value: float) -> float:
-    """The next round number, of a few digits that quarters of it have too; 1 for zero."""
-    if not value > 0.0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * ROUND[np.searchsorted(ROUND, value / power * (1.0 - 1e-9))])
 
 
 def _read(path: str, step: int) -> Any:
@@ -175,19 +166,16 @@ def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: fl
         for axis, color in zip(np.array(axes), TOOL_COLORS, strict=True):
             middle = np.array(at) + 0.5 * TOOL_LENGTH * size * axis
             _add_bar(plotter, middle.tolist(), axis.tolist(), AXIS * size, TOOL_LENGTH * size, color)
+    up = np.array((0.0, 0.0, 1.0) if job["in_space"] else (0.0, 1.0, 0.0))
     for at in job["ground"]:
-        _add_stand(plotter, at, (0.0, 0.0, 1.0) if job["in_space"] else (0.0, 1.0, 0.0), size)
+        foot = (np.array(at) - 0.5 * STAND * size * up).tolist()
+        stand = pyvista.Cone(foot, up, height=STAND * size, radius=0.5 * STAND * size, resolution=4)
+        plotter.add_mesh(stand, color=METAL, ambient=0.3)
 
 
 def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:
     bar = pyvista.Cylinder(at, along, radius=radius, height=length)
     plotter.add_mesh(bar, color=color, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
-
-
-def _add_stand(plotter: Any, at: list[float], up: Sequence[float], size: float) -> None:
-    foot = (np.array(at) - 0.5 * STAND * size * np.array(up)).tolist()
-    stand = pyvista.Cone(foot, up, height=STAND * size, radius=0.5 * STAND * size, resolution=4)
-    plotter.add_mesh(stand, color=METAL, ambient=0.3)
 
 
 def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:

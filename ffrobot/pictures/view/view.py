@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -22,7 +23,6 @@ from ...common.arrays import Array, Indices, Integers, NDArray, as_rows
 from ...common.errors import InputError, SolveError, did_you_mean
 from ...common.files import check_folder, write_atomically
 from ...common.hdf5 import image_of, in_memory
-from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
@@ -33,7 +33,7 @@ from ..shapes import body_surface, surface_shape
 
 # VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
-ROOT = "VTKHDF"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -58,18 +58,21 @@ class Grid:
 def vtkhdf_image(grid: Grid) -> bytes:
     """The file as bytes; the same grid always gives the same. Numbers of points have 7 digits."""
     with in_memory() as file:
-        root = file.create_group(ROOT)
+        root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0])
         root.attrs["Type"] = np.bytes_("UnstructuredGrid")
         _write_cells(root, grid)
-        _write(root, "Points", _flat(grid.points))
-        for name, values in grid.point_data.items():
-            _write(root, f"PointData/{name}", _flat(values))
-        for name, cell_values in grid.cell_data.items():
-            _write(root, f"CellData/{name}", cell_values)
+        for name, values in {"Points": grid.points, **_named("PointData", grid.point_data)}.items():
+            _write(root, name, values.reshape(-1, *values.shape[2:]).astype(np.float32))  # step after step
+        for name, cell_values in _named("CellData", grid.cell_data).items():
+            _write(root, name, cell_values)
         if grid.time is not None:
             _write_steps(root, grid, grid.time)
         return image_of(file)
+
+
+def _named(group: str, arrays: Mapping[str, T]) -> dict[str, T]:
+    return {f"{group}/{name}": values for name, values in arrays.items()}
 
 
 def _write_cells(root: h5py.Group, grid: Grid) -> None:
@@ -88,34 +91,23 @@ def _write_steps(root: h5py.Group, grid: Grid, time: Array) -> None:
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = len(time)
     same, own = np.zeros(len(time), dtype=np.int64), np.arange(len(time)) * grid.points.shape[1]
-    _write(steps, "Values", time)
-    _write(steps, "NumberOfParts", np.ones_like(same))
-    _write(steps, "PartOffsets", same)
-    _write(steps, "PointOffsets", own)
-    _write(steps, "CellOffsets", same[:, None])
-    _write(steps, "ConnectivityIdOffsets", same[:, None])
-    for name in grid.point_data:
-        _write(steps, f"PointDataOffsets/{name}", own)
-    for name in grid.cell_data:
-        _write(steps, f"CellDataOffsets/{name}", same)
-
-
-def _flat(values: Array) -> NDArray[np.float32]:
-    """(T P, …) of (T, P, …), in the precision of the file."""
-    return values.reshape(-1, *values.shape[2:]).astype(np.float32)
+    arrays = {
+        "Values": time,
+        "NumberOfParts": np.ones_like(same),
+        "PartOffsets": same,
+        "PointOffsets": own,
+        "CellOffsets": same[:, None],
+        "ConnectivityIdOffsets": same[:, None],
+        **{f"PointDataOffsets/{name}": own for name in grid.point_data},
+        **{f"CellDataOffsets/{name}": same for name in grid.cell_data},
+    }
+    for name, values in arrays.items():
+        _write(steps, name, values)
 
 
 def _write(group: h5py.Group, name: str, values: NDArray[np.generic]) -> None:
     packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 1000 else {}
     group.create_dataset(name, data=values, track_times=False, **packed)
-
-
-def modes_grid(body: ModalBody) -> Grid:
-    """The surface of a link, undeformed, with every mode as a vector: displacement per unit of modal coordinate."""
-    mesh = body_surface(body)
-    names = [f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {family}" for k, family in enumerate(body.family)]
-    modes = {name: mesh.mode_shapes[None, :, :, k] for k, name in enumerate(names)}
-    return Grid([mesh.cells], mesh.points[None], point_data=modes)
 
 
 def results_grid(results: Results, analysis: str, frames: Indices, notes: list[str]) -> Grid:
@@ -128,15 +120,14 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     """
     bodies = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
-    deflections = [shape.deflection for shape in shapes]
-    exaggerations = [part + body.shift[:, None] for part, body in zip(deflections, bodies, strict=True)]
-    data = {"deflection": deflections, "exaggeration": exaggerations}
-    stresses = [_von_mises(results, analysis, body.name, frames) for body in bodies]
-    if any(stress is not None for stress in stresses):
-        data["von_mises"] = [
-            np.full(deflection.shape[:2], np.nan) if stress is None else stress
-            for stress, deflection in zip(stresses, deflections, strict=True)
-        ]
+    data = dict[str, list[Array]](deflection=[], exaggeration=[], von_mises=[])
+    for shape, body in zip(shapes, bodies, strict=True):
+        deflection, stress = shape.deflection, _von_mises(results, analysis, body.name, frames)
+        data["deflection"].append(deflection)
+        data["exaggeration"].append(deflection + body.shift[:, None])
+        data["von_mises"].append(np.full(deflection.shape[:2], np.nan) if stress is None else stress)
+    if all(np.isnan(stress).all() for stress in data["von_mises"]):
+        del data["von_mises"]
     first = np.cumsum([0, *(len(shape.points) for shape in shapes[:-1])])
     numbers = [body["name"] for body in results.scene["body"]]
     return Grid(
@@ -268,8 +259,8 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
     options = options or Options()
     check_folder(folder)
     notes: list[str] = []
-    views = _modal_body(path) if is_modal_body_file(path) else _results(path, options, notes)
-    paths, pictures = [], []
+    views = [_modal_body(path)] if is_modal_body_file(path) else _results(path, options, notes)
+    paths, pictures = list[Path](), list[Picture]()
     for name, grid, shown in views:
         paths.append(folder / f"{name}.vtkhdf")
         write_atomically(paths[-1], vtkhdf_image(grid), "grid", make_folder=True)
@@ -287,15 +278,26 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
 View = tuple[str, Grid, list[Picture]]  # name of its files, grid, pictures without the grid's path
 
 
-def _modal_body(path: Path) -> Iterator[View]:
+def _modal_body(path: Path) -> View:
+    """Of the surface of a link, undeformed, with every mode as a vector: displacement per unit of modal coordinate."""
     body = read_modal_body(path)
-    name = file_name(body.name)
-    yield name, modes_grid(body), [Picture(body.name, path=f"{name}.png", length=body.length)]
+    mesh, name = body_surface(body), file_name(body.name)
+    modes = {
+        f"mode {k + 1:02d}, {body.frequency[k]:.5g} Hz, {family}": mesh.mode_shapes[None, :, :, k]
+        for k, family in enumerate(body.family)
+    }
+    grid = Grid([mesh.cells], mesh.points[None], point_data=modes)
+    return name, grid, [Picture(body.name, path=f"{name}.png", length=body.length)]
 
 
 def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
-        analyses = _analyses(results, options.analysis)
+        analyses = results.analyses if options.analysis is None else [options.analysis]
+        if options.analysis not in (None, *results.analyses):
+            near = did_you_mean(options.analysis, results.analyses)
+            raise InputError(
+                f'{path}: analysis: expected one of {", ".join(results.analyses)}, found "{options.analysis}"{near}'
+            )
         times = np.concatenate([results.time(name) for name in analyses])
         if options.time is not None and not times.min() <= options.time <= times.max():
             span = f"{times.min():g} to {times.max():g} s"
@@ -303,24 +305,14 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
         for analysis in analyses:
             frames = chosen_frames(results, analysis, options.frames)
             grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
-            colors = {"deflection": f"{name}.png", "von_mises": f"{name}.stress.png"}
-            pictures = [
-                replace(_snapshot(results, analysis, frames, grid, options, color), path=path)
-                for color, path in colors.items()
-                if color in grid.point_data
-            ]
+            pictures = []
+            for color, suffix in (("deflection", ""), ("von_mises", ".stress")):
+                if color in grid.point_data:
+                    step = _step(grid, options.time, color)
+                    scale = visible_scale(grid, [step]) if options.scale is None else options.scale
+                    picture = motion_picture(results, analysis, frames, grid, (step,), scale=scale, color=color)
+                    pictures.append(replace(picture, path=f"{name}{suffix}.png"))
             yield name, grid, pictures
-
-
-def _analyses(results: Results, wanted: str | None) -> Sequence[str]:
-    if wanted is None:
-        return results.analyses
-    if wanted not in results.analyses:
-        near = did_you_mean(wanted, results.analyses)
-        raise InputError(
-            f'{results.path}: analysis: expected one of {", ".join(results.analyses)}, found "{wanted}"{near}'
-        )
-    return [wanted]
 
 
 def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
@@ -335,14 +327,12 @@ def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
     return np.unique(frames)
 
 
-def _snapshot(results: Results, analysis: str, frames: Indices, grid: Grid, options: Options, color: str) -> Picture:
-    """At the step nearest to the time asked for, or where what it is colored by is largest."""
-    assert grid.time is not None
+def _step(grid: Grid, time: float | None, color: str) -> int:
+    """That nearest to `time`; without one, that at which what it is colored by is largest."""
+    if time is not None and grid.time is not None:
+        return int(np.argmin(np.abs(grid.time - time)))
     values = grid.point_data[color]
-    largest = np.nanmax(np.linalg.norm(values, axis=2) if values.ndim == 3 else values, axis=1)
-    step = int(np.argmax(largest) if options.time is None else np.argmin(np.abs(grid.time - options.time)))
-    scale = visible_scale(grid, [step]) if options.scale is None else options.scale
-    return motion_picture(results, analysis, frames, grid, (step,), scale, color)
+    return int(np.argmax(np.nanmax(np.linalg.norm(values, axis=2) if values.ndim == 3 else values, axis=1)))
 
 
 def visible_scale(grid: Grid, steps: Sequence[int]) -> float:
@@ -353,7 +343,7 @@ def visible_scale(grid: Grid, steps: Sequence[int]) -> float:
 
 
 def motion_picture(
-    results: Results, analysis: str, frames: Indices, grid: Grid, steps: tuple[int, ...], scale: float, color: str
+    results: Results, analysis: str, frames: Indices, grid: Grid, steps: tuple[int, ...], *, scale: float, color: str
 ) -> Picture:
     """Of the steps of a grid, which shows the outputs `frames` of an analysis."""
     assert grid.time is not None
@@ -407,7 +397,7 @@ def _rendered(
 
     grid, steps = results_grid(results, analysis, outputs, notes), tuple(range(len(outputs)))
     scale = visible_scale(grid, steps) if scale is None else scale
-    picture = motion_picture(results, analysis, outputs, grid, steps, scale, "deflection")
+    picture = motion_picture(results, analysis, outputs, grid, steps, scale=scale, color="deflection")
     with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "grid.vtkhdf"
         write_atomically(file, vtkhdf_image(grid), "grid", ours=True)
