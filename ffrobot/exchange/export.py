@@ -25,7 +25,7 @@ from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
 from .motion.read_motion import path_text, read_motion
 from .motion.robot_motion import (
-    RobotMotion,
+    JointMotions,
     Side,
     csv_text,
     joint_trajectory_bag,
@@ -62,7 +62,7 @@ Make = Callable[[Path, str | None, Side], FileContent]
 """Of a file, of an analysis of it where one is named, and of a side of compliant gears."""
 
 
-def _motion(convert: Callable[[RobotMotion], Converted], what: str, *of: Any) -> FileContent:
+def _motion(convert: Callable[[JointMotions], Converted], what: str, *of: Any) -> FileContent:
     motion = robot_motion(*of)
     content, remarks = convert(motion)
     counted = what.format(joints=len(motion.joints), points=len(motion.time))

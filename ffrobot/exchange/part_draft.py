@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +42,6 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
     x = way / np.linalg.norm(way)
     y = _across(part, root, x)
     axes = np.stack([x, y, np.cross(x, y)])
-    in_file = METRES[part.unit]
-
     others = {
         f"{face.kind}_{k}": face  # numbered as in the table and the picture
         for k, face in enumerate(part.faces, start=1)
@@ -66,7 +63,7 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
             "file": os.path.relpath(file.resolve(), folder.resolve()),
             "unit": part.unit,
             "length": round(float(np.linalg.norm(way)), DIGITS),
-            "origin": _numbers(root.point / in_file),
+            "origin": _numbers(root.point / METRES[part.unit]),
             "x_axis": _numbers(x),
             "y_axis": _numbers(y),
         },
@@ -75,9 +72,12 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
         "damping": {"ratio": 0.01},
         "interface": [interface("root", root), interface("tip", tip)],
     }
-    tables = [interface(label, face) for label, face in others.items()]
-    head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n{about}\n"
-    return head + toml_text(keys) + "".join(_commented(tables))
+    text = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n{about}\n"
+    text += toml_text(keys)
+    for label, face in others.items():
+        table = toml_text({"interface": [interface(label, face)]})
+        text += "\n" + "".join(f"# {line}\n" for line in table.strip().splitlines())
+    return text
 
 
 def _material(density: float | None) -> tuple[dict[str, float], str]:
@@ -128,11 +128,11 @@ def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
 
 def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
     """The concentrated masses on each face; none of files in another unit of length, whose unit of mass is unknown."""
-    found = dict[PartFace, float]()
+    masses = dict[PartFace, float]()
     for mass in part.masses if part.unit == "m" else ():
         face = min(faces, key=lambda face: float(np.linalg.norm(face.center - mass.point)))
-        found[face] = found.get(face, 0.0) + mass.mass
-    return found
+        masses[face] = masses.get(face, 0.0) + mass.mass
+    return masses
 
 
 def _across(part: Inspection, root: PartFace, x: Array) -> Array:
@@ -158,11 +158,6 @@ def _squared(part: Inspection, x: Array) -> Array:
     along = [face for face in planes if abs(face.direction @ x) < SQUARE]
     large = [face.direction for face in along if face.area > (1 - ALIKE) * along[0].area]
     return max(large, key=lambda normal: as_list(normal[::-1].round(3)), default=axes[1])
-
-
-def _commented(tables: list[dict[str, Any]]) -> Iterator[str]:
-    for table in tables:
-        yield "\n" + "".join(f"# {line}\n" for line in toml_text({"interface": [table]}).strip().splitlines())
 
 
 def _numbers(vector: Array) -> list[float]:

@@ -101,8 +101,8 @@ def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:
         others = quoted(key for key in ("velocities", "accelerations", "effort") if point.get(key))
         raise InputError(f"point {k}: expected positions, found {others}: the path goes through positions")
     if not isinstance(positions, list) or len(positions) != len(joints):
-        found = len(positions) if isinstance(positions, list) else type(positions).__name__
-        raise InputError(f"point {k}: expected {len(joints)} positions, one for each joint, found {found}")
+        other = len(positions) if isinstance(positions, list) else type(positions).__name__
+        raise InputError(f"point {k}: expected {len(joints)} positions, one for each joint, found {other}")
     return begin + _seconds(point.get("time_from_start"), k), [_number(value, f"point {k}") for value in positions]
 
 
@@ -149,8 +149,8 @@ def _motion(joints: Sequence[str], rows: Sequence[Row], *remarks: str) -> Waypoi
     if not joints or len(set(joints)) < len(joints):
         raise InputError(f"expected joints of different names, found {len(joints)}: {shown(', '.join(joints))}")
     values = np.array([positions for _, positions in rows], dtype=float).reshape(len(rows), len(joints))
-    found = waypoints_of(joints, np.array([time for time, _ in rows]), values, "point {}".format)
-    return replace(found, remarks=(*remarks, *found.remarks))
+    motion = waypoints_of(joints, np.array([time for time, _ in rows]), values, "point {}".format)
+    return replace(motion, remarks=(*remarks, *motion.remarks))
 
 
 def _from_bag(path: Path) -> Waypoints:
@@ -188,9 +188,10 @@ def _of_bag(bag: Any) -> Waypoints:
     (_, plan), *later = messages(first)
     left = [f"{len(later)} later messages on {first.topic} left out"] if later else []
     left += [f"{topic.topic} left out: {topic.msgcount} messages" for topic in (*others, *topics[STATES])]
-    points = [{"positions": point.positions.tolist(), "time_from_start": vars(point.time_from_start)}
-              for point in plan.points]  # fmt: skip
-    rows = [_row(plan.joint_names, point, k, 0.0) for k, point in enumerate(points)]
+    rows = []
+    for k, point in enumerate(plan.points):
+        keys = {"positions": point.positions.tolist(), "time_from_start": vars(point.time_from_start)}
+        rows.append(_row(plan.joint_names, keys, k, 0.0))
     return _motion(
         plan.joint_names, rows, *left, *_moving_at_ends(plan.joint_names, [p.velocities for p in plan.points])
     )
@@ -252,8 +253,10 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Waypoi
         from scipy.interpolate import CubicSpline
 
         whole = (times[-1] - times[0]) / NANO
-        remarks.append(f"{quoted(map(shown, apart))}: in other messages: by cubic splines at times of the others,"
-                       f" the {whole:.6g} s that all have")  # fmt: skip
+        remarks.append(
+            f"{quoted(map(shown, apart))}: in other messages: by cubic splines at times of the others, the"
+            f" {whole:.6g} s that all have"
+        )
     columns = list[Array]()
     for name, (at, values) in series.items():
         if name not in apart:

@@ -51,7 +51,7 @@ class JointMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class RobotMotion:
+class JointMotions:
     """The joints of an analysis with their coordinates, at `time` (T,) s; `remarks` say what to know of it.
 
     `side`: of compliant gears, whose positions a JointTrajectory has.
@@ -64,10 +64,8 @@ class RobotMotion:
     side: Side = "motor"
 
 
-def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> RobotMotion:
+def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> JointMotions:
     """From the results file at `path`: of `analysis`, else of the first that has joints which move.
-
-    `side` of compliant gears: which positions a JointTrajectory has.
 
     Raises:
         InputError: there is no such analysis, or none of its joints moves.
@@ -83,11 +81,9 @@ def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> Robo
             raise InputError(f"{path}: expected an analysis with joints that move, found none in {analysis or 'it'}")
         name = analysis or known[0]
         joints = tuple(part for joint in _moving(results, name) for part in _parts(results, name, joint))
-        time = results.time(name)
-        status = results.attributes(name)["status"]
-    if status != "completed":
-        return RobotMotion(name, time, joints, (f"{name} ended at t = {time[-1]:g} s: {status}",), side)
-    return RobotMotion(name, time, joints, (), side)
+        time, status = results.time(name), results.attributes(name)["status"]
+    remarks = () if status == "completed" else (f"{name} ended at t = {time[-1]:g} s: {status}",)
+    return JointMotions(name, time, joints, remarks, side)
 
 
 def _moving(results: Results, analysis: str) -> Iterator[str]:
@@ -97,19 +93,15 @@ def _moving(results: Results, analysis: str) -> Iterator[str]:
 
 def _parts(results: Results, analysis: str, joint: str) -> Iterator[JointMotion]:
     group = f"{analysis}/joints/{joint}"
-    outputs = len(results.time(analysis))
-    coordinate, rate = (results[f"{group}/{key}"].reshape(outputs, -1).T for key in ("coordinate", "rate"))
+    coordinate, rate = (results.data(f"{group}/{key}").T for key in ("coordinate", "rate"))
     has_motor = results.has(f"{group}/moment")
-    moment = results[f"{group}/moment"].reshape(outputs, -1).T if has_motor else [None] * len(coordinate)
-    motor = {}
-    if results.has(f"{group}/motor_coordinate"):
-        keys = (key for key in OF_MOTOR if results.has(f"{group}/{key}"))
-        motor = {key: results[f"{group}/{key}"] for key in keys}
+    moment = results.data(f"{group}/moment").T if has_motor else [None] * len(coordinate)
+    motor = {key: results[f"{group}/{key}"] for key in OF_MOTOR if results.has(f"{group}/{key}")}
     for k, values in enumerate(zip(coordinate, rate, moment, strict=True)):
         yield JointMotion(joint if len(coordinate) == 1 else f"{joint}[{k}]", *values, motor)
 
 
-def csv_text(motion: RobotMotion) -> str:
+def csv_text(motion: JointMotions) -> str:
     """A table: `time`, then NAME.coordinate, NAME.rate and, with a motor, NAME.moment of every joint; SI units.
 
     Of joints with compliant gears also NAME.motor_coordinate, NAME.motor_rate, NAME.motor_moment.
@@ -123,19 +115,19 @@ def csv_text(motion: RobotMotion) -> str:
     return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))])
 
 
-def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ...]]:
+def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The message, of joints with a motor on the motion's side of compliant gears; and remarks on what it leaves out.
 
     Accelerations stay empty, as the message allows: results have none of joints. Where no joint has a motor, all are
     taken, without effort.
     """
-    driven = [joint for joint in motion.joints if joint.moment is not None]
-    moments = [joint.moment for joint in motion.joints if joint.moment is not None]
-    joints, left = driven or list(motion.joints), [joint.name for joint in motion.joints if joint.moment is None]
+    moments = {joint.name: joint.moment for joint in motion.joints if joint.moment is not None}
+    left = [joint.name for joint in motion.joints if joint.moment is None] if moments else []
+    joints = [joint for joint in motion.joints if joint.name not in left]
     remarks = list(motion.remarks)
-    if driven and left:
+    if left:
         remarks.append(f"joints without motor left out: {', '.join(left)}")
-    if not driven:
+    if not moments:
         remarks.append("no joint has a motor: effort is left empty")
     begin = min(float(motion.time[0]), 0.0)
     if begin < 0.0:
@@ -147,7 +139,7 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
     positions, velocities = (
         np.stack(columns, axis=1) for columns in zip(*(joint.on(motion.side) for joint in joints), strict=True)
     )
-    efforts = np.stack(moments, axis=1) if moments else np.zeros((len(motion.time), 0))
+    efforts = np.stack(list(moments.values()), axis=1) if moments else np.zeros((len(motion.time), 0))
     points = [
         {
             "positions": position,
@@ -168,7 +160,7 @@ def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ..
     return message, tuple(remarks)
 
 
-def joint_trajectory_text(motion: RobotMotion) -> tuple[str, tuple[str, ...]]:
+def joint_trajectory_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
     """The message as JSON, a line for each point; and remarks."""
     message, remarks = joint_trajectory(motion)
     points = ",\n".join(json.dumps(point) for point in message.pop("points"))
@@ -181,7 +173,7 @@ BAG = "joint_trajectory"  # name of the files in it
 VERSION = 8  # of the metadata: what ROS 2 Iron and later write, and Humble reads
 
 
-def joint_trajectory_bag(motion: RobotMotion) -> tuple[Mapping[str, bytes], tuple[str, ...]]:
+def joint_trajectory_bag(motion: JointMotions) -> tuple[Mapping[str, bytes], tuple[str, ...]]:
     """Files of the bag by name, SQLite storage, with the message at time zero; and remarks.
 
     Raises:

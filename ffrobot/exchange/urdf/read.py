@@ -34,16 +34,23 @@ from .robot import (
 Element = ElementTree.Element
 
 _ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding=["']([\w.-]+)["']""")
-ONCE = {
-    "inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic",
-}  # fmt: skip
+ONCE = {"inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"}
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 READ: Mapping[str, Container[str]] = {
-    "robot": {"name", "version"}, "link": {"name"}, "joint": {"name", "type"}, "inertial": (), "mass": {"value"},
-    "inertia": ENTRIES, "origin": {"xyz", "rpy", "quat_xyzw"}, "parent": {"link"}, "child": {"link"}, "axis": {"xyz"},
-    "limit": {"lower", "upper", "effort", "velocity"}, "dynamics": {"damping", "friction"},
+    "robot": {"name", "version"},
+    "link": {"name"},
+    "joint": {"name", "type"},
+    "inertial": (),
+    "mass": {"value"},
+    "inertia": ENTRIES,
+    "origin": {"xyz", "rpy", "quat_xyzw"},
+    "parent": {"link"},
+    "child": {"link"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity"},
+    "dynamics": {"damping", "friction"},
     "mimic": {"joint", "multiplier", "offset"},
-}  # fmt: skip
+}
 """Attributes that are read, by element; of elements that are not here the import leaves out all."""
 UNIT = 0.1  # how far from 1 the length of a quaternion may be by its digits
 SHAPES = ("visual", "collision", "material")  # for the eye, or read as far as masses and pictures need them
@@ -97,8 +104,9 @@ def _parsed(content: bytes) -> Element:
 def _robot_of(root: Element) -> Robot:
     links = [_link(each) for each in root.findall("link")]
     joints = [_joint(each) for each in root.findall("joint")]
-    _check_once("link", (link.name for link in links))
-    _check_once("joint", (joint.name for joint in joints))
+    for kind, records in (("link", links), ("joint", joints)):
+        if again := next((name for name, count in Counter(one.name for one in records).items() if count > 1), None):
+            raise InputError(f'expected one <{kind}> of each name, found several of the name "{shown(again)}"')
     by_name = {joint.name: joint for joint in joints}
     check_mimics(by_name)
     base = root_of([link.name for link in links], joints)
@@ -178,18 +186,12 @@ def _left_of(element: Element) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 SIZES: Mapping[Shape, Mapping[str, int]] = {
-    "box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "capsule": {"radius": 1, "length": 1},
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
     "sphere": {"radius": 1},
-}  # fmt: skip
+}
 """Attributes of shapes with so many numbers each."""
-
-
-def _check_once(kind: str, names: Iterable[str]) -> None:
-    seen = set[str]()
-    for name in names:
-        if name in seen:
-            raise InputError(f'expected one <{kind}> of each name, found several of the name "{shown(name)}"')
-        seen.add(name)
 
 
 def _name(element: Element) -> str:
@@ -259,10 +261,16 @@ def _joint(element: Element) -> UrdfJoint:
     if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
         raise InputError(f"{label}: <axis>: expected a direction, found 0 0 0")
     return UrdfJoint(
-        name, kind, _end(element, "parent", label), _end(element, "child", label), _origin(element, label), along,
-        _attributes(element, "limit", label), _attributes(element, "dynamics", label),
-        _mimic(element, label),
-    )  # fmt: skip
+        name=name,
+        type=kind,
+        parent=_end(element, "parent", label),
+        child=_end(element, "child", label),
+        origin=_origin(element, label),
+        axis=along,
+        limits=_attributes(element, "limit", label),
+        dynamics=_attributes(element, "dynamics", label),
+        mimic=_mimic(element, label),
+    )
 
 
 def _end(joint: Element, kind: str, label: str) -> str:
@@ -356,8 +364,8 @@ def root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
         label = f'joint "{shown(joint.name)}"'
         for kind, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
-                raise InputError(f'{label}: <{kind}>: expected a link of the file, found "{shown(name)}"'
-                                 + did_you_mean(name, links))  # fmt: skip
+                near = did_you_mean(name, links)
+                raise InputError(f'{label}: <{kind}>: expected a link of the file, found "{shown(name)}"{near}')
         if joint.child in carried:
             raise InputError(
                 f'{label}: expected one joint that carries link "{shown(joint.child)}", found a second one, "'
@@ -371,20 +379,12 @@ def root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
         raise InputError(
             f"expected one link that no joint carries, found {len(roots)}: {quoted(roots)}; join them by fixed joints"
         )
-    _check_reached(roots[0], links, joints)
+    reached = roots.copy()
+    for link in reached:  # which grows
+        reached += [joint.child for joint in joints if joint.parent == link]
+    if left := [name for name in links if name not in reached]:  # with a parent each
+        raise InputError(f'expected all links to be carried by "{shown(roots[0])}", found a circle of {quoted(left)}')
     return roots[0]
-
-
-def _check_reached(root: str, links: Sequence[str], joints: Sequence[UrdfJoint]) -> None:
-    """Links with a parent each, but not below the root, form circles."""
-    reached, todo = {root}, [root]
-    while todo:
-        link = todo.pop()
-        below = [joint.child for joint in joints if joint.parent == link]
-        reached.update(below)
-        todo += below
-    if left := [name for name in links if name not in reached]:
-        raise InputError(f'expected all links to be carried by "{shown(root)}", found a circle of {quoted(left)}')
 
 
 def check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
@@ -393,8 +393,8 @@ def check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
         label, chain = f'joint "{shown(joint.name)}": <mimic>', [joint.name]
         while (follows := joints[chain[-1]].mimic) is not None:
             if follows.joint not in joints:
-                raise InputError(f'{label}: expected a joint of the file, found "{shown(follows.joint)}"'
-                                 + did_you_mean(follows.joint, joints))  # fmt: skip
+                near = did_you_mean(follows.joint, joints)
+                raise InputError(f'{label}: expected a joint of the file, found "{shown(follows.joint)}"{near}')
             if follows.joint in chain:
                 raise InputError(
                     f"{label}: expected a joint that moves freely at the end of the chain, found a circle:"

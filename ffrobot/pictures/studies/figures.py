@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -17,7 +16,7 @@ from ...common.arrays import Array, as_floats
 from ..figures.plot import image_of, write_figure
 from ..figures.style import legend, literal, new_axes, style
 from ..projection import COLORS
-from .study import LOOKS, Axis, Band, Bars, Diagram, Look, Parallel, Points, Progress, Series, wrapped
+from .study import LOOKS, Axis, Band, Bars, Diagram, Look, Parallel, Points, Progress, floats, wrapped
 
 
 def write_diagrams(diagrams: Sequence[Diagram], folder: Path) -> list[Path]:
@@ -61,7 +60,18 @@ def _draw_bars(diagram: Bars) -> Figure:
     height = 0.8 / count
     for k, series in enumerate(diagram.series):
         at = as_floats(np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height)
-        _label(axes, _bars(axes, diagram, series, at, height, COLORS[k]), series, "+" if diagram.signed else "")
+        values = [value or 0.0 for value in series.values[:MOST]]
+        bars = axes.barh(
+            at,
+            values,
+            height,
+            xerr=list(series.errors[:MOST]) or None,
+            color=[COLORS[1] if diagram.signed and value < 0.0 else COLORS[k] for value in values],
+            label=series.label or None,
+            error_kw={"elinewidth": 0.7, "capsize": 1.5},
+        )
+        numbers = [_number(value, "+" if diagram.signed else "") for value in series.values[:MOST]]
+        axes.bar_label(bars, numbers, padding=2, fontsize=7)
     axes.margins(x=ROOM)
     axes.locator_params(axis="x", nbins=7)
     axes.set_yticks(range(len(labels)), labels)
@@ -73,21 +83,6 @@ def _draw_bars(diagram: Bars) -> Figure:
     axes.set_xlabel(diagram.x_label, loc="right")
     legend(axes)
     return picture
-
-
-def _bars(axes: Axes, diagram: Bars, series: Series, at: Array, height: float, color: str) -> BarContainer:
-    values = [value or 0.0 for value in series.values[:MOST]]
-    colors = [COLORS[1] if diagram.signed and value < 0.0 else color for value in values]
-    errors = list(series.errors[:MOST]) or None
-    return axes.barh(
-        at, values, height, xerr=errors, color=colors, label=series.label or None,
-        error_kw={"elinewidth": 0.7, "capsize": 1.5},
-    )  # fmt: skip
-
-
-def _label(axes: Axes, bars: BarContainer, series: Series, sign: str) -> None:
-    numbers = [_number(value, sign) for value in series.values[:MOST]]
-    axes.bar_label(bars, numbers, padding=2, fontsize=7)
 
 
 def _number(value: float | None, sign: str) -> str:
@@ -112,17 +107,16 @@ def _draw_band(band: Band) -> Figure:
 def _draw_progress(diagram: Progress) -> Figure:
     figure, axes = new_axes(diagram.title)
     number = np.arange(len(diagram.values))
-    values = _numbers(diagram.values)
-    axes.plot(number, _numbers(diagram.best), color=COLORS[0], drawstyle="steps-post", label="best so far")
+    values = floats(diagram.values)
+    axes.plot(number, floats(diagram.best), color=COLORS[0], drawstyle="steps-post", label="best so far")
     for state, look in LOOKS.items():
         mine = np.array([one == state for one in diagram.states])
-        if state == "failed" and mine.any():
-            axes.plot(
-                number[mine], np.full(mine.sum(), 0.02), look.marker, color=look.color, label=look.label,
-                transform=axes.get_xaxis_transform(),
-            )  # fmt: skip
+        marks: dict[str, Any] = {"color": look.color, "label": look.label}
+        if state == "failed" and mine.any():  # at the lower edge
+            edge = np.full(mine.sum(), 0.02)
+            axes.plot(number[mine], edge, look.marker, transform=axes.get_xaxis_transform(), **marks)
         elif mine.any():
-            axes.plot(number[mine], values[mine], look.marker, color=look.color, label=look.label, zorder=3)
+            axes.plot(number[mine], values[mine], look.marker, zorder=3, **marks)
     if diagram.logarithmic:
         axes.set_yscale("log")
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
@@ -130,10 +124,6 @@ def _draw_progress(diagram: Progress) -> Figure:
     axes.set_ylabel(diagram.y_label)
     legend(axes)
     return figure
-
-
-def _numbers(values: tuple[float | None, ...]) -> Array:
-    return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
 def _draw_points(diagram: Points) -> Figure:
@@ -169,14 +159,12 @@ def _draw_parallel(diagram: Parallel) -> Figure:
             _line(axes, places[row], look, FAINT if state == "kept" and len(places) > 30 else 1.0)
     for k, axis in enumerate(diagram.axes):
         _axis(axes, k, axis)
-    present = {state: look for state, look in LOOKS.items() if state in diagram.states}
-    samples = [
-        Line2D(
-            [], [], color=look.color, linestyle=look.dash, linewidth=look.width,
-            label=diagram.best_label if state == "best" else look.label,
-        )
-        for state, look in present.items()
-    ]  # fmt: skip
+    samples = []
+    for state, look in LOOKS.items():
+        if state in diagram.states:
+            label = diagram.best_label if state == "best" else look.label
+            line = {"color": look.color, "linestyle": look.dash, "linewidth": look.width}
+            samples.append(Line2D([], [], label=label, **line))
     if any(axis.limit is not None for axis in diagram.axes):
         samples.append(Line2D([], [], linewidth=1.6, label="limit, pointing beyond it", **_beyond(1)))
     figure.legend(handles=samples, loc="outside lower center", ncols=len(samples))
@@ -197,10 +185,8 @@ def _axis(axes: Axes, k: int, axis: Axis) -> None:
     axes.plot([k, k], [0.0, 1.0], color="black", linewidth=0.8, clip_on=False)
     for place, text in axis.ticks:
         axes.plot([k - 0.02, k], [place, place], color="black", linewidth=0.6, clip_on=False)
-        axes.text(
-            k - 0.035, place, text, ha="right", va="center", fontsize=6,
-            bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0.0, "pad": 0.5},
-        )  # fmt: skip
+        box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0.0, "pad": 0.5}
+        axes.text(k - 0.035, place, text, ha="right", va="center", fontsize=6, bbox=box)
     axes.text(k, 1.05, "\n".join(wrapped(axis.label, LETTERS)), ha="center", va="bottom", fontsize=7)
     if axis.limit is not None:
         place = float(axis.place(np.array(axis.limit)))

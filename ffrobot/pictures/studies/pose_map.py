@@ -25,44 +25,44 @@ LABELS = ("worst", "best")
 FLAT = 1e-9  # of the largest extent: no extent
 
 
-def draw_map(found: PoseMap) -> list[Path]:
+def draw_map(pose_map: PoseMap) -> list[Path]:
     """A picture of each quantity that differs from pose to pose, in the folder of the map; their files."""
     files = []
     with style():
-        for name, quantity in quantities(found).items():
+        for name, quantity in quantities(pose_map).items():
             if not np.isfinite(quantity.values).any() or quantity.everywhere:
                 continue
-            content, path = io.BytesIO(), found.plan.folder / f"{name}.png"
-            _draw(found, quantity).savefig(content, format="png")
+            content, path = io.BytesIO(), pose_map.plan.folder / f"{name}.png"
+            _draw(pose_map, quantity).savefig(content, format="png")
             write_atomically(path, content.getvalue(), "picture", ours=True)
             files.append(path)
     return files
 
 
-def _draw(found: PoseMap, quantity: Quantity) -> Figure:
+def _draw(pose_map: PoseMap, quantity: Quantity) -> Figure:
     """Over the grid where it has one or two axes, and over the places of the point, with the robot."""
-    grid = found.plan.axes
+    grid = pose_map.plan.axes
     long = [axis for axis in grid if len(axis.values) > 1] or list(grid[:1])
     figure = Figure(figsize=WIDE if len(long) < 3 else (WIDE[1], WIDE[1]), layout="constrained")
     figure.suptitle(quantity.title, fontsize=9)
     if len(long) == 2:
-        _heat_map(figure.add_subplot(1, 2, 1), found, quantity, long)
+        _heat_map(figure.add_subplot(1, 2, 1), pose_map, quantity, long)
     elif len(long) == 1:
-        _curve(figure.add_subplot(1, 2, 1), found, quantity, long[0])
+        _curve(figure.add_subplot(1, 2, 1), pose_map, quantity, long[0])
     axes = figure.add_subplot(1, 2, 2) if len(long) < 3 else figure.subplots()
-    _workspace(axes, found, quantity, has_bar=len(long) > 2)
+    _workspace(axes, pose_map, quantity, has_bar=len(long) > 2)
     return figure
 
 
-def _heat_map(axes: Axes, found: PoseMap, quantity: Quantity, long: list[GridAxis]) -> None:
-    values = quantity.values.reshape(found.plan.shape).squeeze()
+def _heat_map(axes: Axes, pose_map: PoseMap, quantity: Quantity, long: list[GridAxis]) -> None:
+    values = quantity.values.reshape(pose_map.plan.shape).squeeze()
     mesh = axes.pcolormesh(*(_in_units(axis) for axis in long), values.T, cmap=ORDERED, shading="nearest")
     axes.grid(False)
     axes.figure.colorbar(mesh, ax=axes)
-    grid = [_in_units(axis) for axis in found.plan.axes]
+    grid = [_in_units(axis) for axis in pose_map.plan.axes]
     for number, color, marker in _marks(quantity):
-        place = np.unravel_index(number, found.plan.shape)
-        at = [values[k] for axis, values, k in zip(found.plan.axes, grid, place, strict=True) if axis in long]
+        place = np.unravel_index(number, pose_map.plan.shape)
+        at = [values[k] for axis, values, k in zip(pose_map.plan.axes, grid, place, strict=True) if axis in long]
         axes.plot(*at, marker, color=color, markeredgecolor="white", markersize=7)
     axes.set_xlabel(_label(long[0]))
     axes.set_ylabel(_label(long[1]))
@@ -70,7 +70,7 @@ def _heat_map(axes: Axes, found: PoseMap, quantity: Quantity, long: list[GridAxi
         axes.set_aspect("equal")
 
 
-def _curve(axes: Axes, found: PoseMap, quantity: Quantity, axis: GridAxis) -> None:
+def _curve(axes: Axes, pose_map: PoseMap, quantity: Quantity, axis: GridAxis) -> None:
     x = _in_units(axis)
     axes.plot(x, quantity.values)
     for number, color, marker in _marks(quantity):
@@ -78,9 +78,9 @@ def _curve(axes: Axes, found: PoseMap, quantity: Quantity, axis: GridAxis) -> No
     axes.set_xlabel(_label(axis))
 
 
-def _workspace(axes: Axes, found: PoseMap, quantity: Quantity, *, has_bar: bool) -> None:
+def _workspace(axes: Axes, pose_map: PoseMap, quantity: Quantity, *, has_bar: bool) -> None:
     """Places of the point in color, and the robot; a robot that stays in a plane is seen against it."""
-    place, robots = in_3d(found.values["place"]), found.values["robot"]
+    place, robots = in_3d(pose_map.values["place"]), pose_map.values["robot"]
     known = np.isfinite(place).all(axis=1)
     seen = np.vstack([place[known], *(robots[number].reshape(-1, 3) for number, *_ in _marks(quantity))])
     extent = np.ptp(seen, axis=0)

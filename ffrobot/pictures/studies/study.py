@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import re
 import textwrap
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import Field
@@ -19,8 +18,7 @@ from ...common.validation import Record, validate
 from ..projection import COLORS
 
 
-@dataclass(frozen=True)
-class Look:
+class Look(NamedTuple):
     """Of the lines and points of designs; the last of `LOOKS` are drawn last."""
 
     label: str
@@ -98,7 +96,7 @@ class Axis(Record):
     @property
     def places(self) -> Array:
         """(n) of all designs, NaN where they failed."""
-        return self.place(np.array([np.nan if value is None else value for value in self.values]))
+        return self.place(floats(self.values))
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
@@ -108,6 +106,11 @@ class Axis(Record):
         values = _round_logarithms(self.low, self.high) if self.logarithmic else np.array([])
         values = values if values.size > 1 else _round_numbers(self.low, self.high)
         return [(float(self.place(value)), f"{value:.6g}") for value in values]
+
+
+def floats(values: Numbers) -> Array:
+    """(n,) with NaN where there is no number."""
+    return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
 def axis_of_goal(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> Axis:
@@ -201,12 +204,8 @@ def _round_logarithms(low: float, high: float) -> Array:
     return as_floats(inside[0] if len(inside[0]) >= TICKS - 1 else inside[1])
 
 
-FORMAT = "ffrobot-study"
-VERSION = 1
 StudyName = Literal["sensitivity", "optimum", "front", "uncertainty"]
 """Of a file, without `.json`, as the folder of a command has it beside its tables."""
-
-NAMES: tuple[StudyName, ...] = get_args(StudyName)
 
 
 class StudyTable(Record):
@@ -251,13 +250,14 @@ def study_files(path: Path) -> list[Path]:
     """Those of a folder of a design command, which has to have one, or `path` itself where it is one."""
     if not path.is_dir():
         return [path] if path.suffix == ".json" else []
-    found = [file for name in NAMES if (file := path / f"{name}.json").is_file()]
-    if not found:
+    names = [f"{name}.json" for name in get_args(StudyName)]
+    files = [file for name in names if (file := path / name).is_file()]
+    if not files:
         raise InputError(
-            f"{path}: expected a folder of ffrobot sensitivity, optimise or uncertainty, with one of"
-            f" {quoted(f'{name}.json' for name in NAMES)}, found none: has the command come to its end?"
+            f"{path}: expected a folder of ffrobot sensitivity, optimise or uncertainty, with one of {quoted(names)},"
+            " found none: has the command come to its end?"
         )
-    return found
+    return files
 
 
 def read_study(path: Path) -> Study:
@@ -268,10 +268,8 @@ def read_study(path: Path) -> Study:
         raise InputError(f"{path}: expected a file that can be read, found: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: expected a study of ffrobot as JSON, found: {error}") from None
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError(f'{path}: expected a study of ffrobot (format "{FORMAT}"), found another file')
-    if data.get("format_version") != VERSION:
-        raise InputError(
-            f"{path}: expected format_version {VERSION}, found {data.get('format_version')}: run the command again"
-        )
+    if not isinstance(data, dict) or data.get("format") != "ffrobot-study":
+        raise InputError(f'{path}: expected a study of ffrobot (format "ffrobot-study"), found another file')
+    if (version := data.get("format_version")) != 1:
+        raise InputError(f"{path}: expected format_version 1, found {version}: run the command again")
     return validate(Study, data, path)
