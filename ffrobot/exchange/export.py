@@ -212,12 +212,9 @@ def print_import(imported: Imported, console: Console) -> None:
     table = plain_table("joint", "type", "range", "moment or force", "speed", "damping", "friction")
     for joint in moving:
         low_high = joint.get("position_limit")
-        table.add_row(
-            joint["name"],
-            joint["type"],
-            f"{low_high[0]:.4g} … {low_high[1]:.4g} {UNITS[joint['type']]}" if low_high else "–",
-            *(f"{joint[key]:.4g}" if key in joint else "–" for key in LIMITS),
-        )
+        span = f"{low_high[0]:.4g} … {low_high[1]:.4g} {UNITS[joint['type']]}" if low_high else "–"
+        limits = (f"{joint[key]:.4g}" if key in joint else "–" for key in LIMITS)
+        table.add_row(joint["name"], joint["type"], span, *limits)
     console.print(table)
     if imported.masses:
         _print_masses(imported, console)

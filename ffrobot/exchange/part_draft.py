@@ -36,25 +36,19 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
         InputError: the part has no two such faces.
     """
     root, tip = _ends(part)
-    way = tip.point - root.point
-    along = (way @ root.direction) * root.direction
-    way = along if root.kind == "plane" else way - along  # x is square to a plane root, and to the axis of a bore
-    x = way / np.linalg.norm(way)
-    y = _across(part, root, x)
-    axes = np.stack([x, y, np.cross(x, y)])
+    axes, length = _frame(part, root, tip)
     others = {
         f"{face.kind}_{k}": face  # numbered as in the table and the picture
         for k, face in enumerate(part.faces, start=1)
         if face.kind in ("plane", "bore") and face is not root and face is not tip
     }
-    mass_on = _masses(part, [root, tip, *others.values()])
+    mass_on, (material, about) = _masses(part, [root, tip, *others.values()]), _material(density)
 
     def interface(label: str, face: PartFace) -> dict[str, Any]:
-        place = axes @ (face.point - root.point)
-        keys = {"name": label, "position": _numbers(place), "normal": _numbers(axes @ face.direction)}
-        return keys | ({"mass": mass_on[face]} if face in mass_on else {})
+        position, normal = _numbers(axes @ (face.point - root.point)), _numbers(axes @ face.direction)
+        mass = {"mass": mass_on[face]} if face in mass_on else {}
+        return {"name": label, "position": position, "normal": normal, **mass}
 
-    material, about = _material(density)
     keys = {
         "name": name,
         "material": material,
@@ -62,18 +56,18 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
             "kind": "solid",
             "file": os.path.relpath(file.resolve(), folder.resolve()),
             "unit": part.unit,
-            "length": round(float(np.linalg.norm(way)), DIGITS),
+            "length": round(length, DIGITS),
             "origin": _numbers(root.point / METRES[part.unit]),
-            "x_axis": _numbers(x),
-            "y_axis": _numbers(y),
+            "x_axis": _numbers(axes[0]),
+            "y_axis": _numbers(axes[1]),
         },
         "reference": {"condition": "cantilever"},
         "modes": {"count": 6},
         "damping": {"ratio": 0.01},
         "interface": [interface("root", root), interface("tip", tip)],
     }
-    text = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n{about}\n"
-    text += toml_text(keys)
+    head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n{about}\n"
+    text = head + toml_text(keys)
     for label, face in others.items():
         table = toml_text({"interface": [interface(label, face)]})
         text += "\n" + "".join(f"# {line}\n" for line in table.strip().splitlines())
@@ -133,6 +127,17 @@ def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
         face = min(faces, key=lambda face: float(np.linalg.norm(face.center - mass.point)))
         masses[face] = masses.get(face, 0.0) + mass.mass
     return masses
+
+
+def _frame(part: Inspection, root: PartFace, tip: PartFace) -> tuple[Array, float]:
+    """Axes (3, 3) of the link, rows, and its length: x is square to a plane root, and to the axis of a bore."""
+    way = tip.point - root.point
+    along = (way @ root.direction) * root.direction
+    way = along if root.kind == "plane" else way - along
+    length = float(np.linalg.norm(way))
+    x = way / length
+    y = _across(part, root, x)
+    return np.stack([x, y, np.cross(x, y)]), length
 
 
 def _across(part: Inspection, root: PartFace, x: Array) -> Array:

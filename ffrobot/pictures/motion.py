@@ -144,6 +144,11 @@ def size_of(bodies: Sequence[MovingBody]) -> float:
     return float(np.ptp(np.concatenate(points), axis=0).max(initial=0.0)) or 1.0
 
 
+def largest_deflection(bodies: Iterable[MovingBody]) -> float:
+    """Of any component of any point at any output, m."""
+    return max((float(np.abs(body.deflection).max(initial=0.0)) for body in bodies), default=0.0)
+
+
 def visible_exaggeration(size: float, deflection: float) -> float:
     """The largest of 1, 2, 5, 10, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m.
 

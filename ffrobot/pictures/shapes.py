@@ -152,6 +152,7 @@ def _skin(entry: Mapping[str, Any], folder: Path) -> trimesh.Trimesh:
 
 
 SIDES = 8  # of bars that stand for lines
+BAR = 0.008  # of the robot's size: their radius
 OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
 
 
@@ -197,6 +198,13 @@ def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
         return point_shape(body)
     mesh = body_surface(link)
     return Shape(body, mesh.points, mesh.mode_shapes, body.modal, mesh.cells)
+
+
+def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, notes: list[str]) -> Shape:
+    """The surface of a body in at most `limit` triangles, its lines as bars for a robot of `size` (m)."""
+    shape = thickened(surface_shape(results, body, notes), BAR * size)
+    kept, triangles = coarsened(shape.points, triangles_of(shape.cells), limit)
+    return replace(shape, points=shape.points[kept], shapes=shape.shapes[kept], cells=triangles)
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:

@@ -287,8 +287,8 @@ def modal_body(
     integrals, n = integrals.transformed(T), len(omega2)
     nodes = {number: Interface(at.position, at.translation @ T, at.rotation @ T) for number, at in nodes.items()}
     interfaces = interfaces_of(nodes, numbers)
-    root, tip = interfaces["root"], interfaces["tip"]
-    length = float(np.linalg.norm(tip.position - root.position))
+    ends = [interfaces["root"], interfaces["tip"]]
+    length = float(np.linalg.norm(ends[1].position - ends[0].position))
     sections = section_inertia(integrals)
     S_bar_kl, S_spin = integrals.S_bar_kl, np.asarray(sections["S_spin"])
     families = _families(S_bar_kl, S_spin)
@@ -297,7 +297,7 @@ def modal_body(
     constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
     if condition == CRAIG_BAMPTON and not constraint:
         condition = "cantilever"  # which holds the root alike
-    omega = np.sqrt(omega2)
+    omega, line = np.sqrt(omega2), _stations_at(ends)
     return ModalBody(
         name=name,
         kind="beam" if sections["J_spin"] else "solid",
@@ -315,12 +315,8 @@ def modal_body(
         I_bar=without_sections.I_bar,
         S_bar_kl=S_bar_kl,
         interfaces=interfaces,
-        stations=_stations(nodes, root, tip, length),
-        mesh=PictureMesh(
-            np.array([root.position, tip.position]),
-            np.array([[0, 1]], dtype=np.int64),
-            np.array([root.translation, tip.translation]),
-        ),
+        stations=_stations(nodes, ends, length),
+        mesh=PictureMesh(line.position, np.array([[0, 1]], dtype=np.int64), line.translation),
         ffrobot_version=VERSION,
         **sections,  # type: ignore[arg-type]
     )
@@ -359,13 +355,17 @@ def _families(S_bar_kl: Array, S_spin: Array) -> tuple[str, ...]:
     return tuple(names[k] for k in np.argmax(shares, axis=0))
 
 
-def _stations(nodes: Nodes, root: Interface, tip: Interface, length: float) -> Stations:
+def _stations(nodes: Nodes, ends: list[Interface], length: float) -> Stations:
     """The nodes on the line from root to tip, ascending in x; root and tip where the body lies otherwise."""
     on_axis = [at for at in nodes.values() if np.abs(at.position[1:]).max() <= ON_AXIS * length]
-    points = sorted(on_axis if len(on_axis) > 1 else [root, tip], key=lambda at: float(at.position[0]))
+    points = sorted(on_axis if len(on_axis) > 1 else ends, key=lambda at: float(at.position[0]))
     stations = [points[0]]
     stations += [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
     if len(stations) < 2:
         raise InputError("nodes: expected root and tip at different x, found them at the same: turn the body's frame")
-    position, translation, rotation = (np.array([getattr(at, part) for at in stations]) for part in PARTS)
-    return Stations(position, translation, rotation, np.zeros(len(stations)))
+    return _stations_at(stations)
+
+
+def _stations_at(points: list[Interface]) -> Stations:
+    position, translation, rotation = (np.array([getattr(at, part) for at in points]) for part in PARTS)
+    return Stations(position, translation, rotation, np.zeros(len(points)))

@@ -1,1 +1,1 @@
-"""Linear models as functional mock-up units (FMI 2.0)."""
+"""Functional mock-up units (FMI 2.0)."""

@@ -31,14 +31,13 @@ SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of s
 
 @dataclass(frozen=True, eq=False)
 class FlexibleLink:
-    """A link of the URDF that a link file describes.
+    """A link of the URDF that a link file describes; its interface "root" is at the carrying joint.
 
     Attributes:
         name: of the link.
         file_name: of the link file beside the scene.
         place: of the URDF's link frame in the axes of the link file.
         keys: of that file.
-        root: its interface at the carrying joint.
         point_of: by the name of each joint beyond, the interface that it is on.
         remarks: on what was taken from where.
     """
@@ -47,7 +46,6 @@ class FlexibleLink:
     file_name: str
     place: Place
     keys: Mapping[str, Any]
-    root: str
     point_of: Mapping[str, str]
     remarks: tuple[str, ...]
 
@@ -79,7 +77,7 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     read_link(LinkTable(keys, folder / file_name))
     if part is not None:  # only now: the check above cannot go up from a folder that is not there yet
         geometry["file"] = os.path.relpath(part, folder.resolve())
-    return FlexibleLink(name, file_name, place, keys, "root", point_of, tuple(remarks))
+    return FlexibleLink(name, file_name, place, keys, point_of, tuple(remarks))
 
 
 def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:

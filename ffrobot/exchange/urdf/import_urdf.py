@@ -16,7 +16,7 @@ from ...common.tables import beyond_limits, shown
 from ...common.toml_files import toml_text
 from ...fe_models.link import cached_modal_body
 from ...fe_models.link_source import LinkTable
-from ...mbs.model.body import Body, from_modal_body
+from ...mbs.model.body import from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
 from .read import read_urdf
@@ -27,56 +27,48 @@ from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses
 SAME = 1e-9  # relative: less is round-off
 
 
-class Replaced:
-    """A link of the URDF, by its <inertial>, and the flexible link in its place, by stage 1; axes of the link file."""
+def _in_place_of(
+    robot: Robot, link: FlexibleLink, folder: Path, *, keep_rest: bool
+) -> tuple[dict[str, Any] | None, list[str]]:
+    """Payload that makes up for the difference to the <inertial> of the URDF, where it is to be kept; and remarks.
 
-    def __init__(self, robot: Robot, link: FlexibleLink, folder: Path) -> None:
-        """The link file will be in `folder`, which need not be there yet. Raises what stage 1 raises."""
-        self.name = link.name
-        geometry = dict(link.keys["geometry"])
-        if isinstance(file := geometry.get("file"), str):
-            geometry["file"] = str((folder / file).resolve())
-        table = LinkTable({**link.keys, "geometry": geometry}, folder / link.file_name)
-        self.body: Body = from_modal_body(link.name, cached_modal_body(table).body)
-        inertial = robot.links[link.name].inertial
-        self.before = None if inertial is None else inertial.seen_from(link.place)
-        self.after = inertial_of(self.body, np.zeros(3))
+    Its `point` is without its body. It is what the URDF has beyond the flexible link: mass m − m', first moment
+    mc − m'c', and the inertia about the frame less that of the link, taken to the center of the rest; axes of the link
+    file, which will be in `folder`, which need not be there yet.
 
-    def remark(self) -> str:
-        """Mass, center and inertia before and after, a line."""
-        has_mass = self.before is not None and self.before.mass != 0
-        before = f"{_words(self.before)} in the URDF" if has_mass else "the URDF has no mass for it"
-        return f'link "{shown(self.name)}": {before}; now {_words(self.after)}'
-
-    def rest(self) -> tuple[dict[str, Any] | None, list[str]]:
-        """Keys of the payload that makes up for the difference, but `point` without its body; and remarks.
-
-        It is what the URDF has beyond the flexible link: mass m − m', first moment mc − m'c', and the inertia about
-        the frame less that of the link, taken to the center of the rest. None where nothing is left.
-
-        Raises:
-            InputError: the flexible link has more mass than that of the URDF.
-        """
-        before, after = self.before or MASSLESS, self.after
-        mass = before.mass - after.mass
-        if mass < -SAME * after.mass:
-            raise InputError(
-                f'--keep-rest: link "{shown(self.name)}": expected a link file with less mass than the URDF,'
-                f" found {after.mass:.6g} kg of {before.mass:.6g} kg"
-            )
-        if mass <= SAME * after.mass:
-            return None, []
-        rest = before + Inertial(-after.mass, after.center, -after.inertia)
-        center, inertia = rest.center, rest.inertia
-        points = {name: point.position for name, point in self.body.points.items() if name != "mid"}
-        nearest = min(points, key=lambda name: float(np.linalg.norm(points[name] - center)))
-        keys: dict[str, Any] = {"point": nearest, "mass": mass, "center": (center - points[nearest]).tolist()}
-        about = f'link "{shown(self.name)}": the rest, {mass:.6g} kg, is a payload on "{nearest}"'
-        if np.linalg.eigvalsh(inertia)[0] >= 0 and is_possible(inertia):
-            symmetric = (inertia + inertia.T) / 2
-            return keys | {"inertia": symmetric.tolist()}, [about]
-        moments = ", ".join(f"{moment:.3g}" for moment in np.linalg.eigvalsh(inertia))
-        return keys, [f"{about}, as a point mass: its moments of inertia would be {moments} kg m², which no body has"]
+    Raises:
+        InputError: the flexible link has more mass than that of the URDF; what stage 1 raises.
+    """
+    geometry = dict(link.keys["geometry"])
+    if isinstance(file := geometry.get("file"), str):
+        geometry["file"] = str((folder / file).resolve())
+    table = LinkTable({**link.keys, "geometry": geometry}, folder / link.file_name)
+    body = from_modal_body(link.name, cached_modal_body(table).body)
+    inertial = robot.links[link.name].inertial
+    before = MASSLESS if inertial is None else inertial.seen_from(link.place)
+    after, label = inertial_of(body, np.zeros(3)), f'link "{shown(link.name)}"'
+    told = f"{_words(before)} in the URDF" if before.mass else "the URDF has no mass for it"
+    remarks = [f"{label}: {told}; now {_words(after)}"]
+    mass = before.mass - after.mass
+    if keep_rest and mass < -SAME * after.mass:
+        raise InputError(
+            f"--keep-rest: {label}: expected a link file with less mass than the URDF, found {after.mass:.6g} kg of"
+            f" {before.mass:.6g} kg"
+        )
+    if not keep_rest or mass <= SAME * after.mass:
+        return None, remarks
+    rest = before + Inertial(-after.mass, after.center, -after.inertia)
+    points = {name: point.position for name, point in body.points.items() if name != "mid"}
+    nearest = min(points, key=lambda name: float(np.linalg.norm(points[name] - rest.center)))
+    payload: dict[str, Any] = {"point": nearest, "mass": mass, "center": (rest.center - points[nearest]).tolist()}
+    about = f'{label}: the rest, {mass:.6g} kg, is a payload on "{nearest}"'
+    principal = np.linalg.eigvalsh(rest.inertia)
+    if principal[0] >= 0 and is_possible(rest.inertia):
+        payload["inertia"] = ((rest.inertia + rest.inertia.T) / 2).tolist()
+    else:
+        moments = ", ".join(f"{moment:.3g}" for moment in principal)
+        about += f", as a point mass: its moments of inertia would be {moments} kg m², which no body has"
+    return payload, [*remarks, about]
 
 
 def _words(inertial: Inertial) -> str:
@@ -239,14 +231,13 @@ def _compared(
     payloads, remarks = [], list[str]()
     for link in links.values():
         try:
-            replaced = Replaced(robot, link, folder)
+            payload, about = _in_place_of(robot, link, folder, keep_rest=keep_rest)
         except FfrobotError as error:
             if keep_rest:
                 raise
             remarks.append(f'link "{shown(link.name)}": not compared with its <inertial>: {error}')
             continue
-        payload, about = replaced.rest() if keep_rest else (None, [])
-        remarks += [replaced.remark(), *about]
+        remarks += about
         if payload is not None:
             payloads.append(payload | {"point": f"{scene.bodies[link.name]}.{payload['point']}"})
     return payloads, remarks

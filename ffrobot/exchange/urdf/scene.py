@@ -137,7 +137,7 @@ class SceneOfRobot:
         keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE[joint.type]}
         on_ground = parent is None or parent.stands_still
         first = GROUND if parent is None or on_ground else f"{self.bodies[parent.top]}.{self._point(parent, joint)}"
-        second = self.flexible[child.top].root if child.flexible else ORIGIN
+        second = "root" if child.flexible else ORIGIN
         keys["between"] = [first, f"{self.bodies[child.top]}.{second}"]
         if on_ground and np.any(place.d):
             keys["at"] = _numbers(place.d)

@@ -55,26 +55,25 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
         import trimesh
     except ModuleNotFoundError:
         return [], [NOT_LOOKED_AT] if any(link.visual or link.collision for link in robot.links.values()) else []
-    found, missing, remarks = list[MeshMass](), list[str](), list[str]()
+    masses, missing, remarks = list[MeshMass](), list[str](), list[str]()
     for link in robot.links.values():
         meshes = [shape for shape in link.visual or link.collision if isinstance(shape, MeshFile)]
         if link.inertial is None or not link.inertial.mass or not meshes:
             continue
-        paths = [mesh_path(mesh.filename, urdf) for mesh in meshes]
-        if None in paths:
-            missing += [mesh.filename for mesh, path in zip(meshes, paths, strict=True) if path is None]
+        if absent := [mesh.filename for mesh in meshes if mesh_path(mesh.filename, urdf) is None]:
+            missing += absent
             continue
         try:
-            parts = [loaded_mesh(mesh, path) for mesh, path in zip(meshes, paths, strict=True) if path is not None]
+            parts = [_loaded(mesh, urdf) for mesh in meshes]
         except Exception as error:  # whatever a reader of damaged or unknown files raises
             logger.warning("mesh of %s", link.name, exc_info=error)
             remarks.append(f'link "{shown(link.name)}": mesh not read: {type(error).__name__}: {shown(str(error))}')
             continue
-        found.append(_mass_of(link.name, trimesh.util.concatenate(parts), link.inertial))
+        masses.append(_mass_of(link.name, trimesh.util.concatenate(parts), link.inertial))
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         remarks.append(f"mesh not found: {shown(missing[0])}{more}; masses are those of <inertial> in any case")
-    return found, remarks
+    return masses, remarks
 
 
 def mesh_path(filename: str, urdf: Path) -> Path | None:
@@ -90,9 +89,10 @@ def mesh_path(filename: str, urdf: Path) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
-def loaded_mesh(mesh: MeshFile, path: Path) -> trimesh.Trimesh:
+def _loaded(mesh: MeshFile, urdf: Path) -> trimesh.Trimesh:
     """The mesh in the axes of its link, m. Raises `ModuleNotFoundError` without trimesh, else what a reader raises."""
-    place = mesh.origin.place
+    place, path = mesh.origin.place, mesh_path(mesh.filename, urdf)
+    assert path is not None
     return loaded_skin(path, mesh.scale, place.d, place.C)
 
 
@@ -191,7 +191,10 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
     """Mass and inertia of a link, and what they are made of; None where nothing says how large the link is."""
     with_density = f"with {filling.density:g} kg/m³"
     for kind, shapes in (("collision", link.collision), ("visual", link.visual)):
-        if not shapes or (filling.radius is not None and _missing(shapes, urdf)):
+        meshes = [shape for shape in shapes if isinstance(shape, MeshFile)]
+        if not shapes or (
+            filling.radius is not None and any(mesh_path(each.filename, urdf) is None for each in meshes)
+        ):
             continue
         label = f'link "{shown(link.name)}": <{kind}>'
         parts = [_of_shape(shape, urdf, filling.density, label) for shape in shapes]
@@ -205,23 +208,15 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
     return _of_primitive(rod, filling.density), what
 
 
-def _missing(shapes: tuple[MeshFile | Primitive, ...], urdf: Path) -> bool:
-    return any(isinstance(shape, MeshFile) and mesh_path(shape.filename, urdf) is None for shape in shapes)
-
-
 def _of_shape(shape: MeshFile | Primitive, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
     """Of a filled shape in axes of the link, and whether it is the convex hull of an open mesh."""
     if isinstance(shape, Primitive):
-        found, is_hull = _of_primitive(shape, density), False
+        name, inertial, is_hull = f"a {shape.shape}", _of_primitive(shape, density), False
     else:
-        found, is_hull = _of_mesh(shape, urdf, density, label)
-    if not (np.isfinite(found.mass) and found.mass > 0):
-        raise InputError(f"{label}: expected a shape with a volume, found {_name(shape)} without one")
-    return found, is_hull
-
-
-def _name(shape: MeshFile | Primitive) -> str:
-    return shown(shape.filename) if isinstance(shape, MeshFile) else f"a {shape.shape}"
+        name, (inertial, is_hull) = shown(shape.filename), _of_mesh(shape, urdf, density, label)
+    if not (np.isfinite(inertial.mass) and inertial.mass > 0):
+        raise InputError(f"{label}: expected a shape with a volume, found {name} without one")
+    return inertial, is_hull
 
 
 def _of_primitive(shape: Primitive, density: float) -> Inertial:
@@ -249,13 +244,13 @@ def _of_primitive(shape: Primitive, density: float) -> Inertial:
 
 
 def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
-    if (path := mesh_path(shape.filename, urdf)) is None:
+    if mesh_path(shape.filename, urdf) is None:
         raise InputError(
             f"{label}: expected its mesh next to the URDF, found no file {shown(shape.filename)}; --radius takes"
             " cylinders where there are no meshes"
         )
     try:
-        mesh = loaded_mesh(shape, path)
+        mesh = _loaded(shape, urdf)
         is_hull = not mesh.is_watertight
         solid = mesh.convex_hull if is_hull else mesh
         mass = density * float(solid.volume)

@@ -11,7 +11,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import in_3d
 from ...results.file import Results
-from ..motion import ground_places, moving_bodies, size_of, visible_exaggeration
+from ..motion import ground_places, largest_deflection, moving_bodies, size_of, visible_exaggeration
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
 from .shared import Curve, FigureRecord
@@ -31,7 +31,7 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     outputs = results.time(figure.analysis)
     frames = np.array([int(np.argmin(np.abs(outputs - time))) for time in figure.times], dtype=np.intp)
     bodies = moving_bodies(results, figure.analysis, frames)
-    largest = max(float(np.abs(body.deflection).max(initial=0.0)) for body in bodies)
+    largest = largest_deflection(bodies)
     s = figure.exaggeration or (1.0 if results.space.is_plane else visible_exaggeration(size_of(bodies), largest))
     exaggerated = f", deflections × {s:g}" if s != 1.0 and largest > 0.0 else ""
     places = np.concatenate([body.global_points for body in bodies], axis=1)

@@ -19,6 +19,7 @@ from ..motion import (
     PointTarget,
     ground_places,
     joint_markers,
+    largest_deflection,
     moving_bodies,
     size_of,
     targets,
@@ -28,12 +29,11 @@ from ..motion import (
 )
 from ..movie_file import Frame, MovieOptions, make_movie
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
-from ..shapes import coarsened, surface_shape, thickened, triangles_of
+from ..shapes import coarse_surface
 from .style import directions, lit, literal, normals, projected, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
 MAX_TRIANGLES = 3000  # of a body
-BAR = 0.008  # of the robot's size: radius of bars that stand for rigid bodies
 MARGIN = 0.06  # of the size of what is seen
 DIRECTIONS = 0.07  # of the robot's size: length of the arrows along x, y, z
 FACE, AXIS, GROUND, WANTED = "#8fb8d4", "#30465c", "#8b95a3", "black"
@@ -79,14 +79,13 @@ class _Picture:
         bodies = moving_bodies(results, analysis, outputs)
         self.size = size_of(bodies)
         if scale is None:
-            scale = visible_exaggeration(self.size, max(float(np.abs(b.deflection).max(initial=0.0)) for b in bodies))
+            scale = visible_exaggeration(self.size, largest_deflection(bodies))
         points, triangles, count = [], [], 0
         for body in bodies:
-            shape = thickened(surface_shape(results, body, notes), BAR * self.size)
-            kept, cells = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
-            points.append(shape.placed(scale)[:, kept])
-            triangles.append(cells + count)
-            count += len(kept)
+            shape = coarse_surface(results, body, self.size, MAX_TRIANGLES, notes)
+            points.append(shape.placed(scale))
+            triangles.append(shape.cells + count)
+            count += len(shape.points)
         self.points, self.triangles = np.concatenate(points, axis=1), np.concatenate(triangles)
         joints, T, reach = joint_markers(results.scene, bodies), len(outputs), AXIS_LENGTH * self.size
         self.joints = np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3))

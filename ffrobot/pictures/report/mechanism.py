@@ -19,19 +19,19 @@ from ..motion import (
     PointTarget,
     ground_places,
     joint_markers,
+    largest_deflection,
     moving_bodies,
     targets,
     tool_markers,
     visible_exaggeration,
 )
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH, UP, VIEWER
-from ..shapes import AMPLITUDE, body_surface, coarsened, drawn_mode, surface_shape, thickened, triangles_of
+from ..shapes import AMPLITUDE, body_surface, coarse_surface, coarsened, drawn_mode, triangles_of
 from .charts import AnalysisRun, Chart, encoded, plain, shades
 
 MAX_FRAMES = 2000
 ABOVE = 0.1  # of the mechanism's size: how far before the bodies of a planar scene its joints and paths are drawn
 MAX_TRIANGLES = 4000  # of a body
-BAR = 0.008  # of the mechanism's size: radius of bars that stand for rigid bodies
 PLAYING_SECONDS = 8.0
 SLOWEST = 1e-3  # the slider's end
 
@@ -46,10 +46,10 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
     first = {id(run.results): run.analysis for run in reversed(runs) if len(run.results.time(run.analysis)) > 1}
     opened = [first.get(id(run.results), run.results.analyses[0]) for run in runs]
     shown = [k for k, run in enumerate(runs) if run.analysis == opened[k]]  # others are hidden at first
-    corners = np.concatenate([body.global_points.reshape(-1, 3) for k in shown for body in moved[k]])
+    seen = [body for k in shown for body in moved[k]]
+    corners = np.concatenate([body.global_points.reshape(-1, 3) for body in seen])
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = float((high - low).max()) or 1.0
-    deflections = [float(np.abs(body.deflection).max(initial=0.0)) for k in shown for body in moved[k]]
     entries = [
         {
             "label": plain(run.label),
@@ -65,7 +65,7 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
     is_plane = runs[0].results.space.is_plane
     data = {
         "runs": entries,
-        "exaggeration": visible_exaggeration(size, max(deflections, default=0.0)),
+        "exaggeration": visible_exaggeration(size, largest_deflection(seen)),
         "speed": max(end / PLAYING_SECONDS, SLOWEST),
         "range": [[float(low[i] - margin[i]), float(high[i] + margin[i])] for i in range(3)],
         "size": size,
@@ -88,25 +88,24 @@ def _frames(run: AnalysisRun) -> Indices:
 def _run_data(run: AnalysisRun, bodies: list[MovingBody], size: float, notes: list[str]) -> dict[str, Any]:
     wanted = targets(run.results, run.analysis)
     return {
-        "bodies": [_body_data(run, body, BAR * size, notes) for body in bodies],
+        "bodies": [_body_data(run, body, size, notes) for body in bodies],
         "joints": [_marker_data(marker) for marker in joint_markers(run.results.scene, bodies)],
         "tools": [_marker_data(marker) for marker in tool_markers(wanted, bodies)],
         "paths": [_path_data(run, target) for target in wanted],
     }
 
 
-def _body_data(run: AnalysisRun, body: MovingBody, bar: float, notes: list[str]) -> dict[str, Any]:
-    shape = thickened(surface_shape(run.results, body, notes), bar)
-    kept, triangles = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
+def _body_data(run: AnalysisRun, body: MovingBody, size: float, notes: list[str]) -> dict[str, Any]:
+    shape = coarse_surface(run.results, body, size, MAX_TRIANGLES, notes)
     return {
         "name": plain(body.name),
         "position": encoded(body.position),
         "quaternion": encoded(body.orientation),
         "shift": encoded(body.shift),
-        "points": encoded(shape.points[kept]),
-        "shapes": encoded(shape.shapes[kept].reshape(len(kept), -1)),
+        "points": encoded(shape.points),
+        "shapes": encoded(shape.shapes.reshape(len(shape.points), -1)),
         "p": encoded(shape.coordinates),
-        "triangles": encoded(triangles, "i4"),
+        "triangles": encoded(shape.cells, "i4"),
     }
 
 

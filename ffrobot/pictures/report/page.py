@@ -7,10 +7,9 @@ import json
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...common.errors import InputError, SolveError
 from ...common.files import check_ending, write_atomically
@@ -21,7 +20,7 @@ from ...results.file import Results
 from ...results.joints import joint_coordinates
 from ...results.linear import read_metrics
 from ...results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
-from ...results.verdict import AnalysisVerdict, millimeters, number
+from ...results.verdict import millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
 from ..studies.study import Study, read_study, study_files
@@ -29,8 +28,7 @@ from .charts import AnalysisRun, Chart, folded, history_charts, path_error, runs
 from .mechanism import link_modes, mechanism, surface_modes
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """A heading row, and rows of text."""
 
     heading: tuple[str, ...]
@@ -135,29 +133,17 @@ def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-@dataclass(frozen=True)
-class RunVerdict:
-    """The verdict of one run, under its name on the page; `mood` is "good", "bad" or "" where nothing is asked."""
-
-    label: str
-    verdict: AnalysisVerdict
-
-    @property
-    def mood(self) -> str:
-        """For its color."""
-        failed = self.verdict.status != "completed"
-        return "bad" if failed or self.verdict.feasible is False else "good" if self.verdict.feasible else ""
-
-    @property
-    def headline(self) -> str:
-        """The answer."""
-        first = next(self.verdict.lines())
-        return first.removeprefix(f"{self.verdict.name}: ")
-
-    @property
-    def facts(self) -> list[str]:
-        """The lines below it."""
-        return [line.strip() for line in list(self.verdict.lines())[1:]]
+def _verdict(run: AnalysisRun) -> dict[str, Any]:
+    """The answer of one run and the lines below it; `mood` is "good", "bad" or "" where nothing is asked."""
+    verdict = run.results.verdict[run.analysis]
+    headline, *facts = verdict.lines()
+    is_bad = verdict.status != "completed" or verdict.feasible is False
+    return {
+        "label": run.label,
+        "mood": "bad" if is_bad else "good" if verdict.feasible else "",
+        "headline": headline.removeprefix(f"{verdict.name}: "),
+        "facts": [fact.strip() for fact in facts],
+    }
 
 
 def _zeros_table(runs: Sequence[AnalysisRun]) -> Table:
@@ -287,7 +273,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "modes_3d": _script_data(shapes),
         "histories": folded(histories),
         "modes": modes,
-        "verdicts": [RunVerdict(run.label, run.results.verdict[run.analysis]) for run in all_runs],
+        "verdicts": [_verdict(run) for run in all_runs],
         **{name: table(all_runs) for name, table in TABLES.items()},
         "notes": notes,
         "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
