@@ -23,8 +23,7 @@ def three(values: Iterable[float]) -> Numbers3:
     return x, y, z
 
 
-MOVING = ("revolute", "continuous", "prismatic", "planar", "floating")
-TYPES = (*MOVING, "fixed")
+TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 """Types of joints that URDF has."""
 
 
@@ -51,11 +50,6 @@ class Place:
     def __matmul__(self, inner: Place) -> Place:
         """A frame in this one, in coordinates of the other."""
         return Place(self.d + self.C @ inner.d, self.C @ inner.C)
-
-    @property
-    def inverse(self) -> Place:
-        """The other in this one."""
-        return Place(-self.C.T @ self.d, self.C.T)
 
 
 HERE = Place(np.zeros(3), np.eye(3))
