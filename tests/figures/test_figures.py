@@ -70,7 +70,7 @@ def test_figure_file_decides_what_is_drawn(results, tmp_path):
         ('curves = [{ data = "inverse/joints/O/reaction[2]", label = "" }]', "expected column 2"),
         ('kind = "path"\ncurves = [{ data = "inverse/bodies/rod/angle", label = "" }]', "expected two columns"),
         ('curves = [{ data = "a", label = "", file = "none.csv" }]', "expected an existing file"),
-        ('kind = "configurations"', 'expected the keys "analysis" and "times"'),
+        ('kind = "configurations"', 'expected "analysis", "times" in kind'),
         ('kind = "configurations"\nanalysis = "invers"\ntimes = [0.0]', 'expected the dataset "invers/time"'),
         ("colour = 1", "found an unknown key"),
     ],

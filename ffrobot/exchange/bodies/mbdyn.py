@@ -102,7 +102,7 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         raise InputError(f"record 8: expected six numbers for each of {count} nodes and each mode, found {len(shapes)}")
     shapes = shapes.reshape(modes, count, 6)
     remarks = [NOT_IN_THE_FILE]
-    matrices = {"damping": np.zeros((modes, modes))}
+    matrices: dict[str, Any] = {"damping": np.zeros((modes, modes))}
     for name_of, k in (("modal_mass", 9), ("stiffness", 10), ("damping", 13)):
         if k in records:
             matrices[name_of] = _numbers(records, k, modes**2).reshape(modes, modes)

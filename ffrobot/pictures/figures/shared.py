@@ -43,6 +43,18 @@ class Curve(Record):
     """CSV file whose first column is the time (s), drawn as separate points."""
 
 
+NEEDED = {
+    "time": ("curves",),
+    "path": ("curves",),
+    "configurations": ("analysis", "times"),
+    "torque-speed": ("curves", "joint"),
+    "bode": ("analysis", "transfers"),
+    "modes": ("analysis",),
+    "placement": ("analysis",),
+}
+"""Keys of each kind of figure."""
+
+
 class FigureRecord(Record):
     """One figure. Axes without a range take that of the data; units are in the labels of the axes.
 
@@ -93,22 +105,15 @@ class FigureRecord(Record):
 
     @model_validator(mode="after")
     def _consistent(self) -> FigureRecord:
-        if self.kind == "configurations" and (self.analysis is None or not self.times):
-            raise ValueError('expected the keys "analysis" and "times" in kind = "configurations"')
-        if self.kind in ("bode", "modes", "placement") and self.analysis is None:
-            raise ValueError(f'expected the key "analysis" in kind = "{self.kind}", found none')
-        if (self.kind == "bode") != bool(self.transfers):
+        if missing := [key for key in NEEDED[self.kind] if not getattr(self, key)]:
             raise ValueError(
-                f'expected the key "transfers" in kind = "bode" and only there, found kind = "{self.kind}"'
+                f'expected {quoted(NEEDED[self.kind])} in kind = "{self.kind}", found no {quoted(missing)}'
             )
-        if self.kind in ("time", "path", "torque-speed") and not self.curves:
-            raise ValueError(f'expected the key "curves" in kind = "{self.kind}", found none')
-        if self.exaggeration is not None and self.kind != "configurations":
-            raise ValueError(
-                f'expected the key "exaggeration" only in kind = "configurations", found kind = "{self.kind}"'
-            )
-        if self.kind == "torque-speed" and (self.joint is None or any(curve.x is None for curve in self.curves)):
-            raise ValueError('expected the key "joint", and "x" in every curve, in kind = "torque-speed"')
+        if self.kind == "torque-speed" and any(curve.x is None for curve in self.curves):
+            raise ValueError('expected the key "x" in every curve of kind = "torque-speed", found one without')
+        for key, kind in (("transfers", "bode"), ("exaggeration", "configurations")):
+            if getattr(self, key) and self.kind != kind:
+                raise ValueError(f'expected the key "{key}" only in kind = "{kind}", found kind = "{self.kind}"')
         return self
 
 
