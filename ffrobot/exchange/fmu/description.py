@@ -18,7 +18,8 @@ from ...common.arrays import Array
 from ...mbs.analysis.forward import Forward
 from .forward_model import UNITS, ForwardUnit, Variable
 
-Element, _add = ElementTree.Element, ElementTree.SubElement
+Element = ElementTree.Element
+_add = ElementTree.SubElement
 
 SOURCE = "linear.c"
 VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts as one

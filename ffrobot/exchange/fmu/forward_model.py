@@ -54,7 +54,7 @@ class Variable:
 
 def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
     """Unit of each coordinate of the joints of a scene, by "NAME", or "NAME 1", "NAME 2" of joints with several."""
-    units = {}
+    units = dict[str, str]()
     for joint in scene.get("joint", ()):
         record = JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
         of_joint = record.units or record.guess_units

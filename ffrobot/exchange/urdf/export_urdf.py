@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -187,9 +187,10 @@ class UrdfOfScene:
         for shape in shapes:
             visual = _add(link, "visual")
             _add_origin(visual, shape.origin.xyz, shape.origin.rpy)
-            keys = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}[shape.shape]
-            values = (_triple(shape.size),) if shape.shape == "box" else shape.size
-            _add(_add(visual, "geometry"), shape.shape, **dict(zip(keys, values, strict=True)))
+            sizes: dict[str, Any] = dict(zip(("radius", "length"), shape.size, strict=False))
+            if shape.shape == "box":
+                sizes = {"size": _triple(shape.size)}
+            _add(_add(visual, "geometry"), shape.shape, **sizes)
 
     def _add_frames(self, node: Node) -> None:
         """Points that carry nothing, such as tools: links without mass."""

@@ -19,7 +19,7 @@ from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
-from .read import read_urdf
+from .read import lines_of, read_urdf
 from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of
 from .scene import SceneOfRobot
 from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
@@ -215,14 +215,12 @@ def _scene(
     shapes = (shape for link in robot.links.values() for shape in link.visual)
     paths = {shape.filename: mesh_path(shape.filename, urdf) for shape in shapes if isinstance(shape, MeshFile)}
     meshes = {name: os.path.relpath(path, folder.resolve()) for name, path in paths.items() if path is not None}
-    try:
+    with lines_of(urdf):
         places = {name: link.place for name, link in links.items()}
         scene = SceneOfRobot(robot, mechanism(robot, places, fix_inertia=fix_inertia), links, meshes)
-    except InputError as error:
-        raise InputError("\n".join(f"{urdf}: {line}" for line in str(error).splitlines())) from None
-    if beyond := list(beyond_limits(dict(scene.keys))):
-        raise InputError("\n".join(f"{urdf}: {line}" for line in beyond))
-    return scene
+        if beyond := list(beyond_limits(dict(scene.keys))):
+            raise InputError("\n".join(beyond))
+        return scene
 
 
 def _compared(

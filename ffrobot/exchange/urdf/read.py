@@ -6,6 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -62,8 +63,15 @@ def read_urdf(path: Path) -> Robot:
     Raises:
         InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
     """
-    try:
+    with lines_of(path):
         return _robot_of(_root_element(read_bytes(path, "URDF file")))
+
+
+@contextmanager
+def lines_of(path: Path) -> Iterator[None]:
+    """Have each line of an `InputError` begin with the file, unless it does already."""
+    try:
+        yield
     except InputError as error:
         if str(error).startswith(f"{path}:"):
             raise

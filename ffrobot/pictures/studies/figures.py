@@ -163,8 +163,8 @@ def _draw_parallel(diagram: Parallel) -> Figure:
     for state, look in LOOKS.items():
         if state in diagram.states:
             label = diagram.best_label if state == "best" else look.label
-            line = {"color": look.color, "linestyle": look.dash, "linewidth": look.width}
-            samples.append(Line2D([], [], label=label, **line))
+            line = Line2D([], [], color=look.color, linestyle=look.dash, linewidth=look.width, label=label)
+            samples.append(line)
     if any(axis.limit is not None for axis in diagram.axes):
         samples.append(Line2D([], [], linewidth=1.6, label="limit, pointing beyond it", **_beyond(1)))
     figure.legend(handles=samples, loc="outside lower center", ncols=len(samples))

@@ -293,7 +293,7 @@ def _modal_body(path: Path) -> View:
 def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
         analyses = results.analyses if options.analysis is None else [options.analysis]
-        if options.analysis not in (None, *results.analyses):
+        if options.analysis is not None and options.analysis not in results.analyses:
             near = did_you_mean(options.analysis, results.analyses)
             raise InputError(
                 f'{path}: analysis: expected one of {", ".join(results.analyses)}, found "{options.analysis}"{near}'
