@@ -195,7 +195,8 @@ def test_bars_stand_for_lines():
     """Closed surfaces: every edge between two triangles, once each way; a ring as far off the line as asked."""
     points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.4], [0.3, 0.0, 0.4]])
     position, still = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
-    body = MovingBody("rod", position, still, None, (), np.zeros((0, 3)), position[:, :0], still[:, :0], position)
+    nothing = {"point_names": (), "points": position[:0], "deflection": position[:, :0], "sections": still[:, :0]}
+    body = MovingBody(name="rod", position=position, orientation=still, modal=None, shift=position, **nothing)
     line = Shape(body, points, np.zeros((3, 3, 0)), np.zeros((1, 0)), np.array([[0, 1], [1, 2]]))
     dot = Shape(body, points[:1], np.zeros((1, 3, 0)), np.zeros((1, 0)), np.zeros((1, 1), dtype=int))
     for shape in (thickened(line, 0.01), thickened(dot, 0.01)):
