@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 
 
 class FfrobotError(Exception):
@@ -61,6 +63,35 @@ def of_file(name: object) -> Iterator[None]:
         raise type(error)(f"{name}: {error}") from error.__cause__
     except (LinAlgError, FloatingPointError) as error:
         raise SolveError(f"{name}: {error}: numbers that differ too much in size, or are too large or small") from error
+
+
+def is_own_fault(error: BaseException) -> bool:
+    """Whether `error` is a fault of the program, since no content of a file that it reads raises such an error.
+
+    These are unknown names, attributes that modules or objects of the program lack, and wrong calls.
+    """
+    if isinstance(error, AttributeError):
+        return isinstance(error.obj, ModuleType) or str(getattr(error.obj, "__module__", "")).startswith("ffrobot")
+    if isinstance(error, TypeError):
+        return re.search(r"\(\) (missing|takes|got) ", str(error)) is not None
+    return isinstance(error, NameError)
+
+
+@contextmanager
+def blaming_file(problem: Callable[[Exception], str], where: str = "") -> Iterator[None]:
+    """Turn what a reader raises into `InputError`: `problem`(error) unless it is one already, after `where`.
+
+    Faults of the program stay what they are. `where` names file and key.
+    """
+    begin = f"{where}: " if where else ""
+    try:
+        yield
+    except FfrobotError as error:
+        raise InputError(f"{begin}{error}") from error.__cause__
+    except Exception as error:
+        if is_own_fault(error):
+            raise
+        raise InputError(f"{begin}{problem(error)}") from error
 
 
 ELSEWHERE = {

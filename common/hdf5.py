@@ -15,7 +15,7 @@ import numpy as np
 
 from . import checksum
 from .arrays import NDArray
-from .errors import FfrobotError, InputError
+from .errors import FfrobotError, InputError, is_own_fault
 from .outputs import check_regular, protected
 
 MOST_COMPRESSED = 1100  # gzip makes 1032 bytes of one at best
@@ -98,7 +98,7 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
 def blaming(*paths: Path) -> Iterator[None]:
     """Turn what reading these files raises into `InputError`, where one is not known to be as ffrobot wrote it.
 
-    With all of them sound an error is the program's own, and is left as it is.
+    With all of them sound an error is the program's own, and is left as it is, as are errors that no file raises.
     """
     try:
         yield
@@ -106,7 +106,7 @@ def blaming(*paths: Path) -> Iterator[None]:
         raise
     except Exception as error:
         doubtful = [path for path in paths if _is_doubtful(path)]
-        if not doubtful:
+        if not doubtful or is_own_fault(error):
             raise
         raise InputError(
             f"{doubtful[0]}: damaged file, or one that ffrobot did not write: {_in_words(error)}"

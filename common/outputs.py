@@ -12,7 +12,7 @@ from io import BytesIO
 from pathlib import Path
 
 from . import checksum
-from .errors import InputError
+from .errors import InputError, is_own_fault
 from .tables import shown
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -128,7 +128,9 @@ def _hdf5_format(source: Path | BytesIO) -> str:
             return "damaged"
         with h5py.File(source, "r") as file:
             return str(file.attrs.get("format", "VTKHDF" if "VTKHDF" in file else "of another program"))
-    except Exception:  # whatever h5py makes of a damaged one
+    except Exception as error:  # whatever h5py makes of a damaged one
+        if is_own_fault(error):
+            raise
         return "damaged"
 
 

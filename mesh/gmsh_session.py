@@ -17,7 +17,7 @@ import gmsh
 import numpy as np
 
 from ..common.arrays import Array, Integers
-from ..common.errors import InputError
+from ..common.errors import InputError, is_own_fault
 from .cells import SLIVER, VOLUME_ELEMENTS, cell_quality
 from .records import CIRCLE, GROWTH
 from .source import MeshBlocks, RawMesh
@@ -85,6 +85,8 @@ def mesh_model(size: float, metres: float, where: str, around: int = CIRCLE) -> 
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more special
+            if is_own_fault(error):
+                raise
             problem = error
         else:
             if not _has_slivers():

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Integers
-from ..common.errors import InputError
+from ..common.errors import InputError, blaming_file
 from .cells import in_gmsh_order
 from .source import MeshBlocks, RawMesh
 
@@ -37,13 +37,11 @@ def read_med(path: Path, where: str) -> RawMesh:
     Raises `InputError` for none, a damaged one, and what cannot be read: several meshes or steps, grids, polyhedra,
     other coordinates than Cartesian ones.
     """
-    try:
-        with h5py.File(path) as file:
-            return _mesh(file)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    except Exception as error:  # whatever h5py and NumPy meet in a damaged file
-        raise InputError(f"{where}: expected a MED file, found one that cannot be read: {error!r}") from error
+    with (
+        blaming_file("expected a MED file, found one that cannot be read: {!r}".format, where),
+        h5py.File(path) as file,
+    ):
+        return _mesh(file)
 
 
 def _mesh(file: h5py.File) -> RawMesh:

@@ -15,7 +15,7 @@ import gmsh
 import numpy as np
 
 from ..common.arrays import Array, Integers
-from ..common.errors import InputError
+from ..common.errors import InputError, blaming_file
 from .cells import GMSH_CORNERS, GMSH_NODES, VOLUME_ELEMENTS
 from .gmsh_session import extract_mesh, gmsh_session, own_entities
 from .source import MeshBlocks, RawMesh
@@ -34,16 +34,11 @@ def read_msh(path: Path, where: str) -> RawMesh:
             f'{where}: expected a mesh in gmsh\'s format, which begins with $MeshFormat, found "{began}" '
             "(gmsh's scripts are not run: save the mesh that they make)"
         )
-    try:
+    with blaming_file(
+        lambda error: f"expected a mesh in gmsh's format, found a damaged one: {' '.join(str(error).split())}", where
+    ):
         version = float(content[len(_HEADER) :].split(maxsplit=1)[0])
-        if version < 4:
-            return _Version2(content).mesh()
-        return _by_gmsh(content)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    except Exception as error:  # gmsh raises nothing more special; of a damaged file, numbers that are none or too few
-        reason = " ".join(str(error).split())
-        raise InputError(f"{where}: expected a mesh in gmsh's format, found a damaged one: {reason}") from error
+        return _Version2(content).mesh() if version < 4 else _by_gmsh(content)
 
 
 def _by_gmsh(content: bytes) -> RawMesh:

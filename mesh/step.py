@@ -11,7 +11,7 @@ import gmsh
 import numpy as np
 
 from ..common.arrays import as_floats
-from ..common.errors import InputError
+from ..common.errors import InputError, blaming_file
 from .checks import check_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .part_reader import MESHING, MESHING_CELL, allow
@@ -39,13 +39,9 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
     declared = declared_unit(text)
     with gmsh_session() as printed:
         gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
-        try:
+        with blaming_file("expected a STEP file, found one that OpenCASCADE cannot read: {}".format, where):
             gmsh.model.occ.importShapes(str(file), highestDimOnly=False, format="step")
             gmsh.model.occ.synchronize()
-        except Exception as error:  # gmsh raises nothing more special
-            raise InputError(
-                f"{where}: expected a STEP file, found one that OpenCASCADE cannot read: {error}"
-            ) from error
         _check_volumes(text, where)
         # Of a damaged file OpenCASCADE makes a part of what is left, and says so.
         if complaints := [f"{what.lower()} ({count})" for what, count in _COMPLAINT.findall(printed())]:

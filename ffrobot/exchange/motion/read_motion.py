@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, Integers, as_list, as_rows
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, blaming_file, quoted
 from ...common.extras import extras
 from ...common.tables import LARGEST, as_csv, shown
 from ...common.toml_files import read_text
@@ -159,15 +159,13 @@ def _from_bag(path: Path) -> Waypoints:
     with extras():
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
-            return _of_bag(bag)
-    except InputError:
-        raise
-    except Exception as error:  # whatever a reader of damaged files raises
+
+    def problem(error: Exception) -> str:
         is_told = type(error).__module__.startswith("rosbags")
-        reason = shown(str(error)) if is_told else "one that is damaged or not complete"
-        raise InputError(f"expected a bag of ROS, found {reason}") from error
+        return f"expected a bag of ROS, found {shown(str(error)) if is_told else 'one that is damaged or not complete'}"
+
+    with blaming_file(problem), AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        return _of_bag(bag)
 
 
 def _of_bag(bag: Any) -> Waypoints:

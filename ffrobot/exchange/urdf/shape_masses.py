@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
+from ...common.errors import InputError, is_own_fault
 from ...common.rotations import rpy_of, smallest_turn
 from ...common.tables import shown
 from ...fe_models.modal_body import ModalBody
@@ -66,6 +66,8 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
         try:
             parts = [_loaded(mesh, urdf) for mesh in meshes]
         except Exception as error:  # whatever a reader of damaged or unknown files raises
+            if is_own_fault(error):
+                raise
             logger.warning("mesh of %s", link.name, exc_info=error)
             remarks.append(f'link "{shown(link.name)}": mesh not read: {type(error).__name__}: {shown(str(error))}')
             continue
@@ -258,6 +260,8 @@ def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[I
     except ModuleNotFoundError:
         raise InputError(f"{label}: masses of meshes need trimesh: pip install trimesh pycollada") from None
     except Exception as error:  # whatever a reader of damaged or unknown files raises
+        if is_own_fault(error):
+            raise
         raise InputError(f"{label}: mesh not read: {type(error).__name__}: {shown(str(error))}") from error
     sign = np.sign(mass)  # of a mesh whose faces look inward
     return Inertial(sign * mass, np.array(solid.center_mass), sign * inertia), is_hull
