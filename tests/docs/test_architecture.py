@@ -29,6 +29,12 @@ def test_paths_exist():
     assert list(paths_to_nothing()) == []
 
 
+def test_tables_are_short():
+    """An index that is longer says that folders do not tell what is in them."""
+    tables = re.findall(r"(?:^\|.*\n)+", TEXT, flags=re.MULTILINE)
+    assert max(table.count("\n") - 2 for table in tables) <= 40  # without the two lines of the head
+
+
 def test_symbols_have_names_in_code_and_results():
     """The last part of each name in a file of the product, each dataset in the table of these."""
     source = "\n".join(
