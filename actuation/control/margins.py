@@ -21,6 +21,7 @@ from typing import Literal
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.keys import SMALLEST
 from ...common.structs import struct
 from ...common.toml_files import toml_key
 from .linear_model import LinearModel, locked_frequencies, sampled
@@ -267,6 +268,8 @@ def suggested_gains(
     names = [models[0].input_names[k].removeprefix("joint/") for k in _motor_inputs(models[0])]
     for _ in range(MOST_TIMES):
         P, D = ({n: float(f"{v:.2g}") for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
+        if min(*P.values(), *D.values()) < SMALLEST:
+            return None  # no scene may have such gains
         record = JointPid(kind="joint-pid", proportional=P, derivative=D, side=side)
         twice = joint_gains(models[0], [record], T).times(SPARE)
         if all(spectral_radius(model, g, T, delay) <= STABLE for model in models for g in (twice, twice.times(0.5))):

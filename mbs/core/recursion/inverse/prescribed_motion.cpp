@@ -39,8 +39,6 @@ template <class Space> const VectorXd &checked(const DrivenMechanism<Space> &dri
   return q;
 }
 
-double largest(const VectorXd &x) { return x.lpNorm<Eigen::Infinity>(); }
-
 } // namespace
 
 template <class Space>
@@ -48,7 +46,7 @@ PrescribedMotion<Space>::PrescribedMotion(DrivenMechanism<Space> driven, const V
     : driven_(std::move(driven)), space_(driven_.mechanism.n_v, driven_.mechanism.rotations),
       motion_(driven_.mechanism, driven_.scene, 0, checked(driven_, q).data(),
               VectorXd::Zero(driven_.mechanism.n_v).eval().data()),
-      w_(driven_.mechanism), forces_(driven_.mechanism),
+      w_(driven_.mechanism), forces_(driven_.mechanism), sizes_(driven_.mechanism),
       state_(VectorXd::Zero(driven_.mechanism.n_q + driven_.mechanism.n_v)), a_(VectorXd::Zero(driven_.mechanism.n_v)),
       required_(a_), f_(a_), Q_(a_), step_(a_), first_(-std::numeric_limits<double>::infinity()), last_(-first_) {
   const auto equations = static_cast<Index>(driven_.mechanism.constraints.size());
@@ -103,11 +101,11 @@ template <class Space> bool PrescribedMotion<Space>::find_position() {
   const auto off = [&] {
     measure();
     factorise();
-    return largest(value_) / (1 + largest(state_.head(driven_.mechanism.n_q)));
+    return sizes_.of_values(value_, q());
   };
   const auto step_on = [&] {
     const VectorXd step = -factors_.solve(value_);
-    const double turn = angles_.empty() ? 0 : largest(step(angles_));
+    const double turn = angles_.empty() ? 0 : step(angles_).template lpNorm<Eigen::Infinity>();
     go(turn > largest_turn ? largest_turn / turn : 1, step);
   };
   return iterate_to_posture(tolerance, floor, off, step_on) <= floor;

@@ -10,6 +10,7 @@
 
 #include "core/recursion/constrained_aba/derivatives.h"
 #include "core/recursion/inverse/motors.h"
+#include "core/recursion/motion/natural_sizes.h"
 
 #include <memory>
 #include <optional>
@@ -97,6 +98,7 @@ private:
   Forces<double> acting_;
   TreeWorkspace w_;
   NewtonEuler<Space> forces_;
+  const NaturalSizes<Space> sizes_;
   std::optional<Motors<Space>> motors_;
   std::vector<int> modes_in_q_, angles_; // of of_modes; of of_joints, by numbers there
   std::vector<Jet> targets_;
