@@ -17,15 +17,15 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.waypoints import spline
-from ..inversion.servo import slopes_by_differences
 from ..linear.statics import static_shapes
 from ..model.body import Body
 from ..model.divided_link import DividedLink
 from ..model.gears import refuse_prescribed_motors
-from ..model.motors import driven_mechanism, fastest_mechanism, turning_motors
+from ..model.model import Model
+from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.system import MultibodySystem
 from ..posture.posture import check_path, mobility
-from ..posture.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
+from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_by, prescribed_motion
 from ..posture.reach import check_reach
 from ..posture.redundancy import resolved
 from ..posture.start import shape_in_redundant_loops, undeformed_posture
@@ -106,7 +106,7 @@ class Fcid(TimedAnalysis):
             )  # fmt: skip
 
         try:
-            shape = _shape(context, self, motion, q, turns_frames=has_motors and bool(turning_motors(model)))
+            shape = _shape(context, self, model, motion, q)
             run = at(self.times)
         except SolveError as error:
             cause = shape_in_redundant_loops(model, MultibodySystem(model).integrated.rows)
@@ -117,14 +117,14 @@ class Fcid(TimedAnalysis):
         return replace(run, statistics=statistics).with_look(at)
 
 
-def _shape(context: Context, analysis: Fcid, motion: PrescribedMotion, q: Array, *, turns_frames: bool) -> Shape:
+def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMotion, q: Array) -> Shape:
     """P(t) of all bodies; expressions are those of whole links."""
     path, whole = context.model.scene.path, context.whole
     bodies = [node.body for node in context.model.tree.nodes]
     if analysis.shape == "given" and whole is not None:
         links = [node.body for node in whole.model.tree.nodes]
         return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
-    return prescribed_shape(path, bodies, analysis, motion, q, turns_frames=turns_frames)
+    return prescribed_shape(model, bodies, analysis, motion, q)
 
 
 def shape_nodes(analysis: Fcid) -> Array:
@@ -175,25 +175,19 @@ def given_shape_of_pieces(
     return [shape[body.name] for body in bodies]
 
 
-def prescribed_shape(
-    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array, *, turns_frames: bool
-) -> Shape:
+def prescribed_shape(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
     """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start.
-
-    `turns_frames`: whether motors turn frames, of whose forces the core has no exact slopes.
 
     Raises `SolveError` where no posture, or no static shape, is found.
     """
     if analysis.shape == "given":
-        return given_shape(scene_path, bodies, analysis)
+        return given_shape(model.scene.path, bodies, analysis)
     if analysis.shape == "static":
-        return _static(scene_path, bodies, analysis, motion, posture, turns_frames)
+        return _static(model, bodies, analysis, motion, posture)
     return [[ZERO] * body.n_modes for body in bodies]
 
 
-def _static(
-    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array, turns_frames: bool
-) -> Shape:
+def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
     nodes = shape_nodes(analysis)
     near: Array = np.empty((0, len(posture)))
@@ -207,22 +201,12 @@ def _static(
         return left
 
     def stiffness(p: Array, at: Indices) -> Array:
-        if turns_frames:
-            around = near[at].repeat(2 * p.shape[1], axis=0)
+        return left_slopes(model, motion, (p, 0 * p, 0 * p), nodes[at], near[at])[2][:, : p.shape[1]]
 
-            def left(times: Array, p: Array, v: Array, a: Array) -> Array:
-                return motion.left_on_modes(as_list(times), p, v, a, around)[1]
-
-            return slopes_by_differences(left, sizes, nodes[at], p, 0 * p, 0 * p)[2]
-        K = motion.derivatives(as_list(nodes[at]), p, 0 * p, 0 * p, near[at])[2]
-        return K.reshape(len(at), -1, p.shape[1])[:, : p.shape[1]]
-
-    omega = np.sqrt(np.concatenate([body.stiffness for body in bodies]))
-    sizes = np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
-    p, is_met = static_shapes(omega, sizes, forces, stiffness, len(nodes))
+    p, is_met = static_shapes(bodies, forces, stiffness, len(nodes))
     if not is_met.all():
         raise SolveError(
-            f'{scene_path}: analysis "{analysis.name}": no static shape was found at'
+            f'{model.scene.path}: analysis "{analysis.name}": no static shape was found at'
             f" t = {nodes[is_met.argmin()]:g} s: the links are too soft for their loads there"
         )
     functions = iter(spline(nodes, p))

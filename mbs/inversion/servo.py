@@ -15,10 +15,10 @@ from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
 from ..model.model import Model
-from ..model.motors import driven_mechanism, fastest_mechanism, turning_motors
+from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.nodes import ConstraintRow
 from ..posture.posture import check_smooth, describe_posture, mobility, solve_posture, worst_posture
-from ..posture.prescribed import PrescribedMotion, following_motors
+from ..posture.prescribed import PrescribedMotion, following_motors, left_slopes
 from ..posture.reach import out_of_reach
 from ..posture.start import undeformed_posture
 
@@ -27,7 +27,6 @@ EVERY = 10  # of these is looked at for singular ones
 PIECES = 400  # of a path that is slowed down
 TINY = 1e-12  # of its time
 MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
-DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
 
 
 class Stopped(Exception):  # noqa: N818 (nothing is wrong)
@@ -67,13 +66,6 @@ class Servo:
         return np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
 
     @property
-    def mode_sizes(self) -> Array:
-        """√J of the bodies of all modes (n,), m·√kg: coordinates that bend a link by about its length."""
-        nodes = self.model.tree.nodes
-        largest = [np.linalg.eigvalsh(node.body.inertia)[-1] for node in nodes]
-        return np.concatenate([np.full(node.body.n_modes, J**0.5) for node, J in zip(nodes, largest, strict=True)])
-
-    @property
     def mode_counts(self) -> list[int]:
         """By body of the tree."""
         return [node.body.n_modes for node in self.model.tree.nodes]
@@ -106,8 +98,8 @@ class Servo:
         def slower(function: TimeFunction) -> TimeFunction:
             values = function.sample(inside).T / factor ** np.arange(3.0)
             curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(factor * times, values))
-            found = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
-            return found.held(0.0, factor * self.end)
+            slow = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
+            return slow.held(0.0, factor * self.end)
 
         rows = tuple(_with_functions(row, slower) for row in self.model.rows)
         model = replace(self.model, rows=rows)
@@ -154,22 +146,10 @@ class Servo:
             r[part] = self.motion.left_on_modes(as_list(times[part]), p[part], v[part], a[part], near[part])[1]
         return r
 
-    def derivatives(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """M, D and K (N, n, n) of these by p̈, ṗ and p: exact, unless motors turn frames or follow a redefined loop."""
-        if not self._has_exact_slopes:
-            return slopes_by_differences(self.residuals, self.mode_sizes, times, p, v, a)
-        n = p.shape[1]
-        M, D, K = self.slopes(times, p, v, a)
-        return M[:, :n], D[:, :n], K[:, :n]
-
-    @property
-    def _has_exact_slopes(self) -> bool:
-        return not turning_motors(self.model) and not (self._is_redefined and self.model.loop_rows.any())
-
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
         """The same r (N, n), and what the motors do, τ (N, motors), N·m or N."""
-        found = self.motion.motion(as_list(times), p, v, a, self.postures(times))
-        return found.left[:, self.of_modes], found.tau
+        states = self.motion.motion(as_list(times), p, v, a, self.postures(times))
+        return states.left[:, self.of_modes], states.tau
 
     @cached_property
     def of_modes(self) -> Indices:
@@ -178,33 +158,7 @@ class Servo:
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""
-        if not self._has_exact_slopes:
-            return slopes_by_differences(
-                lambda *at: np.concatenate(self.forces(*at), axis=1), self.mode_sizes, times, p, v, a
-            )
-        found = self.motion.derivatives(as_list(times), p, v, a, self.postures(times))
-        M, D, K = (x.reshape(len(times), -1, p.shape[1]) for x in found)
-        return M, D, K
-
-
-def slopes_by_differences(
-    forces: Callable[[Array, Array, Array, Array], Array], sizes: Array, times: Array, p: Array, v: Array, a: Array
-) -> tuple[Array, Array, Array]:
-    """Derivatives (N, …, n) of `forces` (N, …) by p̈, ṗ and p; `sizes` (n,) of modes as in `Servo.mode_sizes`."""
-    modes, one = np.array([p, v, a]), np.ones(p.shape[1])
-    K, D, M = (_derivative(forces, times, modes, k, step) for k, step in enumerate((DIFFERENCE * sizes, one, one)))
-    return M, D, K
-
-
-def _derivative(
-    forces: Callable[[Array, Array, Array, Array], Array], times: Array, modes: Array, k: int, step: Array
-) -> Array:
-    """Of `forces` by modes[k] (N, …, n), about `modes` (3, N, n)."""
-    n = len(step)
-    moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
-    moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
-    r = forces(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(len(times), 2, n, -1)
-    return ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
+        return left_slopes(self.model, self.motion, (p, v, a), times, self.postures(times))
 
 
 def make_servo(
@@ -220,11 +174,11 @@ def make_servo(
     start = undeformed_posture(held).q
     freedom = mobility(held, start).freedom
     motors = sum(len(columns) for columns in model.motors.values())
-    for found, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
-        if found != freedom:
+    for count, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
+        if count != freedom:
             raise InputError(
                 f'{where}: expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom'
-                f" ({freedom}), found {found}"
+                f" ({freedom}), found {count}"
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
@@ -237,7 +191,7 @@ def make_servo(
     if not goes_on():
         raise Stopped
     times = as_floats(np.linspace(0.0, end, POSTURES))
-    servo = Servo(held, end, factor, times, start[None], where, goes_on)
+    servo = Servo(held, end, factor, times, start[None], where=where, goes_on=goes_on)
     modes = np.tile(np.concatenate([start[node.p_q] for node in model.tree.nodes]), (POSTURES, 1))
     rest = np.zeros_like(modes)
     near: Array = replace(servo, factor=1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q

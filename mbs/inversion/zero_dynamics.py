@@ -47,7 +47,7 @@ class LinearDynamics:
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
     """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
-    return LinearDynamics(times, *servo.derivatives(times, p, v, a))
+    return LinearDynamics(times, *(x[:, : p.shape[1]] for x in servo.slopes(times, p, v, a)))
 
 
 def equilibrium(servo: Servo, t: float) -> Array:
@@ -63,8 +63,7 @@ def equilibrium(servo: Servo, t: float) -> Array:
 def _shapes(servo: Servo, times: Array) -> tuple[Array, Booleans]:
     """Shapes p (N, n) at `times` (N,) with which motors alone bear the loads: r(t, p, 0, 0) = 0; which are met (N,)."""
     return static_shapes(
-        servo.scale,
-        servo.mode_sizes,
+        [node.body for node in servo.model.tree.nodes],
         lambda p, at: servo.residuals(times[at], p, 0 * p, 0 * p),
         lambda p, at: servo.slopes(times[at], p, 0 * p, 0 * p)[2][:, : p.shape[1]],
         len(times),
@@ -140,9 +139,9 @@ class Linearisation:
         growth = 0.5 * np.diff(self.times) @ (s.real[1:] + s.real[:-1])
         future = np.where(light.any(axis=0), growth > most, is_unstable(s[0]))
         flags = np.where(jumps, is_unstable(s) & ~light, future)
-        found = np.zeros(s.shape, dtype=bool)
-        np.put_along_axis(found, places, flags, axis=1)
-        return np.where(self._is_parted(found), is_unstable(self.zeros) & ~self.is_light, found)
+        later = np.zeros(s.shape, dtype=bool)
+        np.put_along_axis(later, places, flags, axis=1)
+        return np.where(self._is_parted(later), is_unstable(self.zeros) & ~self.is_light, later)
 
     def _is_parted(self, flags: Booleans) -> Booleans:
         """Which zeros (N, 2n) have another flag than their conjugates: two real ones of both sides that have met."""

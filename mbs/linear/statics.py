@@ -11,7 +11,7 @@ Optimization, 2006, sec. 18.3), so that nothing adds up in them; of equations th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Indices, as_floats, null_space
 from ...common.errors import SolveError, quoted
 from .. import _core
+from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
@@ -146,9 +147,9 @@ class Statics:
                 cause = self._cause(at, int(free[excess.argmax()]))
             return Correction(step, np.array([is_met]))
 
-        found, is_met = newton(correct, lambda at, step: tree.integrate(at, step * self.sizes), q[None])
+        rest, is_met = newton(correct, lambda at, step: tree.integrate(at, step * self.sizes), q[None])
         for node in tree.nodes if is_met[0] else ():
-            if np.sum(found[0, node.p_q] ** 2) > node.body.largest_moment:
+            if np.sum(rest[0, node.p_q] ** 2) > node.body.largest_moment:
                 is_met, cause = np.array([False]), f'"{node.body.name}" bends by more than its length there'
         if not is_met[0]:
             raise SolveError(
@@ -156,7 +157,7 @@ class Statics:
                 " motors or trajectories, or with links too soft for their loads, there may be none; else give joint"
                 " coordinates closer to it"
             )
-        return as_floats(found[0])
+        return as_floats(rest[0])
 
     def balance(self, q: Array, free: Indices) -> Balance:
         """Forces at q (n_q,), with multipliers that leave least along v[`free`]."""
@@ -200,10 +201,10 @@ class Statics:
         K = self.stiffness(q, at)
         scale = _scales(K, at.size)
         free = null_space(at.gradient * scale, DEPENDENT)
-        found, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
-        if not len(found) or found.real.min() > UNSTABLE:
+        values, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
+        if not len(values) or values.real.min() > UNSTABLE:
             return
-        moved = np.abs(free @ shapes[:, found.real.argmin()])
+        moved = np.abs(free @ shapes[:, values.real.argmin()])
         node = max(tree.nodes, key=lambda node: float(moved[np.r_[node.v, node.p_v]].max(initial=0.0)))
         bends = moved[node.p_v].max(initial=0.0) > moved[node.v].max(initial=0.0)
         what = (
@@ -218,12 +219,12 @@ class Statics:
 
     def _natural(self, q: Array) -> Array:
         """|q| (n_v,) in natural sizes, 1 of orientations."""
-        found = np.ones(self.model.tree.n_v)
+        sizes = np.ones(self.model.tree.n_v)
         for node in self.model.tree.nodes:
             if node.joint.q_count == node.joint.freedoms:
-                found[node.v] = np.abs(q[node.q]) / self.sizes[node.v]
-            found[node.p_v] = np.abs(q[node.p_q]) / self.sizes[node.p_v]
-        return found
+                sizes[node.v] = np.abs(q[node.q]) / self.sizes[node.v]
+            sizes[node.p_v] = np.abs(q[node.p_q]) / self.sizes[node.p_v]
+        return sizes
 
     def _cause(self, at: Balance, worst: int) -> str:
         """What is left at a posture that is none in equilibrium, `worst` along v."""
@@ -273,8 +274,7 @@ def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
 
 
 def static_shapes(
-    omega: Array,
-    sizes: Array,
+    bodies: Sequence[Body],
     forces: Callable[[Array, Indices], Array],
     stiffness: Callable[[Array, Indices], Array],
     count: int,
@@ -282,9 +282,11 @@ def static_shapes(
     """Shapes p (T, n) of all bodies on which `forces` leave nothing, at T = `count` times, and which are met (T,).
 
     Joints follow the shapes: `forces`(p, numbers of times) are those on modes (k, n), `stiffness` is their derivative
-    (k, n, n): of one of `NEIGHBORS` times at first, and of each where steps shrink slowly. `omega` (n,) are
-    frequencies, rad/s. Modes bend their links by about the length at `sizes` (n,): shapes beyond are not met.
+    (k, n, n): of one of `NEIGHBORS` times at first, and of each where steps shrink slowly. Shapes that bend a link by
+    more than about its length are not met.
     """
+    omega = np.sqrt(np.concatenate([body.stiffness for body in bodies]))
+    sizes = np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
     K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, SLOW), np.full(count, np.inf)
     least = STRAIGHT * float((omega * sizes).min(initial=np.inf))
 

@@ -11,6 +11,7 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.model import Model
+from ..model.motors import frame_share, turning_motors
 from ..model.nodes import rows_of_joint
 
 
@@ -51,15 +52,39 @@ def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, time
 
     Raises `SolveError` where no posture meets the rows.
     """
-    found = motion.motion(as_list(times), modes[0], modes[1], modes[2], near)
-    is_met = np.isfinite(found.q).all(axis=1)
+    states = motion.motion(as_list(times), modes[0], modes[1], modes[2], near)
+    is_met = np.isfinite(states.q).all(axis=1)
     if not is_met.all():
         raise SolveError(
             f"{model.scene.path}: no posture was found at t = {times[int(is_met.argmin())]:g} s: the prescribed shape"
             " takes the trajectories out of reach"
         )
     signs = np.array([row.sign for row in model.rows])
-    return Prescribed(found.q, found.v, found.a, found.multipliers * signs, found.required)
+    return Prescribed(states.q, states.v, states.a, states.multipliers * signs, states.required)
+
+
+def left_slopes(
+    model: Model, motion: PrescribedMotion, modes: tuple[Array, Array, Array], times: Array, near: Array
+) -> tuple[Array, Array, Array]:
+    """M, D and K (T, n + motors, n): derivatives by p̈, ṗ and p of the forces left on modes, and of motors' torques.
+
+    `modes` p, ṗ and p̈ (T, n). Without motors there are n rows.
+    """
+    at, n = as_list(times), modes[0].shape[1]
+    M, D, K = (x.reshape(len(times), -1, n) for x in motion.derivatives(at, *modes, near))
+    turning = turning_motors(model)
+    if turning and M.shape[1] > n:
+        of_modes = np.concatenate([np.arange(node.p_v.start, node.p_v.stop) for node in model.tree.nodes])
+        rows = n + np.cumsum([0, *(len(columns) for columns in model.motors.values())])
+        row_of = dict(zip(model.motors, rows.tolist(), strict=False))
+        states = motion.motion(at, *modes, near)
+        for k in np.flatnonzero(np.isfinite(states.q).all(axis=1)):
+            for joint in turning:
+                share, row = frame_share(model, joint, states.q[k]), row_of[joint]
+                for x in (M, D, K):
+                    x[k, :n] -= model.sign(joint) * np.outer(share.direction[of_modes], x[k, row])
+                K[k, :n] -= model.sign(joint) * states.tau[k, row - n] * share.slope[np.ix_(of_modes, of_modes)]
+    return M, D, K
 
 
 def joint_places(model: Model) -> Array:

@@ -20,6 +20,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.inversion.servo import Servo
 from ffrobot.mbs.model.drives import Command, Drive
+from ffrobot.mbs.model.motors import turning_motors
 from ffrobot.mbs.model.nodes import ConstraintRow, Section
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.loads import Load
@@ -289,16 +290,43 @@ def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops,
         motion = _core.SpatialRedefinedMotion(driven, driven, near[0], factor, [])
     times, modes, n = TIMES[:1], modes[:, :1], modes.shape[2]
     found = [x.reshape(-1, n) for x in motion.derivatives(times.tolist(), *modes, near[:1])]
+
+    def forces(p, v, a):
+        at = [0.0] * len(p), p, v, a, np.repeat(near[:1], len(p), axis=0)
+        return np.hstack([motion.left_on_modes(*at)[1], motion.motion(*at).tau])
+
+    check_slopes(found, forces, modes)
+
+
+def check_slopes(found, forces, modes):
+    """Derivatives (rows, n) of `forces` by p̈, ṗ and p at `modes` (3, 1, n) against differences of fourth order."""
+    n = modes.shape[2]
     for order, (exact, size) in enumerate(zip(found[::-1], (2e-5, 1e-3, 0.1), strict=True)):
         steps = size * np.array([-2.0, -1.0, 1.0, 2.0])
         moved = np.repeat(modes, 4 * n, axis=1)
         moved[order] += np.kron(np.eye(n), steps[:, None])
-        at = [0.0] * (4 * n), *moved, np.repeat(near[:1], 4 * n, axis=0)
-        forces = np.hstack([motion.left_on_modes(*at)[1], motion.motion(*at).tau]).reshape(n, 4, -1)
-        by_differences = np.einsum("k,jki->ij", np.array([1.0, -8.0, 8.0, -1.0]) / (12 * size), forces)
+        of_moved = forces(*moved).reshape(n, 4, -1)
+        by_differences = np.einsum("k,jki->ij", np.array([1.0, -8.0, 8.0, -1.0]) / (12 * size), of_moved)
         for rows in (slice(0, n), slice(n, None)):
             largest = np.abs(by_differences[rows]).max()
             np.testing.assert_allclose(exact[rows], by_differences[rows], rtol=0, atol=1e-8 * largest)
+
+
+def check_slopes_of_servo(servo, modes):
+    def forces(*moved):
+        return np.hstack(servo.forces(np.full(len(moved[0]), TIMES[0]), *moved))
+
+    check_slopes([x[0] for x in servo.slopes(TIMES[:1], *modes[:, :1])], forces, modes[:, :1])
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.6])
+def test_derivatives_of_what_motors_on_frames_leave(factor):
+    """Their moments act on modes beside, along axes that turn with the sections."""
+    model, _, modes, near = drawn(2, ["revolute"] * 3)
+    model = replace(model, scene=model.scene.model_copy(update={"motors": "frame"}))
+    servo = Servo(model, 1.0, factor, TIMES, near, "", lambda: True)
+    assert len(turning_motors(model)) == 3
+    check_slopes_of_servo(servo, modes)
 
 
 @pytest.mark.parametrize("cut", ["j2", "j4"])
@@ -326,3 +354,4 @@ def test_motors_of_planar_joints_in_loops_go_with_the_redefined_output(cut):
     assert np.abs(C[:, model.loop_rows]).max() < 1e-10
     assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, model.loop_rows]).max() < 1e-9
     assert np.abs(found.q - on_path.q).max() > 1e-3
+    check_slopes_of_servo(servo, modes)

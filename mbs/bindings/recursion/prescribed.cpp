@@ -250,7 +250,7 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
            "(1, n_q);\nNaN where none is found.")
       .def("derivatives", &derivatives_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "(M, D, K), (T, (n + motors) n) each: exact derivatives of these forces, and of torques, by p_ddot, p_dot\n"
-           "and p, with motors along joint coordinates or none.")
+           "and p, less what motors that turn frames do beside.")
       .def("motion", &states_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "States and forces for the same arguments; NaN where no posture is found.");
   nb::class_<RedefinedMotion<Space>, Motion>(m, (space + "RedefinedMotion").c_str(),

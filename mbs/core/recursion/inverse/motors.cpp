@@ -34,7 +34,8 @@ template <class Space>
 Motors<Space>::Motors(DrivenMechanism<Space> driven)
     : driven_(std::move(driven)), forces_(driven_.mechanism),
       lambda_(VectorXd::Zero(static_cast<Index>(driven_.mechanism.constraints.size()))),
-      tau_(VectorXd::Zero(static_cast<Index>(driven_.motors.size()))), Q_(VectorXd::Zero(driven_.mechanism.n_v)) {
+      tau_(VectorXd::Zero(static_cast<Index>(driven_.motors.size()))), Q_(VectorXd::Zero(driven_.mechanism.n_v)),
+      beside_(Q_) {
   for (std::size_t r = 0; r < driven_.is_path.size(); ++r)
     if (!driven_.is_path[r])
       cuts_.push_back(static_cast<int>(r));
@@ -97,6 +98,7 @@ template <class Space> void Motors<Space>::split(const double *q, const VectorXd
 template <class Space> void Motors<Space>::split(const double *q, const TreeWorkspace &w) {
   if (!cuts_.empty())
     close_loops(q, w);
+  beside_.setZero();
   for (std::size_t k = 0; k < driven_.motors.size(); ++k) {
     const Motor &motor = driven_.motors[k];
     double &tau = tau_[static_cast<Index>(k)];
@@ -105,6 +107,7 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
     if (motor.turns_frames)
       turn_frames(motor.coordinate, motor.sign * tau, w);
   }
+  Q_ += beside_;
 }
 
 template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::MatrixXd &dQ) const {
@@ -127,7 +130,7 @@ template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::Mat
 template <class Space> void Motors<Space>::turn_frames(int coordinate, double moment, const TreeWorkspace &w) {
   for (std::size_t i = 0; i < driven_.mechanism.nodes.size(); ++i)
     if (const auto &node = driven_.mechanism.nodes[i]; coordinate >= node.v && coordinate < node.p_v())
-      forces_.add_joint_moment_on_modes(i, moment, w, Q_.data());
+      forces_.add_joint_moment_on_modes(i, moment, w, beside_.data());
 }
 
 // Takes off Q what cuts and motors do, so that nothing is left of it along joint coordinates where motors suffice.

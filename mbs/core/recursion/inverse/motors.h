@@ -57,6 +57,7 @@ public:
 
   const Eigen::VectorXd &tau() const { return tau_; }        // (motors)
   const Eigen::VectorXd &left() const { return Q_; }         // (n_v) along modes: F_p
+  const Eigen::VectorXd &beside() const { return beside_; }  // (n_v) the share of left() since motors turn frames
   const Eigen::VectorXd &loops() const { return lambda_c_; } // (constraint equations of loops)
 
 private:
@@ -69,7 +70,7 @@ private:
   const DrivenMechanism<Space> driven_;
   NewtonEuler<Space> forces_;
   std::vector<int> cuts_; // constraint equations of loops; without any, what motors do is known without equations
-  Eigen::VectorXd lambda_, tau_, Q_, lambda_c_;
+  Eigen::VectorXd lambda_, tau_, Q_, beside_, lambda_c_;
   Eigen::MatrixXd columns_; // (n_v, cuts, then motors) -C_c^T, T^T
   LeastNorm factors_;       // of joint coordinates by cuts, then motors
 };

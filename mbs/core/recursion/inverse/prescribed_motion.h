@@ -64,8 +64,10 @@ public:
   Eigen::VectorXd shape_force() const;                          // (modes)
   const Motors<Space> *motors(); // in place of all that is required along joints; null where there are none
   Eigen::VectorXd left();        // (modes) that motors, or without any the constraint equations, leave
-  JointSlopes joint_slopes();    // after balance(), as the next ones; then comes the next move()
-  virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left() and of motors; exact
+  // After balance(), as the next ones; then comes the next move(). Coordinates that are a path, if any, change as in
+  // `followed`.
+  JointSlopes joint_slopes(const JointSlopes *followed = nullptr);
+  virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left() and of motors along joints; exact
   const Eigen::VectorXd &values() const { return value_; }            // C and its rate, which should be zero
   const Eigen::VectorXd &rates() const { return rate_; }
   const std::vector<Jet> &targets() const { return targets_; }

@@ -4,7 +4,6 @@
 #include "core/recursion/inverse/prescribed_motion.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace ffrobot::recursion {
 
@@ -24,8 +23,9 @@ Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, c
   return recursion::derivatives_under(driven_.mechanism, driven_.scene, t, state_, forces, target, w_);
 }
 
-// With all constraint equations C_ddot stays what it is: its derivatives at given a are -C_v a_q and -C_v a_v.
-template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
+// With all constraint equations C_ddot stays what it is: its derivatives at given a are -C_v a_q and -C_v a_v. Rows of
+// a path that is followed are coordinates, whose C_v is constant.
+template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes(const JointSlopes *followed) {
   VectorXd forces = VectorXd::Zero(a_.size());
   if (acting_.generalized)
     forces += Eigen::Map<const VectorXd>(acting_.generalized, a_.size());
@@ -36,11 +36,16 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
   JointSlopes to;
   to.q = to.v = to.a_p = to.a_v = MatrixXd::Zero(a_.size(), modes());
   to.q(driven_.of_modes, Eigen::all).setIdentity();
-  const auto put = [&](const MatrixXd &rows, MatrixXd &all) { all(joints, Eigen::all) = factors_.solve(rows); };
-  put(-C(Eigen::all, driven_.of_modes), to.q);
-  put(-matrix_product(found.rate_q, to.q), to.v);
-  put(matrix_product(C, matrix_product(found.a_v, to.q)), to.a_v);
-  put(matrix_product(C, matrix_product(found.a_q, to.q) + matrix_product(found.a_v, to.v)), to.a_p);
+  const auto put = [&](MatrixXd rows, MatrixXd JointSlopes::*which) {
+    for (Index r = 0; followed && r < rows.rows(); ++r)
+      if (driven_.is_path[static_cast<std::size_t>(r)])
+        rows.row(r) += C.row(r) * followed->*which;
+    (to.*which)(joints, Eigen::all) = factors_.solve(rows);
+  };
+  put(-C(Eigen::all, driven_.of_modes), &JointSlopes::q);
+  put(-matrix_product(found.rate_q, to.q), &JointSlopes::v);
+  put(matrix_product(C, matrix_product(found.a_v, to.q)), &JointSlopes::a_v);
+  put(matrix_product(C, matrix_product(found.a_q, to.q) + matrix_product(found.a_v, to.v)), &JointSlopes::a_p);
   return to;
 }
 
@@ -48,14 +53,12 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
 // motors, else of all constraint equations. Without motors the joints' motion J by p, C J = 0, has the forces left as
 // J^T f.
 template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const JointSlopes &joints) {
-  if (std::ranges::any_of(driven_.motors, &Motor::turns_frames))
-    throw std::invalid_argument("derivatives: expected motors along joint coordinates");
   VectorXd forces = VectorXd::Zero(a_.size());
   if (acting_.generalized)
     forces += Eigen::Map<const VectorXd>(acting_.generalized, a_.size());
   std::vector<int> active = motion_.workspace().active;
   if (const Motors<Space> *found = motors()) {
-    forces(driven_.of_modes) += found->left()(driven_.of_modes);
+    forces(driven_.of_modes) += (found->left() - found->beside())(driven_.of_modes);
     for (std::size_t k = 0; k < driven_.motors.size(); ++k)
       forces[driven_.motors[k].coordinate] += driven_.motors[k].sign * found->tau()[static_cast<Index>(k)];
     std::erase_if(active, [&](int r) { return driven_.is_path[static_cast<std::size_t>(r)]; });
@@ -81,19 +84,17 @@ template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const Joi
 
 template <class Space> LeftSlopes RedefinedMotion<Space>::slopes() {
   const auto &driven = this->driven();
-  if (&driven.mechanism != &path_.driven().mechanism)
-    throw std::invalid_argument("derivatives: expected motors in all joints of a redefined output");
   path_.balance();
   JointSlopes joints = path_.joint_slopes();
   for (MatrixXd *of : {&joints.q, &joints.v, &joints.a_p, &joints.a_v})
     (*of)(driven.of_joints, Eigen::all) *= factor_;
-  return this->left_slopes(joints);
+  return this->left_slopes(&driven.mechanism == &path_.driven().mechanism ? joints : this->joint_slopes(&joints));
 }
 
 template Derivatives PrescribedMotion<Planar>::derivatives_under(const VectorXd &, const std::vector<int> &);
 template Derivatives PrescribedMotion<Spatial>::derivatives_under(const VectorXd &, const std::vector<int> &);
-template JointSlopes PrescribedMotion<Planar>::joint_slopes();
-template JointSlopes PrescribedMotion<Spatial>::joint_slopes();
+template JointSlopes PrescribedMotion<Planar>::joint_slopes(const JointSlopes *);
+template JointSlopes PrescribedMotion<Spatial>::joint_slopes(const JointSlopes *);
 template LeftSlopes PrescribedMotion<Planar>::left_slopes(const JointSlopes &);
 template LeftSlopes PrescribedMotion<Spatial>::left_slopes(const JointSlopes &);
 template LeftSlopes RedefinedMotion<Planar>::slopes();
