@@ -58,7 +58,6 @@ void bind_data(nb::module_ &m) {
       .def_rw("h_spin", &SpatialData::h_spin)
       .def_rw("S_spin", &SpatialData::S_spin)
       .def_rw("spin_axis", &SpatialData::spin_axis)
-      .def_rw("spin_booked", &SpatialData::spin_booked)
       .def_rw("markers", &SpatialData::markers);
 }
 
