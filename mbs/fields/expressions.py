@@ -199,8 +199,8 @@ class _Translation:
             self._fail(node, f"unknown function {name!r}", _suggest(name))
         expected = 3 if name == "where" else 1
         if len(node.args) != expected or node.keywords:
-            found = len(node.args) + len(node.keywords)
-            self._fail(node, f"{name} takes {expected} argument{'s'[: expected - 1]} without names, found {found}")
+            count = len(node.args) + len(node.keywords)
+            self._fail(node, f"{name} takes {expected} argument{'s'[: expected - 1]} without names, found {count}")
         if name == "where":
             constants = [self.condition(node.args[0], nesting + 1)]
             constants += [self.number(argument, nesting + 1) for argument in node.args[1:]]

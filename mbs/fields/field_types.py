@@ -108,18 +108,18 @@ def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
 
 def one_of(record: Record, keys: tuple[str, ...]) -> str:
     """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
-    found = [key for key in keys if getattr(record, key) is not None]
-    if len(found) != 1:
-        raise ValueError(f"expected exactly one of the keys {quoted(keys)}, found {quoted(found)}")
-    return found[0]
+    given = [key for key in keys if getattr(record, key) is not None]
+    if len(given) != 1:
+        raise ValueError(f"expected exactly one of the keys {quoted(keys)}, found {quoted(given)}")
+    return given[0]
 
 
 def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple[str, ...]) -> list[str]:
     """Which of the `optional` keys are set. Raises `ValueError` unless all are `allowed` and there is at least one."""
-    found = [key for key in optional if getattr(record, key) is not None]
-    if not found or not set(found) <= set(allowed):
-        raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(found)}')
-    return found
+    given = [key for key in optional if getattr(record, key) is not None]
+    if not given or not set(given) <= set(allowed):
+        raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(given)}')
+    return given
 
 
 def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:

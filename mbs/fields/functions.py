@@ -107,11 +107,11 @@ def check_derivatives(function: TimeFunction, end: float, describe: str) -> None
     with np.errstate(all="ignore"):  # poles: nothing is known there
         once, twice = (np.stack([_differences(function, times, h * part * end) for h in STEPS]) for part in (1.0, 0.5))
     for order, quantity in ((1, "rate"), (2, "acceleration")):
-        found = twice[:, order - 1]
-        known, wrong = _judged(once[:, order - 1], found, given[order], ROUNDING * np.abs(given[order - 1]).max() / end)
+        slope = twice[:, order - 1]
+        known, wrong = _judged(once[:, order - 1], slope, given[order], ROUNDING * np.abs(given[order - 1]).max() / end)
         if wrong.any():
             k = int(np.flatnonzero(wrong)[0])
-            said = found[np.flatnonzero(known[:, k])[0], k]
+            said = slope[np.flatnonzero(known[:, k])[0], k]
             raise InputError(
                 f"{describe}: expected the derivatives of the value, (value, rate, acceleration), found the {quantity}"
                 f" {given[order, k]:.6g} at t = {times[k]:.6g} s, where differences of the"

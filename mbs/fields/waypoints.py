@@ -61,12 +61,12 @@ class Waypoints:
         for pattern in OF_A_JOINT:
             name = pattern.format(joint)
             ends = (f"/{name}",) if name != pattern else ()
-            found = [k for k, column in enumerate(self.columns) if column == name or column.endswith(ends)]
-            if len(found) > 1:
-                names = quoted(self.columns[k] for k in found)
+            numbers = [k for k, column in enumerate(self.columns) if column == name or column.endswith(ends)]
+            if len(numbers) > 1:
+                names = quoted(self.columns[k] for k in numbers)
                 raise ValueError(f'expected one column of joint "{joint}", found {names}')
-            if found:
-                return replace(self, columns=("value",), values=self.values[:, found])
+            if numbers:
+                return replace(self, columns=("value",), values=self.values[:, numbers])
         return self
 
     def spline(self) -> Piecewise:
@@ -100,18 +100,18 @@ class Waypoints:
             return ""
         of_rows, curve = _accelerations(self.times, self.values).max(axis=0), self.spline()
         of_rows = np.where(of_rows > 0.0, of_rows, np.inf)
-        found = []
+        holds = []
         for last, first in zip(ends[:-1], begins[1:], strict=True):
             rows = self.times[max(last - 2, 0) : first + 3]
             times = (rows[:-1, None] + np.linspace(0.0, 1.0, DENSE) * np.diff(rows)[:, None]).ravel()
-            found.append(float((np.abs(curve.sample(times, 2)).max(axis=0) / of_rows).max()))
-        k = int(np.argmax(found))
-        if found[k] < STOPPING:
+            holds.append(float((np.abs(curve.sample(times, 2)).max(axis=0) / of_rows).max()))
+        k = int(np.argmax(holds))
+        if holds[k] < STOPPING:
             return ""
-        more = f", one of {len(found)} holds" if len(found) > 1 else ""
+        more = f", one of {len(holds)} holds" if len(holds) > 1 else ""
         return (
             f"rows from t = {self.times[ends[k]]:g} to {self.times[begins[k + 1]]:g} s are alike{more}: the path rests"
-            f" there, by accelerations {found[k]:.2g} times those of the rows. Where it does not, leave one of them"
+            f" there, by accelerations {holds[k]:.2g} times those of the rows. Where it does not, leave one of them"
             " out, or smooth the record"
         )
 
@@ -137,10 +137,10 @@ def load_waypoints(path: Path) -> Waypoints:
             if factor != 1.0:
                 remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in (unit[2] or unit[3]) else "rad"}')
     try:
-        found = waypoints_of(names, times, values, lambda k: f"line {lines[k]}")
+        waypoints = waypoints_of(names, times, values, lambda k: f"line {lines[k]}")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return replace(found, remarks=tuple(f"{path.name}: {remark}" for remark in (*remarks, *found.remarks)))
+    return replace(waypoints, remarks=tuple(f"{path.name}: {remark}" for remark in (*remarks, *waypoints.remarks)))
 
 
 def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Callable[[int], str]) -> Waypoints:

@@ -66,8 +66,8 @@ def bernstein_integral(scheme: Scheme) -> Array:
     m = np.arange(s)
     powers = scheme.to_powers / (m[:, None] + 1)  # of ξ, ξ² …, ξ^s
     shares: Array = np.array([[comb(i, k + 1) / comb(s, k + 1) for k in m] for i in range(s + 1)])
-    found: Array = shares @ powers
-    return found
+    integral: Array = shares @ powers
+    return integral
 
 
 GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)

@@ -74,9 +74,9 @@ def is_minimum_phase(linear: Linearisation) -> bool:
 def describe_zeros(linear: Linearisation) -> str:
     """The slowest zeros in the right half plane, in 1/s."""
     row = max(linear.zeros, key=lambda s: float(s.real.max()))
-    found = row[is_unstable(row)]
-    shown = ", ".join(f"{s.real:.4g}{f' ± {s.imag:.4g}i' if s.imag > 0 else ''}" for s in found if s.imag >= 0)
-    return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(found)} in all)"
+    unstable = row[is_unstable(row)]
+    shown = ", ".join(f"{s.real:.4g}{f' ± {s.imag:.4g}i' if s.imag > 0 else ''}" for s in unstable if s.imag >= 0)
+    return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(unstable)} in all)"
 
 
 def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
@@ -236,14 +236,14 @@ def outcome_along(
 ) -> Outcome:
     """The motion whose modes follow the curve, at `times` (T,), up to the first without a posture."""
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
-    found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
-    is_met = np.isfinite(found.q).all(axis=1)
+    states = servo.motion.motion(as_list(times), *modes, servo.postures(times))
+    is_met = np.isfinite(states.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
     return Outcome(
         analysis=analysis,
         model=without_paths(model),
-        motion=Motion(times, found.q, found.v, found.a, found.loops).at(kept),
-        forces=Forces(required=found.required).at(kept),
+        motion=Motion(times, states.q, states.v, states.a, states.loops).at(kept),
+        forces=Forces(required=states.required).at(kept),
         statistics=statistics,
         prescribed=Prescription(servo.equations, shape_of(curve, servo.mode_counts), servo.near[0]),
     )

@@ -90,7 +90,7 @@ def invert(
     breaks = np.unique([-pre, 0.0, end, end + post]) if is_marched else _breaks(pre, end, post)
     breaks = with_corners(breaks, (*(target.function for target in servo.targets()), *servo.model.scene.load_functions))
     for scheme in schemes:
-        problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, finish, scheme)
+        problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, end=finish, scheme=scheme)
         solver = _Solver(problem, tolerance * force, progress)
         try:
             if is_marched:
@@ -105,8 +105,8 @@ def invert(
             break
     assert solver.curve is not None
     return Inversion(
-        servo, linear, solver.curve, solver.status, solver.iterations, solver.unmet / force, solver.worst,
-        _off_rest(servo, solver.curve, start.state),
+        servo, linear, solver.curve, solver.status, solver.iterations, unmet=solver.unmet / force, worst=solver.worst,
+        off_rest=_off_rest(servo, solver.curve, start.state),
     )  # fmt: skip
 
 
@@ -123,12 +123,12 @@ class _Solver:
         """On all breaks; `along`(states, breaks): derivatives, taken where those of the last mesh do not lead on."""
         is_near = True  # derivatives to the guess
         for refinement in range(MOST_REFINEMENTS):
-            found = collocate(self.problem, breaks, guess)
-            self.iterations += found.iterations
-            unmet, self.worst = np.full(len(breaks) - 1, np.inf), found.worst
-            self.status = "mesh too coarse" if found.converged else "inversion not converged"
-            if found.converged:
-                self.curve, unmet = found.curve, self._unmet(found.curve)
+            collocated = collocate(self.problem, breaks, guess)
+            self.iterations += collocated.iterations
+            unmet, self.worst = np.full(len(breaks) - 1, np.inf), collocated.worst
+            self.status = "mesh too coarse" if collocated.converged else "inversion not converged"
+            if collocated.converged:
+                self.curve, unmet = collocated.curve, self._unmet(collocated.curve)
                 self.worst = float(breaks[unmet.argmax()])
             if unmet.max() <= self.most:
                 self.status, self.unmet = "completed", float(unmet.max())
@@ -136,15 +136,15 @@ class _Solver:
             if not self.progress(float(breaks[0] + (breaks[-1] - breaks[0]) * refinement / MOST_REFINEMENTS)):
                 self.status = "interrupted"
                 break
-            if found.converged:
-                breaks, guess, is_near = cut(breaks, as_floats(unmet / self.most)), _states(found.curve), False
+            if collocated.converged:
+                breaks, guess, is_near = cut(breaks, as_floats(unmet / self.most)), _states(collocated.curve), False
             elif not is_near:
                 self.problem, is_near = replace(self.problem, derivatives=along(guess, breaks)), True
             else:
                 breaks = halved(breaks)
             if len(breaks) > MOST_INTERVALS + 1:
                 break
-        self.unmet, self.curve = float(unmet.max()), self.curve or found.curve
+        self.unmet, self.curve = float(unmet.max()), self.curve or collocated.curve
 
     def march(self, corners: Array, about: Callable[[float, Array], Derivatives]) -> None:
         """One window after the other between `corners`, each from where the last one ended, as long as r lets it be.
@@ -158,22 +158,22 @@ class _Solver:
             last = min(float(corners[corners > t][0]), t + WINDOW * width)
             window = as_floats(np.linspace(t, last, int(np.ceil((last - t) / width - 1e-6)) + 1))
             self.problem = replace(self.problem, derivatives=about(t, y), start=Boundary(np.eye(2 * n), y))
-            found = collocate(self.problem, window, _constant(y[:n]))
-            self.iterations += found.iterations
-            unmet = float(self._unmet(found.curve).max()) if found.converged else np.inf
+            collocated = collocate(self.problem, window, _constant(y[:n]))
+            self.iterations += collocated.iterations
+            unmet = float(self._unmet(collocated.curve).max()) if collocated.converged else np.inf
             wider = float(np.clip(0.9 * (self.most / max(unmet, TINY)) ** 0.25, 0.2, 4.0))
             width = float(window[1] - window[0]) * wider
             if unmet <= self.most:
                 self.unmet, t = max(self.unmet, unmet), last
-                self._append(found.curve)
-                p, v, _ = _states(found.curve)(window[-1:])
+                self._append(collocated.curve)
+                p, v, _ = _states(collocated.curve)(window[-1:])
                 y = np.concatenate([p[0], v[0]])
                 self.status = "completed" if t >= end else "interrupted"
                 if not self.progress(t):
                     break
             elif width < SHORTEST * (end - float(corners[0])):
-                self.status = "mesh too coarse" if found.converged else "inversion not converged"
-                self.curve, self.worst = self.curve or found.curve, found.worst
+                self.status = "mesh too coarse" if collocated.converged else "inversion not converged"
+                self.curve, self.worst = self.curve or collocated.curve, collocated.worst
                 break
 
     def _append(self, curve: PPoly) -> None:
@@ -229,8 +229,8 @@ def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) 
     speeds = np.where([of if excess > 0 else ~of for of in held], np.abs(zeros), 0.0).max(axis=1)
     rows = [int(of.sum()) for of in held]
     rows[int(speeds.argmax())] -= excess
-    found = [_boundary(servo, t, zeros[k], held[k], rows[k]) for k, t in enumerate((first, last))]
-    return found[0], found[1]
+    both = [_boundary(servo, t, zeros[k], held[k], rows[k]) for k, t in enumerate((first, last))]
+    return both[0], both[1]
 
 
 def _boundary(servo: Servo, t: float, s: ComplexArray, is_held: Booleans, count: int) -> Boundary:

@@ -116,11 +116,22 @@ class LinearEquations:
         K_more, D_more = gear_matrices(tree, q)
         K_more -= sum((moments[joint] * shares[joint].slope for joint in shares), np.zeros_like(K_more))
         return LinearMechanism(
-            t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),
-            H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
-            self._inputs(H, shares, points), self._outputs(state, H, points), MappingProxyType(points),
-            MappingProxyType(tool_axes), H, H_dot, self._signs * force - on_modes @ H, self.names,
-        )  # fmt: skip
+            t,
+            q,
+            v,
+            a,
+            M=sides * (M + M.T) / 2,
+            D=H.T @ D_more @ H - sides * (M @ by_rate),
+            K=H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
+            inputs=self._inputs(H, shares, points),
+            outputs=self._outputs(state, H, points),
+            points=MappingProxyType(points),
+            tool_axes=MappingProxyType(tool_axes),
+            transformation=H,
+            transformation_rate=H_dot,
+            force=self._signs * force - on_modes @ H,
+            names=self.names,
+        )
 
     def _followers(self, state: KnownStates, t: float) -> tuple[Array, Array]:
         """H (n_v, f), and what gives the coordinates that follow from the rates that rows would get (n_v − f, rows)."""
@@ -144,38 +155,38 @@ class LinearEquations:
 
     def _inputs(self, H: Array, shares: Mapping[str, FrameShare], points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: a unit of each motor, and of forces on points along x, y, z."""
-        found = {}
+        inputs = {}
         for joint, columns in self.model.motors.items():
             beside = shares[joint].direction @ H if joint in shares else 0.0
             for name, k in _labelled(joint, columns):
-                found[name] = self.model.sign(joint) * (H[k] + beside)
-        return MappingProxyType(found | self._along_axes("force", points))
+                inputs[name] = self.model.sign(joint) * (H[k] + beside)
+        return MappingProxyType(inputs | self._along_axes("force", points))
 
     def _outputs(self, state: KnownStates, H: Array, points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: joint coordinates, those of motors behind compliant gears, and places of points."""
-        tree, found = self.model.tree, dict[str, Array]()
+        tree, rows = self.model.tree, dict[str, Array]()
         for joint in self.model.scene.joint:
             if joint.name in tree.carried:
                 sign = tree.nodes[tree.carried[joint.name]].sign
-                found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
+                rows |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
         gradients = self.model.along_cut.measured(state.q)[1][0]
         for cut in tree.cut_joints:
             own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
-            found |= dict(zip(_names(cut.name, len(own)), own, strict=True))
-        found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
-        return MappingProxyType(found | self._along_axes("point", points))
+            rows |= dict(zip(_names(cut.name, len(own)), own, strict=True))
+        rows |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
+        return MappingProxyType(rows | self._along_axes("point", points))
 
     def _points(self, state: KnownStates, H: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """(k, f) translations along the axes of the space, then rotations, of each point; (k, k) axes of tools."""
-        tree, space, found, axes = self.model.tree, SPACES[self.model.scene.space], {}, {}
+        tree, space, motions, axes = self.model.tree, SPACES[self.model.scene.space], {}, {}
         components = [*space.translations, *(3 + k for k in space.rotations)]
         places = tree.places(np.tile(state.q, (H.shape[1], 1)), H.T)  # a unit of each of s by itself
         for point, place in self.points.items():
             motion = places.at(tree.section(place))
-            found[point] = np.hstack([motion.velocity, motion.omega])[:, components].T
+            motions[point] = np.hstack([motion.velocity, motion.omega])[:, components].T
             if place in tree.tools:
                 axes[point] = np.kron(np.eye(2), motion.F[0].T)[np.ix_(components, components)]
-        return found, axes
+        return motions, axes
 
     def _along_axes(self, kind: str, points: Mapping[str, Array]) -> dict[str, Array]:
         """By "KIND/BODY.POINT/x", …: translations of points."""
@@ -249,9 +260,9 @@ def _independent(model: Model, q: Array) -> Indices:
 
 def _bracket(nodes: Sequence[Node], v: Array) -> Array:
     """B (n_v, n_v) of velocities (or accelerations) v: −ω~ where three of v turn an orientation."""
-    found = np.zeros((len(v), len(v)))
+    B = np.zeros((len(v), len(v)))
     for node in nodes:
         if node.joint.q_count > node.joint.freedoms:
             turning = slice(node.v.stop - 3, node.v.stop)
-            found[turning, turning] = -skew(v[turning])
-    return found
+            B[turning, turning] = -skew(v[turning])
+    return B

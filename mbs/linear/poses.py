@@ -58,16 +58,16 @@ class PoseEvaluator:
         before = self._place(q)
         straight, mechanism, bent = self._equilibrium(q)
         torque = np.array([mechanism.force[mechanism.names.index(name)] for name in self.motors])
-        found = {"place": before, "sag": self._place(bent) - before, "torque": torque}
-        found["manipulability"] = np.array(self._manipulability(straight))
+        values = {"place": before, "sag": self._place(bent) - before, "torque": torque}
+        values["manipulability"] = np.array(self._manipulability(straight))
         for condition, found_there in joint_conditions(mechanism).items():
-            found |= {f"joints_{condition}/{name}": value for name, value in self._of_condition(found_there).items()}
+            values |= {f"joints_{condition}/{name}": value for name, value in self._of_condition(found_there).items()}
             if len(self._omega):
                 response = frequency_response(found_there.free, mechanism.of_tool(self.point), self._omega)
-                found[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
+                values[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
         places = tree.places(q[None])
-        found["robot"] = np.array([[places.at(end).r[0] for end in pair] for pair in self.segments])
-        return found
+        values["robot"] = np.array([[places.at(end).r[0] for end in pair] for pair in self.segments])
+        return values
 
     def _all(self, q: Array) -> Array:
         """With the coordinates of motors behind compliant gears that are not strained."""
@@ -111,10 +111,10 @@ class PoseEvaluator:
 
 def _segments(model: Model, point: str) -> list[tuple[Section, Section]]:
     """From the section at which a body is carried to those at which it carries others, and to the point."""
-    tree, found = model.tree, []
+    tree, segments = model.tree, []
     for number, node in enumerate(tree.nodes):
         ends = [other.inner for other in tree.nodes if other.inner.body == number]
         if point.partition(".")[0] == node.body.name:
             ends.append(tree.section(point))
-        found += [(node.outer, end) for end in ends]
-    return found
+        segments += [(node.outer, end) for end in ends]
+    return segments

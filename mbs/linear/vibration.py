@@ -103,7 +103,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     """
     model = with_prescribed_motors(resolved(model, end))
     unconstrained = without_rows(model)
-    state, found = undeformed_posture(model), []
+    state, spectra = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
         q = solve_posture(model, float(t), state.q)
         if q is None:
@@ -112,8 +112,8 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
                 f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
-        found.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
-    return common_modes(model.scene.path, found, modes)
+        spectra.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
+    return common_modes(model.scene.path, spectra, modes)
 
 
 def common_modes(path: Path, found: Sequence[tuple[Array, Array]], modes: int) -> PathFrequencies:

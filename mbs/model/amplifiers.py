@@ -67,11 +67,11 @@ class Amplifiers:
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
         """Voltages (T, k) at `times` (T,), s, of those `wanted` (T, k), linear between; `strain` (T, k) as before."""
         late = [np.interp(times - d, times, V) for d, V in zip(self.delay, wanted.T, strict=True)]
-        asked, found = np.stack(late, axis=1), np.zeros_like(wanted)
-        found[0] = np.clip(asked[0], *self.range)
+        asked, limited = np.stack(late, axis=1), np.zeros_like(wanted)
+        limited[0] = np.clip(asked[0], *self.range)
         for k, h in enumerate(np.diff(times)):
-            found[k + 1] = self.advance(h, found[k], (asked[k], asked[k + 1]), (strain[k] + strain[k + 1]) / 2)[0]
-        return found
+            limited[k + 1] = self.advance(h, limited[k], (asked[k], asked[k + 1]), (strain[k] + strain[k + 1]) / 2)[0]
+        return limited
 
 
 class Driven(Protocol):

@@ -242,10 +242,10 @@ def scaled(body: Body, *, mass: float = 1.0, stiffness: float = 1.0) -> Body:
     if (of := body.stiffening) is not None:
         scaled_up = {key: mass * getattr(of, key) for key in ("K_s", "K_x", "S_turned")}
         heavier = replace(heavier, stiffening=replace(of, **scaled_up))
-    found = transformed(heavier, np.eye(body.n_modes) / mass**0.5, body.stiffness * stiffness / mass)
+    heavy = transformed(heavier, np.eye(body.n_modes) / mass**0.5, body.stiffness * stiffness / mass)
     if (kept := body.reduction) is not None:
-        found = replace(found, reduction=replace(kept, whole=scaled(kept.whole, mass=mass, stiffness=stiffness)))
-    return found
+        heavy = replace(heavy, reduction=replace(kept, whole=scaled(kept.whole, mass=mass, stiffness=stiffness)))
+    return heavy
 
 
 def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> Body:

@@ -67,16 +67,16 @@ def with_prescribed_motors(model: Model) -> Model:
     """
     if not any(path.motor for path in model.scene.trajectory):
         return model
-    found = with_compliance(model)
-    outputs = {gear.motor.v.start for gear in found.tree.gears}
-    behind = {gear.joint.v.start for gear in found.tree.gears}
-    for row in found.rows if outputs else ():
+    geared = with_compliance(model)
+    outputs = {gear.motor.v.start for gear in geared.tree.gears}
+    behind = {gear.joint.v.start for gear in geared.tree.gears}
+    for row in geared.rows if outputs else ():
         if row.is_trajectory and (row.kind != "coordinate" or row.coordinate in behind):
             raise InputError(
                 f'{model.scene.path}: trajectory: expected motors ("motor") in all of them, or in none, with compliant'
                 f' gears, found "{row.owner}" with trajectories of motors'
             )
-    return found
+    return geared
 
 
 def refuse_prescribed_motors(model: Model, analysis: Analysis) -> None:
@@ -135,11 +135,11 @@ def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
 
 
 def _of_frictions(tree: KinematicTree, v: Array, of: Callable[[Friction, Array], Array]) -> Array:
-    found = np.zeros_like(v)
+    force = np.zeros_like(v)
     for node in tree.nodes:
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            found[:, column] = of(friction, v[:, column])
-    return found
+            force[:, column] = of(friction, v[:, column])
+    return force
 
 
 def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:

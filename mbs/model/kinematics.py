@@ -73,18 +73,18 @@ class Markers:
 
     def row(self, row: ConstraintRow) -> _core.ConstraintModel:
         """A row of constraints between markers."""
-        found = _core.ConstraintModel()
-        found.name, found.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
+        row_model = _core.ConstraintModel()
+        row_model.name, row_model.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
         if row.kind == "coordinate":
-            found.coordinate = row.coordinate
-            return found
+            row_model.coordinate = row.coordinate
+            return row_model
         a, b = self.place(row.a), self.place(row.b)
         if row.law is not None:  # see ConstraintRow: of "dot" rows it is that of b
             turning = (-1, self._turning_marker(row.law))
             a, b = (a, turning) if row.kind == "dot" else (turning, b)
-        found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
-        found.f, found.g, found.coordinate = np.array(row.f), np.array(row.g), row.coordinate
-        return found
+        row_model.a, row_model.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
+        row_model.f, row_model.g, row_model.coordinate = np.array(row.f), np.array(row.g), row.coordinate
+        return row_model
 
     def bodies(self, driven: Booleans | None = None) -> list[_core.SpatialBody]:
         """With all markers; `driven` (n_v,): coordinates along which given forces act."""
@@ -288,16 +288,16 @@ class Places:
         return self._motion(self._numbers.get((number, "", None), number))
 
     def _motion(self, number: int) -> Motion:
-        found = self._motions[:, number]
-        return Motion(found[:, :3], found[:, 3:12].reshape(-1, 3, 3), found[:, 12:15], found[:, 15:])
+        columns = self._motions[:, number]
+        return Motion(columns[:, :3], columns[:, 3:12].reshape(-1, 3, 3), columns[:, 12:15], columns[:, 15:])
 
     def at(self, section: Section) -> Motion:
         """Of the triad of a section."""
         if section.body < 0:
             zero = np.zeros((len(self._motions), 3))
             return Motion(section.position + zero, np.tile(section.triad, (len(zero), 1, 1)), zero, zero)
-        found = self._motion(self._numbers[_key(section)]) if section.point else self.frame(section.body)
-        return found if section.still else found._replace(F=found.F @ section.triad)
+        motion = self._motion(self._numbers[_key(section)]) if section.point else self.frame(section.body)
+        return motion if section.still else motion._replace(F=motion.F @ section.triad)
 
 
 def _key(section: Section) -> tuple[object, ...]:

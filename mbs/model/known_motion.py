@@ -108,10 +108,10 @@ class MotionForces:
     @cached_property
     def at_points(self) -> list[list[tuple[Section, Wrench]]]:
         """By body of the tree all that acts on it at its points and its frame, section by section."""
-        found: list[list[tuple[Section, Wrench]]] = [[] for _ in self.system.model.tree.nodes]
+        wrenches: list[list[tuple[Section, Wrench]]] = [[] for _ in self.system.model.tree.nodes]
         for number, section in enumerate(self.system.sections):
-            found[section.body].append((section, _wrench(self.found.sections, number)))
-        return found
+            wrenches[section.body].append((section, _wrench(self.found.sections, number)))
+        return wrenches
 
     def of_body(self, number: int) -> SectionMotion:
         """Of the frame of body no. `number`."""
@@ -133,26 +133,26 @@ def _motion(table: Array, number: int) -> SectionMotion:
 def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
     """Under multipliers (T, rows) and all given forces of the system at `times` (T,)."""
     of_core = multipliers * system.row_signs
-    found = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
-    return MotionForces(system, found)
+    forces = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
+    return MotionForces(system, forces)
 
 
 def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
     """What multipliers (T, rows) do by themselves to joints and constraints, at q (T, n_q)."""
-    found = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.row_signs)
-    return MotionForces(system, found)
+    forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.row_signs)
+    return MotionForces(system, forces)
 
 
 def rotor_torques(model: Model, states: States, times: Array) -> Array:
     """J u̇ (T, bodies) N·m about the axis of each rotor in a revolute joint, by the body that the joint carries."""
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
-    places, found = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
+    places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
     for number, node in enumerate(tree.nodes):
         if node.joint.type == "revolute":
             axis = places.at(node.inner).F[:, :, 2]
-            found[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
-    return found
+            torque[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
+    return torque
 
 
 def required_forces(model: Model, state: States, times: Array) -> Array:
@@ -171,5 +171,5 @@ def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
     T, n = len(q), model.tree.n_v
     system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a
-    found = system.core.required_forces(system.scene, [t] * len(a), *states).reshape(T, n + 1, n)
-    return as_floats(np.swapaxes(found[:, 1:] - found[:, :1], 1, 2))
+    f = system.core.required_forces(system.scene, [t] * len(a), *states).reshape(T, n + 1, n)
+    return as_floats(np.swapaxes(f[:, 1:] - f[:, :1], 1, 2))

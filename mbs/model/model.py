@@ -65,13 +65,13 @@ class Model:
         Of z of b against z of a and, of joints that do not turn, x against x. An owner's rows are of x and y of a with
         z of b and, of such joints, of x of a with y of b.
         """
-        aligned, found = dict[str, list[ConstraintRow]](), list[ConstraintRow]()
+        aligned, turning = dict[str, list[ConstraintRow]](), list[ConstraintRow]()
         for row in (row for row in self.rows if row.kind == "dot"):
             aligned.setdefault(row.owner, []).append(row)
         for first, second, *still in (rows for rows in aligned.values() if len(rows) > 1):
-            found.append(replace(first, f=np.cross(first.f, second.f)))
-            found += [replace(row, g=np.cross(row.g, first.g)) for row in still]
-        return [row.owner for row in found], Kinematics(self.tree.nodes, rows=found)
+            turning.append(replace(first, f=np.cross(first.f, second.f)))
+            turning += [replace(row, g=np.cross(row.g, first.g)) for row in still]
+        return [row.owner for row in turning], Kinematics(self.tree.nodes, rows=turning)
 
     @cached_property
     def along_cut(self) -> AlongCut:
@@ -161,10 +161,10 @@ def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
 def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
     """Raise `InputError` for a motor without a rotor, or a compliant gear, in the joint at which a loop is cut."""
     for joint in tree.loops:
-        if found := joint.asks_for_coordinate:
+        if key := joint.asks_for_coordinate:
             raise InputError(
                 f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
-                f" rotor_inertia nor a compliant gear, to be cut, found {quoted(found)} here and one of them in each of"
+                f" rotor_inertia nor a compliant gear, to be cut, found {quoted(key)} here and one of them in each of"
                 " the others. Such loops are not available in 3D"
             )
 
@@ -288,15 +288,15 @@ ALONG = 1e-12  # of the largest rotation of modes: what is left of them across a
 
 def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
     """The tree with such coordinates of all joints that have them."""
-    found, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
-    found.on_frames = frozenset(joint.name for joint in joints if _has_angle_of_frames(tree, joint))
-    found.nodes = tuple(
+    changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
+    changed.on_frames = frozenset(joint.name for joint in joints if _has_angle_of_frames(tree, joint))
+    changed.nodes = tuple(
         replace(node, inner=node.inner._replace(still=True), outer=node.outer._replace(still=True))
-        if node.joint.name in found.on_frames
+        if node.joint.name in changed.on_frames
         else node
         for node in tree.nodes
     )
-    return found
+    return changed
 
 
 def _has_angle_of_frames(tree: KinematicTree, joint: JointRecord) -> bool:

@@ -100,14 +100,14 @@ def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Arr
     system = driven_system(model)
     driven = driven_mechanism(model, has_motors=False)
     on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * system.row_signs)
-    found = {}
+    by_body = {}
     for node, (axes, origin), forces in zip(
         model.tree.nodes, frames_in_core(model, system.core, q[0]), on_bodies, strict=True
     ):
         force, moment = forces[:, :3], forces[:, 3:6]
         on_frame = [force @ axes, (moment - np.cross(origin, force)) @ axes]
-        found[node.body.name] = np.hstack([*on_frame, forces[:, 6:]])
-    return found
+        by_body[node.body.name] = np.hstack([*on_frame, forces[:, 6:]])
+    return by_body
 
 
 class SplitForces(NamedTuple):

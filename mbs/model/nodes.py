@@ -57,8 +57,17 @@ class Node:
 
     def coordinates(self, q: Array) -> Array:
         """Those of the joint (…, k) as the scene counts them, at q (…, n_q)."""
-        found = self.joint.coordinates(q[..., self.q])
-        return self.joint.turned_around(found) if self.backwards else found
+        own = self.joint.coordinates(q[..., self.q])
+        return self.joint.turned_around(own) if self.backwards else own
+
+
+def node_at(
+    q: int, v: int, body: Body, joint: JointRecord, inner: Section, outer: Section, *, backwards: bool = False
+) -> Node:
+    """The node whose joint's coordinates begin at q and v, with those of the modes after them."""
+    p_q, p_v, n = q + joint.q_count, v + joint.freedoms, body.n_modes
+    along = {"q": slice(q, p_q), "p_q": slice(p_q, p_q + n), "v": slice(v, p_v), "p_v": slice(p_v, p_v + n)}
+    return Node(body, joint, backwards, inner, outer, **along)
 
 
 def rotor(node: Node) -> tuple[float, float]:

@@ -41,8 +41,8 @@ class Plane(NamedTuple):
     def shares(self, component: int) -> list[tuple[int, float]]:
         """Of a force (0, 1, 2) or moment (3, 4, 5) along a global axis: components of a planar wrench, with shares."""
         along = self.axes[:, component % 3]
-        found = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
-        return [(k, float(share)) for k, share in found if abs(share) > EXACT]
+        parts = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
+        return [(k, float(share)) for k, share in parts if abs(share) > EXACT]
 
 
 def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
@@ -67,15 +67,15 @@ class _Frame(NamedTuple):
 
 
 def _frames(parts: ModelParts) -> Iterator[_Frame]:
-    found: list[_Frame] = []
+    frames: list[_Frame] = []
     for body in parts.bodies:
         markers = parts.ground if body.parent < 0 else parts.bodies[body.parent].data.markers
         inner, outer = markers[body.parent_marker], body.data.markers[body.inboard_marker]
-        r, R = (np.zeros(3), np.eye(3)) if body.parent < 0 else found[body.parent][:2]
+        r, R = (np.zeros(3), np.eye(3)) if body.parent < 0 else frames[body.parent][:2]
         carrier = R @ inner.triad
         own = carrier @ outer.triad.T
-        found.append(_Frame(r + R @ inner.position - own @ outer.position, own, carrier))
-        yield found[-1]
+        frames.append(_Frame(r + R @ inner.position - own @ outer.position, own, carrier))
+        yield frames[-1]
 
 
 def _normals(parts: ModelParts, frames: Sequence[_Frame]) -> list[Array]:
@@ -91,10 +91,10 @@ def _ends(row: _core.ConstraintModel) -> tuple[int, int, int, int]:
 
 def _like(row: _core.ConstraintModel, f: Array) -> _core.ConstraintModel:
     """The same between the same markers, along f."""
-    found = _core.ConstraintModel()
-    found.name, found.kind, found.a, found.b, found.coordinate = row.name, row.kind, row.a, row.b, row.coordinate
-    found.f = f
-    return found
+    made = _core.ConstraintModel()
+    made.name, made.kind, made.a, made.b, made.coordinate = row.name, row.kind, row.a, row.b, row.coordinate
+    made.f = f
+    return made
 
 
 def _is_mixed(f: Array) -> bool:
@@ -130,7 +130,7 @@ class _Reduction:
         """Rows of the plane, which ones in space they follow, and columns of `spread`."""
         rows = self._parts.rows
         spread: list[Array] = [np.zeros((len(rows), 0))]
-        found, followed, unit = [], [], np.eye(len(rows))
+        kept, followed, unit = [], [], np.eye(len(rows))
         for k, row in enumerate(rows):
             group = [] if is_path[k] else self._oblique(k)
             if not group:
@@ -141,10 +141,10 @@ class _Reduction:
             else:
                 of_row = list(self._together(group)) if group[0] == k else []
             for in_plane, column in of_row:
-                found.append(in_plane)
+                kept.append(in_plane)
                 followed.append(k)
                 spread.append(column)
-        return found, followed, spread
+        return kept, followed, spread
 
     def _oblique(self, k: int) -> list[int]:
         """Rows of a loop that hold one way in several directions, k among them, where the plane is oblique to these."""
@@ -179,29 +179,29 @@ class _Reduction:
         off = abs(normal[2]) if body.joint == _core.JointKind.prismatic else np.linalg.norm(normal - np.eye(3)[2])
         if off > EXACT and body.joint != _core.JointKind.weld:
             raise AcrossError
-        found = _core.PlanarBody()
+        planar = _core.PlanarBody()
         for key in SHARED:
-            setattr(found, key, getattr(body, key))
-        found.joint, found.data = PLANAR[body.joint], planar_data(data, axes)
-        return found
+            setattr(planar, key, getattr(body, key))
+        planar.joint, planar.data = PLANAR[body.joint], planar_data(data, axes)
+        return planar
 
     def _row(self, row: _core.ConstraintModel) -> _core.ConstraintModel | None:
         """In axes of planar markers; None where it does nothing in the plane."""
-        found = _like(row, row.f)
+        planar = _like(row, row.f)
         if row.kind == _core.ConstraintKind.coordinate:
-            return found
+            return planar
         if row.kind == _core.ConstraintKind.turn:
-            return self._turn(found, row)
+            return self._turn(planar, row)
         f = self._direction(row)
         g = self._of_marker(row.b) @ row.g if row.kind == _core.ConstraintKind.dot else row.g
         if np.linalg.norm(f[:2]) <= EXACT or (row.kind == _core.ConstraintKind.dot and np.linalg.norm(g[:2]) <= EXACT):
             return None
         if row.kind != _core.ConstraintKind.dot:
             if _is_mixed(f):
-                found.a = self._shifted_for(row, f)
+                planar.a = self._shifted_for(row, f)
             f[2] = 0.0
-        found.f, found.g = f, g
-        return found
+        planar.f, planar.g = f, g
+        return planar
 
     def _turn(self, found: _core.ConstraintModel, row: _core.ConstraintModel) -> _core.ConstraintModel:
         """The difference of angles of planar markers, in which directions are those of their x: see `axes_of_triad`."""

@@ -35,14 +35,14 @@ def projected(body: Body) -> Body:
         )
         for label, at in kept.points.items()
     }
-    found = replace(
+    planar = replace(
         kept, first_moment=kept.mass * center, S_bar=S_bar, S_bar_kl=S_bar_kl, points=MappingProxyType(points),
         second_moment=kept.mass * np.outer(center, center) + 0.5 * about_center * np.eye(3),
         I_bar=_about(center, S_bar, kept.I_bar), J_spin=0.0, h_spin=0.0 * kept.h_spin, S_spin=0.0 * kept.S_spin,
         attachment_modes=int(np.sum(moving >= body.n_eigenmodes)),
     )  # fmt: skip
     if kept.stiffening is None:
-        return found
+        return planar
     K_s = ALONG[:, None, None] * kept.stiffening.K_s
     K_points = {
         point: np.concatenate([ALONG, 1.0 - ALONG])[:, None, None] * K for point, K in kept.stiffening.K_points.items()
@@ -51,7 +51,7 @@ def projected(body: Body) -> Body:
         kept.stiffening, K_s=K_s, K_x=_about(center, K_s, kept.stiffening.K_x), K_points=MappingProxyType(K_points),
         S_turned=_keeping_shapes(kept.stiffening.S_turned),
     )  # fmt: skip
-    return replace(found, stiffening=stiffening)
+    return replace(planar, stiffening=stiffening)
 
 
 def vanishing_in_plane(body: Body) -> tuple[str, ...]:
@@ -113,26 +113,26 @@ def _is_small(across: Array, whole: Array) -> bool:
 
 def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarker:
     """`axes` (3, 3): rows x, y of the plane and its normal, in axes of the body."""
-    found, Phi, Phi_r = _core.PlanarMarker(), axes @ marker.Phi[:3], axes @ marker.Phi[3:]
+    planar, Phi, Phi_r = _core.PlanarMarker(), axes @ marker.Phi[:3], axes @ marker.Phi[3:]
     if not (_is_small(Phi[2], Phi) and _is_small(Phi_r[:2], Phi_r)):
         raise AcrossError
     x = axes @ marker.triad @ axes_of_triad(marker.triad.T @ axes[2])[0]
-    found.position, found.angle = np.ascontiguousarray((axes @ marker.position)[:2]), float(np.arctan2(x[1], x[0]))
-    found.Phi = np.vstack([Phi[:2], Phi_r[2:]])
+    planar.position, planar.angle = np.ascontiguousarray((axes @ marker.position)[:2]), float(np.arctan2(x[1], x[0]))
+    planar.Phi = np.vstack([Phi[:2], Phi_r[2:]])
     if len(marker.K):
         K = np.einsum("skl,slmn->skmn", np.array([axes, axes]), np.reshape(marker.K, (2, 3, *marker.K[0].shape)))
         if not (_is_small(K[0, 2], K[0]) and _is_small(K[1, :2], K[1])):
             raise AcrossError
-        found.K = [K[0, 0], K[0, 1], K[1, 2]]
-    return found
+        planar.K = [K[0, 0], K[0, 1], K[1, 2]]
+    return planar
 
 
 def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
     """The constants of a body in the plane. Raises `AcrossError` where it bends otherwise, or twists."""
-    found, normal = _core.PlanarData(), axes[2]
+    planar, normal = _core.PlanarData(), axes[2]
     along = float(normal @ data.spin_axis)
-    found.mass, found.first_moment = data.mass, np.ascontiguousarray(axes[:2] @ data.first_moment)
-    found.inertia = float(np.trace(data.J2) - normal @ data.J2 @ normal + data.J_spin * along**2)
+    planar.mass, planar.first_moment = data.mass, np.ascontiguousarray(axes[:2] @ data.first_moment)
+    planar.inertia = float(np.trace(data.J2) - normal @ data.J2 @ normal + data.J_spin * along**2)
     if len(data.stiffness):
         if np.any(data.h_spin) or np.any(data.S_spin):
             raise AcrossError
@@ -142,22 +142,22 @@ def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
         if np.diag(S[2, 2]).max() > EXACT or not _is_small(normal @ data.S_bar, data.S_bar):
             raise AcrossError
         I_bar = _turned(data.I_bar.reshape(3, 3, n), axes)
-        found.stiffness, found.damping = data.stiffness, data.damping
-        found.S_bar = np.ascontiguousarray(axes[:2] @ data.S_bar)
-        found.h, found.j = I_bar[0, 1] - I_bar[1, 0], I_bar[0, 0] + I_bar[1, 1]
-        found.S_tilde, found.m_xy = S[0, 1] - S[1, 0], S[0, 0] + S[1, 1]
+        planar.stiffness, planar.damping = data.stiffness, data.damping
+        planar.S_bar = np.ascontiguousarray(axes[:2] @ data.S_bar)
+        planar.h, planar.j = I_bar[0, 1] - I_bar[1, 0], I_bar[0, 0] + I_bar[1, 1]
+        planar.S_tilde, planar.m_xy = S[0, 1] - S[1, 0], S[0, 0] + S[1, 1]
         if data.K_s:
             K_s = as_floats(np.einsum("kl,lmn->kmn", axes, np.array(data.K_s)))
             K_x = _turned(np.array(data.K_x).reshape(3, 3, n, n), axes)
             if not (_is_small(K_s[2], K_s) and _is_small(K_x[:, 2], K_x)):
                 raise AcrossError
-            found.K = [K_s[0], K_s[1], K_x[0, 0] + K_x[1, 1], K_x[0, 1] - K_x[1, 0]]
+            planar.K = [K_s[0], K_s[1], K_x[0, 0] + K_x[1, 1], K_x[0, 1] - K_x[1, 0]]
             S, J2 = axes[:2] @ data.first_moment, axes[:2] @ data.J2 @ axes[:2].T
             N = np.block([[np.array([[data.mass]]), S[None]], [S[:, None], J2]])
-            for moved, by_place in ((found.S_bar, I_bar[:2, :2]), (K_s[:2], K_x[:2, :2])):
+            for moved, by_place in ((planar.S_bar, I_bar[:2, :2]), (K_s[:2], K_x[:2, :2])):
                 _check_shapes(N, np.concatenate([moved[None], by_place]).reshape(3, 2, -1))
-    found.markers = [planar_marker(marker, axes) for marker in data.markers]
-    return found
+    planar.markers = [planar_marker(marker, axes) for marker in data.markers]
+    return planar
 
 
 def _check_shapes(N: Array, F: Array) -> None:

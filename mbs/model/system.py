@@ -125,8 +125,8 @@ class MultibodySystem:
 
     def multipliers(self, of_core: Array) -> Array:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
-        found = of_core if self.plane is None else of_core @ self.plane.spread.T
-        return found * self.row_signs
+        of_rows = of_core if self.plane is None else of_core @ self.plane.spread.T
+        return of_rows * self.row_signs
 
     @property
     def sections(self) -> list[Section]:
@@ -151,15 +151,15 @@ class MultibodySystem:
     def _driven(self, commands: Sequence[Command]) -> Booleans:
         """(n_v,) along which coordinates given forces act, of which inverse analyses have none."""
         tree = self.model.tree
-        found: Booleans = np.zeros(tree.n_v, dtype=bool)
+        is_driven: Booleans = np.zeros(tree.n_v, dtype=bool)
         for direction in (*(drive.direction for drive in self._along), *(command.direction for command in commands)):
-            found |= direction != 0
+            is_driven |= direction != 0
         resisting = [node for node in tree.nodes if node.joint.frictions]
         for node in (*resisting, *(side for gear in tree.gears for side in (gear.motor, gear.joint))):
-            found[node.v] = True
+            is_driven[node.v] = True
         for body in (c.frame[0] for c in commands if c.frame):
-            found[tree.nodes[body].v] = True
-        return found
+            is_driven[tree.nodes[body].v] = True
+        return is_driven
 
     def _check(self) -> None:
         """Raise `InputError` for what the core does not take."""
@@ -188,8 +188,8 @@ class MultibodySystem:
         `supplied` (n_v,) acts beside loads, friction and springs in gears. Rows that depend on others at q, v are left
         out.
         """
-        found, signs = self.core.derivatives(self.scene, t, q, v, supplied), self.row_signs[:, None]
-        return Derivatives(found.a_q, found.a_v, found.a_f, signs * found.value_q, signs * found.rate_q)
+        slopes, signs = self.core.derivatives(self.scene, t, q, v, supplied), self.row_signs[:, None]
+        return Derivatives(slopes.a_q, slopes.a_v, slopes.a_f, signs * slopes.value_q, signs * slopes.rate_q)
 
     def _follow(self, plane: Plane | None) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
@@ -250,11 +250,11 @@ def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
 
 def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrderHold:
     """Forces of commands that are held, in their order."""
-    found = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
+    hold = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
     for number, command in enumerate(commands):
         for share in _frame_shares(model, *command.frame) if command.frame is not None else ():
-            found.add_frame_motor(number, *share)
-    return found
+            hold.add_frame_motor(number, *share)
+    return hold
 
 
 def _frame_shares(model: Model, body: int, sign: float) -> Iterator[tuple[int, int, Array, Array]]:

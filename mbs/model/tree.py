@@ -28,7 +28,7 @@ from ..scene.mechanism import MechanismScene
 from ..scene.topology import Topology
 from .body import Body, rigid_body
 from .kinematics import Kinematics, Places
-from .nodes import ConstraintRow, Node, Section
+from .nodes import ConstraintRow, Node, Section, node_at
 
 AXES = np.eye(3)
 AXES.setflags(write=False)
@@ -88,12 +88,8 @@ class KinematicTree:
                 triads = joint.outward_triads(backwards)
                 inner = self.section(carrier.other, triads[0], joint.at)
                 outer = self.section(carrier.own, triads[1])
-            p_q, p_v, n = q + joint.q_count, v + joint.freedoms, body.n_modes
-            nodes.append(
-                Node(body, joint, backwards, inner, outer, slice(q, p_q), slice(p_q, p_q + n), slice(v, p_v),
-                     slice(p_v, p_v + n))
-            )  # fmt: skip
-            q, v = p_q + n, p_v + n
+            nodes.append(node_at(q, v, body, joint, inner, outer, backwards=backwards))
+            q, v = nodes[-1].p_q.stop, nodes[-1].p_v.stop
         self.nodes = tuple(nodes)
         self.n_q, self.n_v = q, v
         self.loops = tuple(joints[number] for number in topology.loop_joints)
@@ -112,25 +108,22 @@ class KinematicTree:
 
         They turn or slide on the sections `inner` as the outputs of the rotors' gears do, and stand after all others.
         """
-        found, nodes = copy.copy(self), list(self.nodes)
+        tree, nodes = copy.copy(self), list(self.nodes)
         for joint, label, inner in outputs:
-            q, v, outer = found.n_q, found.n_v, Section(len(nodes), "", np.eye(3), np.zeros(3))
+            outer = Section(len(nodes), "", np.eye(3), np.zeros(3))
             body = rigid_body(label, 0.0, np.zeros(3), np.zeros((3, 3)), {})
-            found.n_q, found.n_v = q + 1, v + 1
-            no_modes = slice(found.n_q, found.n_q), slice(found.n_v, found.n_v)
-            nodes.append(
-                Node(body, joint, False, inner, outer, slice(q, q + 1), no_modes[0], slice(v, v + 1), no_modes[1])
-            )
-        found.nodes = tuple(nodes)
-        found.index = {node.body.name: number for number, node in enumerate(nodes)}
-        found.carried = {node.joint.name: number for number, node in enumerate(nodes)}
-        return found
+            nodes.append(node_at(tree.n_q, tree.n_v, body, joint, inner, outer))
+            tree.n_q, tree.n_v = tree.n_q + 1, tree.n_v + 1
+        tree.nodes = tuple(nodes)
+        tree.index = {node.body.name: number for number, node in enumerate(nodes)}
+        tree.carried = {node.joint.name: number for number, node in enumerate(nodes)}
+        return tree
 
     def with_bodies(self, bodies: Sequence[Body]) -> KinematicTree:
         """The tree with other bodies of the same names, modes and points, in its order."""
-        found = copy.copy(self)
-        found.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
-        return found
+        tree = copy.copy(self)
+        tree.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
+        return tree
 
     @property
     def cut_joints(self) -> tuple[JointRecord, ...]:
@@ -140,10 +133,10 @@ class KinematicTree:
     @property
     def joint_columns(self) -> Booleans:
         """(n_v,) which of v belong to joints, not to modes."""
-        found = np.ones(self.n_v, dtype=bool)
+        is_joint = np.ones(self.n_v, dtype=bool)
         for node in self.nodes:
-            found[node.p_v] = False
-        return found
+            is_joint[node.p_v] = False
+        return is_joint
 
     def at_rest(self, guesses: Mapping[str, Array]) -> Array:
         """Q (n_q,) of undeformed links, with joint coordinates in the scene's order by name, else 0."""
@@ -205,9 +198,9 @@ def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[Cons
     """
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
-    found = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
-    nodes = found.nodes[len(tree.nodes) :]
-    return found, [replace(row, coordinate=node.v.start) for row, node in zip(rows, nodes, strict=True)]
+    longer = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
+    nodes = longer.nodes[len(tree.nodes) :]
+    return longer, [replace(row, coordinate=node.v.start) for row, node in zip(rows, nodes, strict=True)]
 
 
 def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutCoordinate]:
@@ -257,34 +250,34 @@ class AlongCut:
 
     def resistance(self, q: Array, v: Array) -> Array:
         """Generalized forces (T, n_v) by which friction resists at q (T, n_q) and v (T, n_v)."""
-        found = np.zeros_like(v)
-        gradients = self.measured(q)[1] if self._rough else found
+        force = np.zeros_like(v)
+        gradients = self.measured(q)[1] if self._rough else force
         for k in self._rough:
             G = gradients[:, k]
-            found += self._all[k].resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
-        return found
+            force += self._all[k].resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
+        return force
 
     def damping(self, q: Array) -> Array:
         """D (n_v, n_v) of viscous friction at q (n_q,)."""
-        found = np.zeros((self._n_v, self._n_v))
-        gradients = self.measured(q[None])[1][0] if self._rough else found
+        D = np.zeros((self._n_v, self._n_v))
+        gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:
             friction, G = self._all[k].friction, gradients[k]
             assert friction is not None
-            found += friction.viscous * np.outer(G, G)
-        return found
+            D += friction.viscous * np.outer(G, G)
+        return D
 
     def motions(self, q: Array, v: Array, times: Array) -> list[CutMotion]:
         """Of each at q (T, n_q), v (T, n_v) and `times` (T,); angles begin nearest to their guesses."""
-        found = list[CutMotion]()
+        motions = list[CutMotion]()
         if self._kinematics is None:
-            return found
+            return motions
         values, rates = self.measured(q)[0], self._kinematics.constraint_rates(q, v, np.zeros(len(q)))
         for one, value, rate in zip(self._all, values.T, rates.T, strict=True):
             turns = one.row.kind == "turn"
             coordinate, is_counted = _unwound(value, rate, times, one.guess) if turns else (value, True)
-            found.append(CutMotion(coordinate, rate, is_counted))
-        return found
+            motions.append(CutMotion(coordinate, rate, is_counted))
+        return motions
 
 
 def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Array, bool]:
@@ -299,6 +292,6 @@ def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Arr
     rough = h * (rate[1:] + rate[:-1]) / 2
     way = rough - h**2 * np.diff(slope) / 12
     turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
-    found: Array = angle + 2 * np.pi * np.cumsum(turns)
-    off = np.abs(way - np.array([rough, np.diff(found)])).max()
-    return found, bool(off < np.pi / 2)
+    whole: Array = angle + 2 * np.pi * np.cumsum(turns)
+    off = np.abs(way - np.array([rough, np.diff(whole)])).max()
+    return whole, bool(off < np.pi / 2)

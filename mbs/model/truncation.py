@@ -71,8 +71,8 @@ def modes_kept(body: Body) -> str:
 
 def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
     """Points of a body at which joints, trajectories and loads of the scene act."""
-    found = [reference.body_and_point for reference in scene.references() if reference.loaded]
-    return list(dict.fromkeys(part[1] for part in found if part is not None and part[0] == body))
+    loaded = [reference.body_and_point for reference in scene.references() if reference.loaded]
+    return list(dict.fromkeys(part[1] for part in loaded if part is not None and part[0] == body))
 
 
 def interface_loads(body: Body, loaded: Sequence[str]) -> Array:

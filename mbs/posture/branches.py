@@ -58,18 +58,18 @@ def start_postures(model: Model) -> list[StartPosture]:
     """
     start = undeformed_posture(model).q
     columns = turning_joints(model)[1]
-    found = [_posture(model, start, start)]
+    starts = [_posture(model, start, start)]
     state = mobility(model, start)
     if not columns.size or not model.rows or state.followed < state.freedom:
-        return found
+        return starts
     others = regular_postures(model, random_angles(start, columns, TRIES))
     for q in others:
-        if all(_turn(q, one.q, columns) > SAME for one in found):
+        if all(_turn(q, one.q, columns) > SAME for one in starts):
             q[columns] = np.angle(np.exp(1j * q[columns]))
-            found.append(_posture(model, q, start))
-    found.sort(key=lambda one: one.away)
-    names = [one.branch for one in found]
-    return [one if one.branch not in names[:k] else one._replace(branch={}) for k, one in enumerate(found)]
+            starts.append(_posture(model, q, start))
+    starts.sort(key=lambda one: one.away)
+    names = [one.branch for one in starts]
+    return [one if one.branch not in names[:k] else one._replace(branch={}) for k, one in enumerate(starts)]
 
 
 def _posture(model: Model, q: Array, start: Array) -> StartPosture:
@@ -120,15 +120,15 @@ def branch_names(model: Model, q: Array) -> dict[str, Word]:
     joints = _turning(model)
     axes = _lines(model, q, joints)[1]
     parallel = [float(np.linalg.norm(np.cross(a, b))) < MEETING for a, b in pairwise(axes)]
-    found: dict[str, Word] = {}
+    words: dict[str, Word] = {}
     if len(joints) >= 3 and parallel[:2] == [False, True]:
-        found[joints[1].joint.name] = "right" if _raises(model, q, joints[1]) else "left"
-        found[joints[2].joint.name] = "up" if _above(model, q, joints[2]) else "down"
+        words[joints[1].joint.name] = "right" if _raises(model, q, joints[1]) else "left"
+        words[joints[2].joint.name] = "up" if _above(model, q, joints[2]) else "down"
     elif len(joints) >= 2 and parallel[0]:
-        found[joints[1].joint.name] = "up" if _above(model, q, joints[1]) else "down"
+        words[joints[1].joint.name] = "up" if _above(model, q, joints[1]) else "down"
     if len(joints) == 6:
-        found[joints[4].joint.name] = "flip" if _flips(model, q, joints[4]) else "noflip"
-    return found
+        words[joints[4].joint.name] = "flip" if _flips(model, q, joints[4]) else "noflip"
+    return words
 
 
 def in_words(branch: Mapping[str, Word]) -> str:
@@ -160,13 +160,13 @@ def _turning(model: Model) -> list[Node]:
 
 def _chain(model: Model) -> list[Node]:
     """The joints of the tree from the ground to the body of the tool: that of the last path of a point, or the last."""
-    tree, found = model.tree, list[Node]()
+    tree, chain = model.tree, list[Node]()
     point = model.scene.tool_point
     number = len(tree.nodes) - 1 if point is None else tree.index[point.partition(".")[0]]
     while number >= 0:
-        found.append(tree.nodes[number])
-        number = found[-1].inner.body
-    return found[::-1]
+        chain.append(tree.nodes[number])
+        number = chain[-1].inner.body
+    return chain[::-1]
 
 
 def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:

@@ -47,15 +47,15 @@ class Watched(NamedTuple):
 
 def watched(tree: KinematicTree) -> list[Watched]:
     """Coordinates that the core watches: none where joints have no limits."""
-    found = []
+    ways = []
     for node in tree.nodes:
         if _is_limited(node.joint) and not _is_sampled(node):
             # Which of q with which sign, read off numbers that all differ
             for number, entry in enumerate(node.coordinates(np.arange(1.0, tree.n_q + 1))):
                 if np.isfinite(node.joint.position_limits[number]).any():
                     at = abs(int(entry)) - 1 - node.q.start + node.v.start
-                    found.append(Watched(node.joint, number, at, float(np.sign(entry))))
-    return found
+                    ways.append(Watched(node.joint, number, at, float(np.sign(entry))))
+    return ways
 
 
 def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:

@@ -47,8 +47,8 @@ def row_sizes(model: Model) -> Array:
 
 def solve_posture(model: Model, t: float, q: Array, held: Booleans | None = None) -> Array | None:
     """Q (n_q,) moved onto C(q, t) = 0 by least steps of joints not `held` (n_v,); None where it does not converge."""
-    found, is_met = solve_postures(model, np.array([t]), q[None], held)
-    return found[0] if is_met[0] else None
+    solved, is_met = solve_postures(model, np.array([t]), q[None], held)
+    return solved[0] if is_met[0] else None
 
 
 def posture_search(model: Model) -> PostureSearch:
@@ -68,11 +68,11 @@ def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None =
     search = posture_search(model)
     if held is not None:
         search.scales[held] = 0.0
-    found, left = model.constraints.postures(q, times, search)
+    moved, left = model.constraints.postures(q, times, search)
     is_met = left <= MET
-    for is_turned_over in turned_over(model, found, times).values():
+    for is_turned_over in turned_over(model, moved, times).values():
         is_met &= ~is_turned_over
-    return found, is_met
+    return moved, is_met
 
 
 def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans | None = None) -> State:
@@ -122,8 +122,8 @@ def mobilities(model: Model, times: Array, q: Array, loop_rank: int = -1) -> lis
 def row_ratios(model: Model, times: Array, q: Array, rank: int) -> Array:
     """(T,) of the singular values of all rows, not zero by their `rank`: least over largest, as in `mobilities`."""
     is_path = [False] * len(model.rows)
-    found = model.constraints.mobilities(q, times, is_path, robot_size(model), rank)
-    return np.array([at.loop_ratio for at in found])
+    motions = model.constraints.mobilities(q, times, is_path, robot_size(model), rank)
+    return np.array([at.loop_ratio for at in motions])
 
 
 def mobility(model: Model, q: Array) -> Mobility:
@@ -203,8 +203,8 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
     before = solve_posture(loops, 0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
     if not loops.rows or before is None:
         return ""
-    found = mobility(model, before)
-    ratio = row_ratios(loops, np.array([t]), q[None], found.loop_rank)[0]
+    freedom = mobility(model, before)
+    ratio = row_ratios(loops, np.array([t]), q[None], freedom.loop_rank)[0]
     if ratio < NEARLY_SINGULAR:
         return (
             f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
@@ -212,7 +212,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
             " and coupler in a line. No finite force determines the further motion. Avoid this posture or drive a joint"
             " instead"
         )
-    ratio = row_ratios(model, np.array([t]), q[None], found.loop_rank + found.followed)[0]
+    ratio = row_ratios(model, np.array([t]), q[None], freedom.loop_rank + freedom.followed)[0]
     if ratio < NEARLY_SINGULAR:
         paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
         return (
@@ -229,39 +229,39 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
     Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, a singular posture, and a
     path that jumps before `end` (s).
     """
-    path, found = model.scene.path, mobility(model, q)
+    path, free = model.scene.path, mobility(model, q)
     bent, locked = paths_by_bending(model, q)
     for each in model.scene.trajectory if end > 0 else ():
         check_smooth(path, ((f'trajectory "{each.name}": {name}', target) for name, target in each.targets), end)
     rows = int(np.count_nonzero(~model.loop_rows))
     names = quoted(trajectory.name for trajectory in model.scene.trajectory)
-    if rows > found.freedom and bent:
+    if rows > free.freedom and bent:
         yield (
             f"loops lock joints {quoted(locked)} with rigid links: the mechanism follows trajectory {names} only as its"
             " links bend"
         )
-        found = replace(found, freedom=found.freedom + bent, followed=found.followed + bent)
-    if rows > found.freedom:
+        free = replace(free, freedom=free.freedom + bent, followed=free.followed + bent)
+    if rows > free.freedom:
         raise InputError(
-            f"{path}: trajectory: expected at most {found.freedom} components, as many as the mechanism has degrees of"
+            f"{path}: trajectory: expected at most {free.freedom} components, as many as the mechanism has degrees of"
             f" freedom with rigid links, found {rows} in {names}: only vibrations could follow the others"
         )
-    if found.followed < rows:
+    if free.followed < rows:
         raise InputError(
             f"{path}: initial: expected a posture in which the links can follow trajectory {names} in every direction,"
             " found a singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the"
             " path"
         )
-    if found.ratio < NEARLY_SINGULAR:
-        yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
-    if rows and found.followed < found.freedom:
+    if free.ratio < NEARLY_SINGULAR:
+        yield f"near a singular posture at the start: {names} can hardly be followed (ratio {free.ratio:.1e})"
+    if rows and free.followed < free.freedom:
         yield (
-            f"{found.freedom - found.followed} degrees of freedom are not prescribed; forces and inertia move"
-            f' {", ".join(found.left)}: prescribe a joint by a trajectory, or set redundancy = "least-motion" or'
+            f"{free.freedom - free.followed} degrees of freedom are not prescribed; forces and inertia move"
+            f' {", ".join(free.left)}: prescribe a joint by a trajectory, or set redundancy = "least-motion" or'
             ' "least-torque"'
         )
     if rows:
-        yield from _check_motors(model, found)
+        yield from _check_motors(model, free)
 
 
 def _check_motors(model: Model, found: Mobility) -> Iterator[str]:
@@ -296,9 +296,9 @@ def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: f
     """
     for label, target in targets:
         for order, quantity in enumerate(("value", "velocity")):
-            found = _jump(target, end, order)
-            if found is not None:
-                t, before, after = found
+            jump = _jump(target, end, order)
+            if jump is not None:
+                t, before, after = jump
                 raise InputError(
                     f"{path}: {label}: expected a continuous {quantity}, found a jump from {before:.6g} to {after:.6g}"
                     f" at t = {t:.9g} s: no finite force can make the robot follow; round it off (waypoints make a"

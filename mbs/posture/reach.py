@@ -40,8 +40,8 @@ def out_of_reach(model: Model, times: Array) -> str:
 
 def _all_beyond(model: Model, times: Array) -> Iterator[tuple[str, str]]:
     """Each path that leads beyond the reach of the links at some of `times` (T,): its name, and how far."""
-    found = ((path.name, _beyond(model, path, times)) for path in model.scene.trajectory)
-    yield from ((name, how) for name, how in found if how)
+    beyond = ((path.name, _beyond(model, path, times)) for path in model.scene.trajectory)
+    yield from ((name, how) for name, how in beyond if how)
 
 
 def check_reach(model: Model, end: float) -> None:

@@ -44,11 +44,11 @@ def resolved(model: Model, end: float) -> Model:
     if criterion is None or all(not row.is_trajectory for row in model.rows):
         return model
     start = undeformed_posture(model)
-    found = mobility(model, start.q)
-    _check(model, criterion, found)
+    free = mobility(model, start.q)
+    _check(model, criterion, free)
     times = as_floats(np.linspace(0.0, end, NODES)) if end > 0 else np.zeros(1)
     q = _least_motion(model, start.q, times)
-    nodes = _most_observable(model, q, times, found.freedom - found.followed)
+    nodes = _most_observable(model, q, times, free.freedom - free.followed)
     if not end > 0:
         return _with_prescribed_joints(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
     return _with_prescribed_joints(
@@ -133,9 +133,9 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
     still, start = np.zeros((3, len(weights), int(np.count_nonzero(~model.tree.joint_columns)))), q[::STRIDE]
 
     def moved(c: Array, which: int) -> Array:
-        found = (q if which == 0 else start).copy()
-        found[:, places] += basis[which] @ c.reshape(count - 2, len(places))
-        return found
+        best = (q if which == 0 else start).copy()
+        best[:, places] += basis[which] @ c.reshape(count - 2, len(places))
+        return best
 
     def moments(c: Array) -> Array:
         held = _with_prescribed_joints(model, nodes, times, moved(c, 0))
@@ -148,15 +148,15 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
 
     size = 1.0
     size = float(np.linalg.norm(moments(np.zeros((count - 2) * len(places))))) or 1.0
-    found = least_squares(
+    best = least_squares(
         moments, np.zeros((count - 2) * len(places)), diff_step=1e-6, ftol=1e-8, xtol=1e-6, max_nfev=MOST_STEPS
     )
-    if not found.success:
+    if not best.success:
         raise SolveError(
             f'{model.scene.path}: redundancy = "least-torque": expected the least within {MOST_STEPS} steps, found'
             ' none: "least-motion" needs none, or prescribe a joint by a trajectory'
         )
-    return moved(found.x, 0)
+    return moved(best.x, 0)
 
 
 def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:

@@ -195,7 +195,7 @@ def relaxed_gears(model: Model, state: State) -> State:
 def _numbers(model: Model, table: Mapping[str, object], key: str) -> dict[str, Array]:
     """The lists of numbers of a table by joint. Raises `InputError` for a wrong number of them."""
     joints = {joint.name: joint for joint in (*(node.joint for node in model.tree.nodes), *model.scene.joint)}
-    found = {}
+    lists = {}
     for name, value in table.items():
         joint = joints[name]
         wanted, numbers = len(joint.guess_units or joint.units), np.atleast_1d(np.array(value, dtype=float))
@@ -204,8 +204,8 @@ def _numbers(model: Model, table: Mapping[str, object], key: str) -> dict[str, A
                 f"{model.scene.path}: initial.{key}.{name}: expected {wanted} numbers of a {joint.type} joint, found"
                 f" {len(numbers)}"
             )
-        found[name] = numbers
-    return found
+        lists[name] = numbers
+    return lists
 
 
 def _guessed_rates(model: Model) -> Array:

@@ -80,10 +80,10 @@ def _flooded(model: Model, start: Array, shape: tuple[int, ...], seed: int) -> t
     q, reached, within = np.tile(start, (count, 1)), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     trial, guess, waiting = np.array([seed]), start[None], np.zeros(0, dtype=np.intp)
     while len(trial):
-        found, is_met = _solved(model, trial, guess)
-        keeps = is_met & within_limits(model, found)
+        solved, is_met = _solved(model, trial, guess)
+        keeps = is_met & within_limits(model, solved)
         new = keeps | (is_met & ~reached[trial])
-        q[trial[new]], reached[trial[new]], within[trial[keeps]] = found[new], True, True
+        q[trial[new]], reached[trial[new]], within[trial[keeps]] = solved[new], True, True
         waiting = np.append(waiting, trial[new & ~keeps])
         trial, guess = _around(trial[keeps], shape, q, ~within)
         if not len(trial):
@@ -116,21 +116,21 @@ def _elsewhere(
         return none
     some = np.random.default_rng(0).permutation(left)[:PLACES]
     trial = np.repeat(some, TRIES)
-    found, is_met = _solved(model, trial, np.tile(random_angles(start, columns, TRIES), (len(some), 1)))
-    trial, found = trial[is_met], found[is_met]
+    solved, is_met = _solved(model, trial, np.tile(random_angles(start, columns, TRIES), (len(some), 1)))
+    trial, solved = trial[is_met], solved[is_met]
     if not len(trial):
         return none
-    turns = np.angle(np.exp(1j * (found[:, columns] - start[columns])))
-    found[:, columns] = start[columns] + turns
-    away = np.abs(turns).sum(axis=1) + np.where(within_limits(model, found), 0.0, BEYOND)
+    turns = np.angle(np.exp(1j * (solved[:, columns] - start[columns])))
+    solved[:, columns] = start[columns] + turns
+    away = np.abs(turns).sum(axis=1) + np.where(within_limits(model, solved), 0.0, BEYOND)
     best = [int(away.argmin())]
-    return trial[best], found[best]
+    return trial[best], solved[best]
 
 
 def _solved(model: Model, numbers: Indices, guess: Array) -> tuple[Array, Booleans]:
     parts = [slice(k, k + TOGETHER) for k in range(0, len(numbers), TOGETHER)]
-    found = [solve_postures(model, numbers[part].astype(float), guess[part]) for part in parts]
-    return np.concatenate([q for q, _ in found]), np.concatenate([met for _, met in found])
+    solved = [solve_postures(model, numbers[part].astype(float), guess[part]) for part in parts]
+    return np.concatenate([q for q, _ in solved]), np.concatenate([met for _, met in solved])
 
 
 def _neighbors(numbers: Indices, shape: tuple[int, ...]) -> tuple[Indices, Indices]:

@@ -36,8 +36,8 @@ class Surroundings(NamedTuple):
 
     def replayable(self, way: str | None = None) -> str:
         """The kinds whose findings forward runs can apply, in this `way` or in any: `"pcid" or "fcid"`."""
-        found = [kind for kind in self.kinds() if (way in kind.applicable if way else kind.applicable)]
-        return either(kind.kind_name() for kind in found)
+        kinds = [kind for kind in self.kinds() if (way in kind.applicable if way else kind.applicable)]
+        return either(kind.kind_name() for kind in kinds)
 
 
 class Analysis(Referring):

@@ -67,9 +67,9 @@ class Initial(Referring):
 
     def naming(self, **named: frozenset[str]) -> Self:
         """The same with these joints in `named`, by table, which other joints have values beside."""
-        found = self.model_copy()
-        found._named = named
-        return found
+        copy = self.model_copy()
+        copy._named = named
+        return copy
 
 
 class MechanismKeys(Record):

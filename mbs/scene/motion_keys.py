@@ -164,11 +164,12 @@ class MotionKeys(Referring):
         durations = None if self.duration is None else tuple(np.broadcast_to(self.duration, count).tolist())
         holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
         smoothness = self.smoothness or SMOOTHNESS[profile]
-        return Legs(places, self.start, profile, smoothness, limits, durations, holds, self.blend, self.stretch)
+        more = {"blend": self.blend, "stretch": self.stretch}
+        return Legs(places, self.start, profile, smoothness, limits, durations, holds=holds, **more)
 
     def _legs_of_table(self, waypoints: Waypoints) -> Legs:
         profile, times = self.profile or "rest-to-rest", waypoints.times
         assert profile != "spline"
         smoothness, durations = self.smoothness or SMOOTHNESS[profile], tuple(np.diff(times).tolist())
         holds = (0.0,) * (len(times) - 2)
-        return Legs(waypoints.values, float(times[0]), profile, smoothness, Limits(), durations, holds)
+        return Legs(waypoints.values, float(times[0]), profile, smoothness, Limits(), durations=durations, holds=holds)

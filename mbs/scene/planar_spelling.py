@@ -72,15 +72,15 @@ def _of_bodies(scene: MechanismKeys, given: Values, of_joints: Mapping[str, Any]
 
     All others are 0 where joints have no guesses, too. Trees avoid prismatic joints, then those without a guess.
     """
-    found = dict(given)
+    angles = dict(given)
     if not of_joints:
-        return found
+        return angles
     edges = [
         Edge(joint.between, 2 * (joint.type == "prismatic") + (joint.name not in of_joints)) for joint in scene.joint
     ]
     for body, carrier in spanning_forest([body.name for body in scene.body], edges).carriers.items():
-        if carrier is not None and body not in found:
+        if carrier is not None and body not in angles:
             joint = scene.joint[carrier.joint]
             turn = of_joints.get(joint.name, 0.0) if _turns(joint) else 0.0
-            found[body] = found.get(carrier.parent, 0.0) + (turn if joint.between[1] == carrier.own else -turn)
-    return found
+            angles[body] = angles.get(carrier.parent, 0.0) + (turn if joint.between[1] == carrier.own else -turn)
+    return angles

@@ -111,8 +111,8 @@ class Trajectory(MotionKeys):
             header += " or t,JOINT" if allowed == ("value",) else " or t,x,y,z,qw,qx,qy,qz" if "z" in allowed else ""
             of = self.joint or self.motor
             missing = f': no column of "{of}"{did_you_mean(of, columns)}' if allowed == ("value",) and of else ""
-            found = ",".join(("t", *columns))
-            raise ValueError(f'expected waypoints with the header {header}, found "{found}"{missing}')
+            expected = ",".join(("t", *columns))
+            raise ValueError(f'expected waypoints with the header {header}, found "{expected}"{missing}')
         if turned:
             try:
                 orientation_of(self.waypoints)
@@ -120,9 +120,9 @@ class Trajectory(MotionKeys):
                 raise ValueError(f"waypoints: {error}") from None
 
     def _check_orientation(self) -> None:
-        found = [key for key in ORIENTATIONS if getattr(self, key) is not None]
-        if len(found) > 1:
-            raise ValueError(f"expected one orientation at most ({quoted(ORIENTATIONS)}), found {quoted(found)}")
+        keys = [key for key in ORIENTATIONS if getattr(self, key) is not None]
+        if len(keys) > 1:
+            raise ValueError(f"expected one orientation at most ({quoted(ORIENTATIONS)}), found {quoted(keys)}")
         for key, beside in (("reference_rotation_vector", "rotation_vector"), ("tool_axis", "direction")):
             if getattr(self, key) is not None and getattr(self, beside) is None:
                 raise ValueError(f'expected the key "{key}" only with {beside}, found it alone')
@@ -134,8 +134,8 @@ class Trajectory(MotionKeys):
     def _check_poses(self) -> None:
         if not self._has_poses:
             return
-        if found := [key for key in ORIENTATIONS if getattr(self, key) is not None]:
-            raise ValueError(f"expected an orientation either in via or by {quoted(found)}, found both")
+        if keys := [key for key in ORIENTATIONS if getattr(self, key) is not None]:
+            raise ValueError(f"expected an orientation either in via or by {quoted(keys)}, found both")
         if self.duration is None:
             limits = [key for key in LIMITS if getattr(self, key) is not None]
             raise ValueError(

@@ -47,15 +47,15 @@ def bounds_of_zeros(
     end = float(linear.times[-1])
     pre, post = decay_times(linear, end, needs_future=True)
     pre, post = max(pre, around[0]), max(post, around[1])
-    found = invert(servo, linear, pre, post, INVERTED, lambda _: True)
-    if found.status != "completed":
-        raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {found.status}")
+    inverted = invert(servo, linear, pre, post, INVERTED, lambda _: True)
+    if inverted.status != "completed":
+        raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {inverted.status}")
     zeros, times, shares = [], [], []
     for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
         still = np.zeros((1, len(rest)))
         dynamics = linear_dynamics(servo, np.array([t]), rest[None], still, still)
         s, left = np.linalg.eig(first_order(dynamics, 0, servo.scale).T)
-        y = np.concatenate([servo.scale * (found.curve(t) - rest), found.curve(t, 1)])
+        y = np.concatenate([servo.scale * (inverted.curve(t) - rest), inverted.curve(t, 1)])
         B = np.linalg.solve(dynamics.M[0], asked.Phi_V) * unit
         counts = (sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)
         for k in np.flatnonzero(counts):
@@ -136,10 +136,10 @@ def path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, flo
 def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
     """A warning for a path whose acceleration or jerk jumps where it begins or ends."""
     names = {2: "acceleration", 3: "jerk"}
-    found = [(where, round(order)) for where, order in zip(("begins", "ends"), path_orders(targets, end), strict=True)
+    rough = [(where, round(order)) for where, order in zip(("begins", "ends"), path_orders(targets, end), strict=True)
              if np.isfinite(order) and round(order) in names]  # fmt: skip
-    for order in sorted({order for _, order in found}):
-        where = " and ".join(f"where it {name}" for name, of in found if of == order)
+    for order in sorted({order for _, order in rough}):
+        where = " and ".join(f"where it {name}" for name, of in rough if of == order)
         cost = "no voltage without jumps makes up for that" if order == 2 else "that takes several times the voltage"
         yield (f"the path's {names[order]} jumps {where}: {cost}. Smoother ends: 35*s**4 - 84*s**5 + 70*s**6 - 20*s**7")
 

@@ -140,11 +140,11 @@ class _Newton:
         from scipy.linalg.lapack import dgbtrs
 
         b, size = self.layout.band, self.layout.size
-        found: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
+        solution: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
         if not is_refined:
-            return found
-        left = right - dgbmv(size, size, b, b, 1.0, self.matrix, found)
-        return found + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
+            return solution
+        left = right - dgbmv(size, size, b, b, 1.0, self.matrix, solution)
+        return solution + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 
 def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:

@@ -81,15 +81,15 @@ def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tr
 
 def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool]) -> tuple[Tracked, bool]:
     """The least voltage with a share `calm` of the effort on finer and finer intervals, and whether it settled."""
-    found, change = track(asked, breaks, None, calm), np.inf
-    while found.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
-        steps = np.abs(np.diff(found.voltage(breaks) / asked.units, axis=0)).max(axis=1)
-        breaks = halved(breaks, steps > TURNING * found.share)
-        finer = track(asked, breaks, found, calm)
+    tracked, change = track(asked, breaks, None, calm), np.inf
+    while tracked.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
+        steps = np.abs(np.diff(tracked.voltage(breaks) / asked.units, axis=0)).max(axis=1)
+        breaks = halved(breaks, steps > TURNING * tracked.share)
+        finer = track(asked, breaks, tracked, calm)
         if not finer.converged:  # from other voltages steps wander less
             finer = track(asked, breaks, None, calm)
         if not finer.converged:
             break
-        change = abs(finer.share / found.share - 1.0)
-        found = replace(finer, doubt=2 * change + finer.added / finer.share)
-    return found, change <= SETTLED
+        change = abs(finer.share / tracked.share - 1.0)
+        tracked = replace(finer, doubt=2 * change + finer.added / finer.share)
+    return tracked, change <= SETTLED

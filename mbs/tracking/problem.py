@@ -159,10 +159,10 @@ def track(
     if steps.has_share and not last.converged:
         start = replace(start, iterations=last.iterations)
         for steps.unique in WANDERING:
-            found = _newton(steps, start, MOST_ITERATIONS)
-            if not found.converged:
+            iterate = _newton(steps, start, MOST_ITERATIONS)
+            if not iterate.converged:
                 break
-            start = last = found
+            start = last = iterate
     return last.tracked(steps)
 
 
@@ -189,11 +189,18 @@ class _Iterate:
         slope = np.diff(self.V, axis=0) / steps.h[:, None]
         cost = steps.cost(self.found)
         return Tracked(
-            piecewise(GAUSS, breaks, self.p, self.v, self.K), PPoly(np.array([slope, self.V[:-1]]), breaks),
-            self.converged, self.iterations, self.share, 0.0 if steps.has_share else cost, steps.prices(self.found),
-            steps.asked.objective, step=self.moved, found=self.found,
+            piecewise(GAUSS, breaks, self.p, self.v, self.K),
+            PPoly(np.array([slope, self.V[:-1]]), breaks),
+            self.converged,
+            self.iterations,
+            self.share,
+            cost=0.0 if steps.has_share else cost,
+            prices=steps.prices(self.found),
+            objective=steps.asked.objective,
+            step=self.moved,
+            found=self.found,
             added=steps.unique * cost if steps.has_share else 0.0,
-        )  # fmt: skip
+        )
 
 
 def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
@@ -270,12 +277,12 @@ class _Steps:
         offset = np.concatenate(stages.at_end(p[:-1], v[:-1], K + moved), axis=1) - x[1:, self.y]
         of_torques = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
         self.program = self._program(ends, offset, *of_torques, x, self._charges(v, K + moved, (starts[1], K_z)))
-        found = minimize(self.program, self.gap, now.found)
-        change = found.x * self.unit
+        least = minimize(self.program, self.gap, now.found)
+        change = least.x * self.unit
         K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, self.program.z(change), optimize=True)
         x = x + change
         self.sigma = float(x[0, -1]) if self.has_share else 1.0
-        return *np.split(x[:, self.y], 2, axis=1), K_new, x[:, self.V], found
+        return *np.split(x[:, self.y], 2, axis=1), K_new, x[:, self.V], least
 
     def _stages_by_z(self, stages: Elimination) -> Array:
         """Derivatives (N, s, n, width + m) of K by z."""
@@ -334,7 +341,7 @@ class _Steps:
         rest = np.zeros((2, width))
         rest[:, self.y.start : self.y.start + n] = self.asked.rest / self.y_unit[:n]
         start, end = (rest - now[[0, -1]]) @ rows.T
-        return Program(H, g, F, G, c, (rows, start), (rows, end), C, d)
+        return Program(H, g, F, G, c, start=(rows, start), end=(rows, end), C=C, d=d)
 
     def _effort(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
         """H and g of J."""
@@ -370,19 +377,19 @@ class _Steps:
         V = volt * now[:, self.V]
 
         def by_z(start: float | Array, end: float | Array, of: slice = slice(None)) -> Array:
-            found = np.zeros((N, 1, m, self.width + m))
-            found[of, 0, each, each], found[of, 0, each, self.width + each] = volt * start, volt * end
-            return found
+            slopes = np.zeros((N, 1, m, self.width + m))
+            slopes[of, 0, each, each], slopes[of, 0, each, self.width + each] = volt * start, volt * end
+            return slopes
 
-        found = {"voltage": (V[:-1, None], by_z(1.0, 0.0))}
+        limited = {"voltage": (V[:-1, None], by_z(1.0, 0.0))}
         if self.asked.is_free:  # else V ends at zero
-            found["end"] = np.broadcast_to(V[-1], (N, 1, m)), by_z(0.0, 1.0, slice(-1, None))
+            limited["end"] = np.broadcast_to(V[-1], (N, 1, m)), by_z(0.0, 1.0, slice(-1, None))
         if charges[0].shape[1] or self.asked.limits.patches.has_rates:
             C, pace = self.asked.limits.patches.capacitance, 1.0 / self.h[:, None]
             slope, of_slope = (np.diff(V, axis=0) * pace)[:, None], by_z(-pace, pace)
-            found["slew"] = slope, of_slope
-            found["current"] = charges[0] + C * slope, charges[1] * self.unit_z + C[:, None] * of_slope
-        return found
+            limited["slew"] = slope, of_slope
+            limited["current"] = charges[0] + C * slope, charges[1] * self.unit_z + C[:, None] * of_slope
+        return limited
 
     def _inequalities(self, values: Mapping[str, tuple[Array, Array]]) -> tuple[Array, Array]:
         """C and d: limits of voltages at breaks, of their rates and of currents between, and of torques at stages.

@@ -131,13 +131,13 @@ class Tracking(TimedAnalysis):
             posed = _pose(model, context.patches, self, progress)
             least = settled(posed.asked, posed.coarse, progress)
             _check_found(context, posed, least)
-            found, objective = _solve(context, posed, self, least)
+            tracked, objective = _solve(context, posed, self, least)
             if objective == "least-voltage":  # without the effort's share
-                least = replace(found, doubt=least.doubt)
+                least = replace(tracked, doubt=least.doubt)
             texts = list(_warnings(context, posed, self, least))
-            if found.unmet > self.tolerance:
+            if tracked.unmet > self.tolerance:
                 texts.append(
-                    f"between Gauss points modal forces up to {found.unmet:.2g} of the largest elastic one are left"
+                    f"between Gauss points modal forces up to {tracked.unmet:.2g} of the largest elastic one are left"
                     f" over, more than the tolerance, {self.tolerance:g}: raise intervals, or loosen the tolerance"
                 )
             bounds = _bounds(posed)
@@ -149,19 +149,19 @@ class Tracking(TimedAnalysis):
         around = TrackedPath(
             pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
             least_voltage_doubt=least.doubt * least.share * most,
-            least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
-            held=servo.model, unmet=found.unmet, bounds=bounds,
+            least_share=least.share if has_limits else float("nan"), objective=objective, cost=tracked.cost,
+            held=servo.model, unmet=tracked.unmet, bounds=bounds,
             prices={
                 kind: model.by_motor(of) if kind == "torque" else {
                     name: prices[0] for name, prices in _by_body(context, of[None]).items()
                 }
-                for kind, of in found.prices.items()
+                for kind, of in tracked.prices.items()
             },
         )  # fmt: skip
         times = output_times(self.end, self.output_step, pre, post)
 
         def at(times: Array) -> Outcome:
-            return replace(_outcome(self, model, servo, found, context, times), details=around)
+            return replace(_outcome(self, model, servo, tracked, context, times), details=around)
 
         run = at(times)
         around = _with_torques_alone(context, run, around)
@@ -298,12 +298,12 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     kept = Limits(within, limits.torque * (1.0 - analysis.tolerance))
     asked = replace(posed.asked, objective=objective, limits=kept)
     breaks = posed.breaks if objective == "effort" and least.share < AMPLE else least.voltage.x
-    found = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
-    if not found.converged:
+    tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
+    if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = _causes(context, posed) or "loosen limits or tolerance"
         raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
-    return found, objective
+    return tracked, objective
 
 
 def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
