@@ -42,7 +42,7 @@ OF_PART: dict[type, dict[str, str]] = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModalBody(Integrals, Frozen):
-    """A flexible link in mass-orthonormal modal coordinates; immutable, checked when made. SI units, the link's frame.
+    """Flexible link in mass-orthonormal modal coordinates, SI units, axes of the link; immutable and validated.
 
     Attributes:
         name: of the link.
@@ -53,7 +53,7 @@ class ModalBody(Integrals, Frozen):
         stiffness: (n, n) K_ff = diag(ω²).
         modal_mass: (n, n) m_ff = I to 1e-8.
         damping_ratio: (n,) ζ.
-        damping_of: "link", or "robot" where ζ is wanted of the vibrations of the assembled robot.
+        damping_of: "link", or "robot" if ζ refers to the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
         J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
@@ -68,13 +68,13 @@ class ModalBody(Integrals, Frozen):
         stress_loads: names of the l unit loads (`unit_loads`) whose static stresses are known; none in old files.
         surface_static: (p, 6, l) likewise, as `static` in `StressPoint`.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
-        measured: which frequencies and damping ratios were measured; None where all are computed.
+        measured: marks of measured frequencies and damping ratios; None if all are computed.
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
         assembly: the program that assembled its matrices, with versions; empty where not known.
         eigensolver: that found its modes, likewise.
-        remarks: what the file of a solid's part holds and the body does not, a sentence each.
+        remarks: omitted content of the part's file, one sentence each.
 
     Raises:
         InputError: shapes do not fit together, something is not finite, or an identity does not hold.
@@ -141,7 +141,7 @@ class ModalBody(Integrals, Frozen):
         return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
 
     def interpolate(self, x: float) -> Interface:
-        """What the modes do at `x` (m from the root) on the axis.
+        """Mode shapes at the point `x` (m from the root) on the axis.
 
         If the stations of each element are known (files made here), all six components are the cubic through the
         four stations of the element: exactly the finite element functions of a beam, of either theory. Otherwise

@@ -181,7 +181,7 @@ def fit_measured(
         measured: table with mode, frequency (Hz), and optionally uncertainty (Hz).
         vary: keys with dots; "KEY=KEY" have a common factor.
         output: new file; None: next to the old one, with a name that ends in `.fitted.toml`.
-        motors: of a robot during the measurement, `free` (the default) or `held`.
+        motors: state of a robot's motors during the measurement, `free` (the default) or `held`.
         force: whether to replace existing files.
 
     Returns:

@@ -58,11 +58,11 @@ class Fit:
 
     @property
     def degrees_of_freedom(self) -> int | None:
-        """From how many remaining errors the deviations are estimated; None where uncertainties were given."""
+        """Degrees of freedom of the estimated deviations; None with given uncertainties."""
         return None if self.uncertainty is not None else len(self.measured) - len(self.keys)
 
     def coverage_factor(self, probability: float) -> float:
-        """How many deviations to both sides of a fitted value hold the true one with this probability.
+        """Number of deviations on both sides of a fitted value in a confidence interval of this probability.
 
         Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3); NaN of none.
         """

@@ -51,7 +51,7 @@ class LinkAccess(Datasets):
         return read_modal_body(self._modal_path(name))
 
     def modal_mass(self, name: str) -> float:
-        """Its mass, kg, without reading the rest of the file."""
+        """Mass of a modal body, kg; reads no other data."""
         return read_mass(self._modal_path(name))
 
     def _modal_path(self, name: str) -> Path:
@@ -144,5 +144,5 @@ class Results(LinkAccess, AnalysisAccess):
 
     @property
     def skipped(self) -> list[str]:
-        """What the solve left out, one line each."""
+        """Parts of the scene that the model omits, one line each."""
         return [str(line) for line in self.attributes("/")["skipped"]]
