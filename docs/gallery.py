@@ -74,8 +74,8 @@ def in_docs(text: str, case: str) -> str:
 def gallery_page() -> str:
     """The text of docs/cases.md."""
     return (
-        "# Cases\n\n<!-- written by docs/gallery.py from the READMEs of the cases -->\n\nEach case is a folder of `cases/`"
-        " with its scene, figures and a README with the model, the mathematics and the expected numbers.\n\n"
+        "# Cases\n\n<!-- written by docs/gallery.py from the READMEs of the cases -->\n\nEach case is a folder of"
+        " `cases/` with its scene, figures and a README with the model, the mathematics and the expected numbers.\n\n"
         f"## Gallery\n\n{cards()}"
     )
 

@@ -75,19 +75,19 @@ def make_link(
 ) -> LinkOutcome:
     """Compute the modal body of a link unless it is up to date: `ffrobot link`.
 
-    Under mpirun all processes call; only the first writes, and computes the links that are beams.
+    Under mpirun all processes call it; only the first one writes files and computes beams.
 
     Args:
         link: a link file, or a dictionary of its keys.
         output: modal body file; None: next to the link file, or in the user's cache for a dictionary.
         force: whether to compute it in any case.
-        progress: is called with a line for each step.
+        progress: function that receives a line for each step.
 
     Returns:
         The modal body, its file, and whether it was computed.
 
     Raises:
-        InputError: something in the link file is wrong, or `output` is some other file that would be lost.
+        InputError: the link file is invalid, or `output` is a file of another kind.
         SolveError: no modes were found, or the file cannot be written.
 
     Example:

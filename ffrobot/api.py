@@ -27,10 +27,10 @@ def solve(
     resume: bool = False,
     allow_python: Sequence[AnyPath] = (),
 ) -> Results:
-    """Run the analyses of a scene, or of a scene file: `ffrobot solve`.
+    """Solve the analyses of a scene or a scene file: `ffrobot solve`.
 
     Args:
-        scene: a scene file, or a scene from `make_scene` or `load_scene`.
+        scene: scene file, or a scene from `make_scene` or `load_scene`.
         output: results file; None: results stay in memory.
         watcher: an object that observes progress and can stop the run.
         resume: whether to resume a stopped run from `output`; Python functions have to be the same.
@@ -40,11 +40,11 @@ def solve(
         The results; `results["inverse/joints/shoulder/moment"]` is a dataset.
 
     Raises:
-        InputError: something in the scene is wrong.
-        SolveError: an analysis does not reach its end; `output` has the part until then.
+        InputError: the scene is invalid.
+        SolveError: an analysis does not reach its end; `output` contains the results so far.
 
     Warns:
-        FfrobotWarning: results may be wrong; `Results.warnings` has the same texts.
+        FfrobotWarning: results may be wrong; `Results.warnings` contains the texts.
 
     Example:
         results = ffrobot.solve("scene.toml", "scene.results.h5")
@@ -99,7 +99,7 @@ def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> lis
     """Write the result of a design function as files for `write_report`, and as figures.
 
     Args:
-        found: what `sensitivity`, `optimise`, `trade_off` or `uncertainty` returned.
+        found: result of `sensitivity`, `optimise`, `trade_off` or `uncertainty`.
         folder: where to write.
         figures: whether to draw figures.
 
@@ -225,7 +225,7 @@ def write_movie(
     Args:
         results: a results file, or results.
         path: the movie, `.gif` or `.mp4`.
-        analysis: the analysis; None: the first that goes through time.
+        analysis: the analysis; None: the first one over time.
         seconds: duration of the movie; None: 8 s.
         scale: factor of deflections; None: chosen for visibility.
         rendered: whether PyVista renders solids (`ffrobot view --movie`), instead of a drawing.

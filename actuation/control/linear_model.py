@@ -29,7 +29,7 @@ SHOWN = 4  # names in the line that a model prints
 
 @struct
 class LinearModel:
-    """Equations of motion, linear about a configuration or one instant of a motion: x = (δs, δṡ), f coordinates s.
+    """Linear model about a configuration or one instant of a motion: states x = (δs, δṡ), f coordinates s.
 
     Attributes:
         A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D of accelerations alone is not 0.
@@ -67,7 +67,7 @@ class LinearModel:
 
     @cached_property
     def second_order(self) -> tuple[Array, Array, Array, Array]:
-        """K̂, D̂ (f, f), inputs (f, …) and outputs (…, f) where the mass is the identity: s = L⁻ᵀ z, mass = L Lᵀ."""
+        """K̂, D̂ (f, f), inputs (f, …) and outputs (…, f) for unit mass: s = L⁻ᵀ z, mass = L Lᵀ."""
         f, L = self.freedom, np.linalg.cholesky(self.mass)
         L_T, inverse = L.T, np.linalg.inv(L.T)
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
@@ -83,22 +83,22 @@ class LinearModel:
         return _numbers("output", names, self.output_names)
 
     def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:
-        """G(iω) (len(omega), outputs, inputs) at angular frequencies ω, rad/s."""
+        """Frequency response G(iω) (len(omega), outputs, inputs) at ω, rad/s."""
         K, D, B, C = self.second_order
         s = 1j * np.asarray(omega)[:, None, None]
         X = np.linalg.solve(s**2 * np.eye(self.freedom) + s * D + K, B[None, :, self.inputs(inputs)])
         return np.asarray(C[self.outputs(outputs)] @ X, dtype=complex)
 
     def arrays(self) -> dict[str, Any]:
-        """Everything of the model by name, as files hold it."""
+        """Arrays and names of the model, as files contain them."""
         return {name: getattr(self, name) for name in type(self).__annotations__}
 
     def save(self, path: Path) -> None:
-        """Write to a .npz or .mat file (MATLAB's). Raises `InputError` for another suffix."""
+        """Write the model to a .npz or .mat file. Raises `InputError` for another suffix."""
         save_arrays(self.arrays(), path)
 
     def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> control.StateSpace:
-        """The model as python-control's state space, "." in names made ":"; needs that package (extra "control").
+        """State-space model of python-control (extra "control"), with ":" instead of "." in names.
 
         From `inputs` to `outputs` by their names here, in that order; all where they are not given. Raises `InputError`
         for unknown ones.

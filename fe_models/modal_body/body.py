@@ -135,7 +135,7 @@ class ModalBody(Integrals, Frozen):
 
     @property
     def modes_in_words(self) -> str:
-        """How many modes there are."""
+        """Numbers of eigenmodes and attachment modes, in words."""
         static = self.mode_count - self.eigenmode_count
         kind = "constraint" if self.reference_condition == "craig-bampton" else "attachment"
         return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
@@ -155,7 +155,7 @@ class ModalBody(Integrals, Frozen):
         return Interface(position[0], translation[0], rotation[0])
 
     def along_axis(self, x: Array) -> AlongAxis:
-        """What the modes do at several places `x` (m,), m from the root: as `interpolate`, which raises the same."""
+        """Mode shapes at several points `x` (m,) on the axis, m from the root; errors as in `interpolate`."""
         positions = self.stations.position[:, 0]
         slack = 1e-9 * self.length
         outside = x[~((positions[0] - slack <= x) & (x <= positions[-1] + slack))]

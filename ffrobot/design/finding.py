@@ -67,7 +67,7 @@ class Finding(ABC):
 
     @abstractmethod
     def remarks(self) -> Iterator[str]:
-        """What to mind, and how it was found."""
+        """Notes on the accuracy, failed runs, and the method."""
 
     @abstractmethod
     def csv_files(self) -> Iterator[CsvFile]:
@@ -75,14 +75,14 @@ class Finding(ABC):
 
     @abstractmethod
     def diagrams(self) -> Sequence[Diagram]:
-        """Its pictures."""
+        """Diagrams of the study."""
 
     def report_tables(self) -> Iterator[StudyTable]:
         """Tables of text for the page of a report."""
         return (section.for_report() for section in self.sections())
 
     def print(self, console: Console) -> None:
-        """Tables of text, then what to mind."""
+        """Print the tables as text, then the notes."""
         for section in self.sections():
             if section.line:
                 console.print(section.line, soft_wrap=True)
@@ -96,13 +96,13 @@ class Finding(ABC):
         return out.getvalue()
 
     def write_tables(self, folder: Path) -> Iterator[Path]:
-        """Write the tables with all numbers; the files one after the other."""
+        """Write the CSV tables; yields the written files."""
         for file in self.csv_files():
             write_atomically(folder / file.name, as_csv([file.columns, *file.rows]).encode(), file.what, ours=True)
             yield folder / file.name
 
     def study(self) -> Study:
-        """Words, tables and diagrams."""
+        """Content of the study for JSON and reports: texts, tables and diagrams."""
         facts = tuple(_fact(line) for line in self.remarks() if line)
         return Study(
             ffrobot_version=VERSION, name=self.name, title=self.title, scene=str(self.scene),
@@ -112,7 +112,7 @@ class Finding(ABC):
         )  # fmt: skip
 
     def write_study(self, folder: Path, *, figures: bool) -> Iterator[Path]:
-        """Write the file for the report, and the diagrams as figures; the files one after the other."""
+        """Write the JSON file for the report, and the figures; yields the written files."""
         study = self.study()
         yield write_study(study, folder)
         if figures:

@@ -226,21 +226,21 @@ class Front(Finding):
 
     @property
     def values(self) -> Array:
-        """(N, 2) of both responses."""
+        """(N, 2) values of both responses."""
         return np.array([(one.goal, one.against) for one in self.points])
 
     @property
     def shortfall(self) -> str:
-        """That some designs do not keep the limits."""
+        """Statement that some designs are infeasible; empty if all are feasible."""
         good = all(one.feasible for one in self.points)
         return "" if good else "not all designs of the curve keep the limits: see the table"
 
     def headline(self) -> str:
-        """How many designs, of which responses."""
+        """Number of designs and their responses, in one line."""
         return f"{self.goals[0]} against {self.goals[1]}: {len(self.points)} designs"
 
     def sections(self) -> Iterator[TextTable]:
-        """A line for each design: both responses, what the second one costs, the keys."""
+        """Table with a line for each design: both responses, shadow price, keys."""
         price = " per ".join(unit or "1" for unit in self.units)
         heading = (*map(with_unit, self.goals, self.units), f"price ({price})", *self.keys, "")
         yield TextTable(heading, self._rows())
@@ -251,7 +251,7 @@ class Front(Finding):
             yield (f"{one.goal:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
 
     def remarks(self) -> Iterator[str]:
-        """How it was found, and what to mind."""
+        """Lines with the method and notes on the accuracy."""
         how = f"{len(self.points)} designs by slsqp, {self.runs} runs with a tolerance of at most {self.tolerance:g}"
         yield f"how        {how}"
         for one in self.points:
@@ -259,7 +259,7 @@ class Front(Finding):
                 yield f"note       {self.goals[1]} {one.against:.6g}: {one.message}"
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each design; `price` is ∂response/∂against along the front."""
+        """CSV table with one line for each design; `price` is ∂response/∂against along the front."""
         columns = [*self.goals, "price", *self.keys, "converged", "feasible", "message"]
         yield CsvFile("front.csv", "table of the front", columns, self._numbers())
 
@@ -270,7 +270,7 @@ class Front(Finding):
             yield [one.goal, one.against, price, *one.point, *states, one.message]
 
     def diagrams(self) -> list[Diagram]:
-        """The front and all tried designs."""
+        """Diagrams of the front and of all designs."""
         states = states_of(self.problem, self.tried, [one.design for one in self.points])
         limits = [(limit.goal.text, limit) for limit in self.problem.limits]
         goals = [(self.goals[0], None), *limits, (self.goals[1], None)]

@@ -97,7 +97,7 @@ COLUMNS = ("what", "name", "start", "best", "low", "high", "reached", "price")
 
 @dataclass(frozen=True)
 class Optimum(Finding):
-    """The result of a search.
+    """Result of an optimization.
 
     Attributes:
         scene: its file.
@@ -105,7 +105,7 @@ class Optimum(Finding):
         method, message: the optimizer; why it ended, if not at an optimum.
         start, best: designs of the best search; `searches` are all.
         optimality: conditions of optimality at `best`; None without gradients.
-        runs: their number; `failures` has failed ones in words.
+        runs: number of runs; `failures` are messages of failed ones.
         tolerance: largest tolerance of the runs.
         verdict: of `best`.
         best_scene: the scene file of `best`, complete; None if it was not kept.
@@ -135,12 +135,12 @@ class Optimum(Finding):
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """With dots."""
+        """Keys with dots."""
         return tuple(map(".".join, self.space.keys))
 
     @property
     def values(self) -> tuple[object, ...]:
-        """Of the keys, in the best design."""
+        """Values of the keys in the best design."""
         return self.space.point(self.best.place)
 
     @property
@@ -150,27 +150,27 @@ class Optimum(Finding):
 
     @property
     def limits(self) -> Array:
-        """(m) values of the responses that are limited."""
+        """(m,) values of the limited responses."""
         return np.array([reading.value for reading in self.best.readings[1:]])
 
     @property
     def violation(self) -> float:
-        """The largest excess of a limit, of the limit; up to 1e-6 the design is `feasible`."""
+        """Largest excess over a limit, relative to the limit; up to 1e-6 the design is `feasible`."""
         return self.problem.violation(self.best.readings)
 
     @property
     def feasible(self) -> bool:
-        """Whether the best design keeps all limits."""
+        """Whether the best design satisfies all limits."""
         return self.violation <= KEPT
 
     @property
     def converged(self) -> bool:
-        """Whether gradients say that nothing better is near."""
+        """Whether the conditions of optimality are satisfied."""
         return self.optimality is not None and self.optimality.reached(AIM)
 
     @property
     def prices(self) -> Array:
-        """(m) ∂response/∂limit: change of the best value per unit of each limit; NaN of those not reached."""
+        """(m,) ∂response/∂limit, shadow prices of the limits, SI units; NaN if not active."""
         if self.optimality is None:
             return np.full(len(self.problem.limits), np.nan)
         room = np.array([limit.sense / limit.scale for limit in self.problem.limits])
@@ -178,7 +178,7 @@ class Optimum(Finding):
 
     @property
     def bound_prices(self) -> Array:
-        """(n) ∂response/∂bound likewise, of the bounds that numbers are at."""
+        """(n,) ∂response/∂bound, shadow prices of the bounds, SI units; NaN if not active."""
         if self.optimality is None:
             return np.full(len(self.space.variables), np.nan)
         found = -self.optimality.bounds / self.problem.factors(self.best.values)[0]
@@ -187,17 +187,17 @@ class Optimum(Finding):
 
     @property
     def shortfall(self) -> str:
-        """That it does not keep all limits."""
+        """Reason why the best design is infeasible; empty if it is feasible."""
         return "" if self.feasible else "no design found that keeps all limits: see the table of limits"
 
     def sections(self) -> Iterator[TextTable]:
-        """Keys and limits, at the start and in the best design."""
+        """Tables of keys and limits, at the start and in the best design."""
         yield TextTable(("key", "start", "best", "bounds"), self._key_rows(), line=self.headline())
         if self.problem.limits:
             yield TextTable(("limit", "start", "best", ""), [row[:4] for row in self._limit_rows()])
 
     def report_tables(self) -> Iterator[StudyTable]:
-        """With shadow prices of limits."""
+        """Tables for the report, with shadow prices of limits."""
         keys, *limits = self.sections()
         yield keys.for_report()
         if limits:
@@ -205,7 +205,7 @@ class Optimum(Finding):
             yield TextTable(heading, self._limit_rows()).for_report()
 
     def headline(self) -> str:
-        """The best value and what it saves, or that no design keeps all limits."""
+        """Best value and its improvement, or that no design is feasible, in one line."""
         word = "least" if self.problem.sense > 0 else "largest"
         text = f"{word} {self.problem.objective.text}: {self.best.readings[0].in_words()}"
         if self.start.completed and (own := self.start.values[0]):
@@ -215,7 +215,7 @@ class Optimum(Finding):
         return text if self.feasible else f"no design found that keeps all limits; nearest is one with {text}"
 
     def remarks(self) -> Iterator[str]:
-        """Shadow prices of limits and bounds in words, what to mind, and how the design was found."""
+        """Lines with shadow prices, notes on the accuracy, and the method."""
         for variable, u in zip(self.space.variables, self.best.place, strict=True):
             if variable.motors:
                 yield f"motor      {variable.keys[0][1]}: {variable.motors[round(u)].name}, 1:{variable.values(u)[0]:g}"
@@ -250,12 +250,12 @@ class Optimum(Finding):
                 yield f"{variable.name}: {self._trade(bound, room, price, '')}"
 
     def write_tables(self, folder: Path) -> Iterator[Path]:
-        """Next to the scene of the best design and the table of all, which the search has written."""
+        """Write the CSV tables next to the files of the search; yields the written files."""
         yield from (path for path in (self.best_scene, self.designs) if path is not None)
         yield from super().write_tables(folder)
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """Response, keys and limits with their shadow prices, one line each."""
+        """CSV table of response, keys and limits with their shadow prices."""
         yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
@@ -272,7 +272,7 @@ class Optimum(Finding):
             yield ["limit", limit.goal.text, starts[k + 1], self.limits[k], *within, *_reached(price)]
 
     def diagrams(self) -> list[Diagram]:
-        """All designs, and how the search went."""
+        """Diagrams of all designs and of the convergence."""
         problem = self.problem
         states = states_of(problem, self.tried, [self.best])
         goals = [(problem.objective.text, None), *((limit.goal.text, limit) for limit in problem.limits)]

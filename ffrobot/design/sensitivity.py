@@ -233,14 +233,14 @@ ERRORS = "errors: by differences of lower order, noise, and the tolerance of reu
 
 @dataclass(frozen=True)
 class Sensitivity(Finding):
-    """Derivatives of g responses by k keys.
+    """Derivatives of g responses with respect to k keys.
 
     Attributes:
         scene: its file.
         goals, readings: the responses, and their values in the scene.
         keys: with dots; `values` (k,) are theirs in the scene.
         entries: the derivatives, [response][key].
-        failures: designs that failed, in words.
+        failures: messages of failed designs.
         tolerance: largest tolerance of the runs; `runs` is their number.
         table: the file of all runs; None if they were not kept.
     """
@@ -266,7 +266,7 @@ class Sensitivity(Finding):
 
     @property
     def derivative(self) -> Array:
-        """(g, k) ∂response/∂key, SI units; NaN where there is none."""
+        """(g, k) ∂response/∂key, SI units; NaN if unknown."""
         return np.array([[entry.derivative for entry in row] for row in self.entries])
 
     @property
@@ -283,7 +283,7 @@ class Sensitivity(Finding):
             )
 
     def ranked(self, g: int) -> list[int]:
-        """Key numbers, the largest percent per percent of response g first; those without one by their derivative."""
+        """Key numbers by decreasing influence on response g, in percent per percent, or else by derivative."""
         sizes = [np.nan_to_num(np.abs(of[g])) for of in (self.logarithmic, self.derivative)]
         return sorted(range(len(self.keys)), key=lambda k: (-sizes[0][k], -sizes[1][k]))
 
@@ -292,7 +292,7 @@ class Sensitivity(Finding):
         return "; ".join(f"{goal}: {self.keys[self.ranked(g)[0]]} matters most" for g, goal in enumerate(self.goals))
 
     def sections(self) -> Iterator[TextTable]:
-        """A table for each response, the most influential key first."""
+        """Tables, one for each response, the most influential key first."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             rows = [self._row(g, k) for k in self.ranked(g)]
             when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
@@ -306,7 +306,7 @@ class Sensitivity(Finding):
         )  # fmt: skip
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each response and key."""
+        """CSV tables with one line for each response and key."""
         yield CsvFile("sensitivity.csv", "table of sensitivities", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
@@ -320,7 +320,7 @@ class Sensitivity(Finding):
                 ]  # fmt: skip
 
     def diagrams(self) -> list[Bars]:
-        """A tornado for each response."""
+        """Tornado diagrams, one for each response."""
         return [self._tornado(g) for g in range(len(self.goals))]
 
     def _tornado(self, g: int) -> Bars:
@@ -336,7 +336,7 @@ class Sensitivity(Finding):
         )
 
     def remarks(self) -> Iterator[str]:
-        """What to mind about the numbers, and how they came about."""
+        """Notes on the accuracy, failed runs, and the method."""
         for goal, reading, row in zip(self.goals, self.readings, self.entries, strict=True):
             if reading.remark:
                 yield f"note       {goal}: {reading.remark}"

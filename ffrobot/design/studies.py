@@ -102,7 +102,7 @@ def sensitivity(
     step: Annotated[float, FiniteRange(1e-6, 0.2)] = 0.01, tolerance: Annotated[float | None, Tolerance] = None,
     **how: Unpack[RunOptions],
 ) -> "Sensitivity":  # fmt: skip
-    """Derivatives of scalar responses by keys of a scene and its links: `ffrobot sensitivity`.
+    """Derivatives of scalar responses with respect to keys of a scene and its links: `ffrobot sensitivity`.
 
     Args:
         scene: the scene file.
@@ -140,7 +140,7 @@ def optimise(
     seed: Annotated[int, IntRange(0, 2**32 - 1)] = 0, runs: MostRuns = 1000,
     tolerance: Annotated[float, Tolerance] = 1e-8, **how: Unpack[RunOptions],
 ) -> "Optimum":  # fmt: skip
-    """The design with the least, or largest, objective within limits: `ffrobot optimise`.
+    """Find the design with the smallest or largest objective within limits: `ffrobot optimise`.
 
     Args:
         scene: the scene file.
@@ -158,7 +158,7 @@ def optimise(
         how: as in `sensitivity`.
 
     Returns:
-        The best design. If no design satisfies the limits it is the nearest one, and not `feasible`.
+        The best design; if none satisfies the limits, the nearest one, with `feasible` False.
 
     Raises:
         InputError: responses, limits or keys are wrong, or bounds exclude all designs.
@@ -186,7 +186,7 @@ def trade_off(
     subject_to: Limits = (), runs: MostRuns = 1000, tolerance: Annotated[float, Tolerance] = 1e-8,
     **how: Unpack[RunOptions],
 ) -> "Front":  # fmt: skip
-    """Pareto front: the least of one response for each of `points` values of another: `ffrobot optimise … --against`.
+    """Pareto front: smallest first response for `points` values of a second one: `ffrobot optimise … --against`.
 
     Args:
         scene: the scene file.
@@ -205,7 +205,7 @@ def trade_off(
 
     Raises:
         InputError: as in `optimise`; discrete sets; responses with the same optimum.
-        SolveError: a design with which a search begins does not complete.
+        SolveError: the initial design of a search does not complete.
 
     Example:
         front = ffrobot.trade_off(
@@ -244,7 +244,7 @@ def uncertainty(
 
     Raises:
         InputError: responses, keys or distributions are wrong.
-        SolveError: the scene with nominal values, or all others, cannot be solved.
+        SolveError: the nominal scene, or all others, cannot be solved.
 
     Example:
         found = ffrobot.uncertainty("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], samples=100)

@@ -91,7 +91,7 @@ class Uncertainty(Finding):
     table: Path | None
 
     def headline(self) -> str:
-        """Between what responses are, most of the time."""
+        """Intervals of the responses, in one line."""
         texts = []
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             low, _, high = self.statistics.quantiles[:, g]
@@ -99,7 +99,7 @@ class Uncertainty(Finding):
         return "; ".join([*texts, *(f"band of {band.name}" for band in self.bands)])
 
     def sections(self) -> Iterator[TextTable]:
-        """Each response with what the keys do to it, then the bands."""
+        """Tables of each response with the influence of the keys, then the bands."""
         for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
             heading = (*self.statistics.named, "worst case")
             nominal = f"{goal}: {reading.in_words()} with all parameters at nominal values"
@@ -140,7 +140,7 @@ class Uncertainty(Finding):
         return TextTable(("key", "spread", *parts), rows, of=self.goals[g])
 
     def ranked(self, g: int) -> list[int]:
-        """Keys by number, the most influential for response g first."""
+        """Key numbers by decreasing influence on response g."""
         by = self.indices.total[g] if self.indices else self.shares[g]
         return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
 
@@ -154,7 +154,7 @@ class Uncertainty(Finding):
             yield (band.name, band.unit, *cells)
 
     def remarks(self) -> Iterator[str]:
-        """What there is to mind, and how it was found."""
+        """Notes on the accuracy, failed runs, and the method."""
         deviations = self.statistics.deviation
         for goal, reading, explained, deviation in zip(
             self.goals, self.readings, self.explained, deviations, strict=True
@@ -180,7 +180,7 @@ class Uncertainty(Finding):
         yield f"how        {self.runs} runs; {how}"
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """One line for each response, and of each history one for each time."""
+        """CSV tables with one line for each response, and for each time of a history."""
         if self.goals:
             yield CsvFile("uncertainty.csv", "table of uncertainties", self._goal_columns(), self._goal_rows())
         for band in self.bands:
@@ -203,7 +203,7 @@ class Uncertainty(Finding):
             yield [goal, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
 
     def diagrams(self) -> list[Diagram]:
-        """The ranking of keys for each response, and the bands."""
+        """Diagrams of the ranking of keys for each response, and of the bands."""
         return [*(self._ranking(g) for g in range(len(self.goals))), *map(self._band, self.bands)]
 
     def _ranking(self, g: int) -> Bars:

@@ -286,7 +286,7 @@ def print_fit(fit: Fit, console: Console) -> None:
 
 
 def remarks(fit: Fit) -> Iterator[str]:
-    """What to mind about the numbers."""
+    """Notes on the accuracy of the fit."""
     if np.isnan(fit.relative_deviation).any():
         yield (
             "as many frequencies as keys: they fit whatever their errors, so no uncertainty is known; give a column"

@@ -26,7 +26,7 @@ class AnalysisAccess(Datasets):
 
     @property
     def analyses(self) -> list[str]:
-        """Names of the analyses that the file holds, in the order of the scene."""
+        """Names of the analyses in the file, in the order of the scene."""
         return [entry["name"] for entry in self.scene["analysis"] if entry["name"] in self._file]
 
     @property
@@ -43,12 +43,12 @@ class AnalysisAccess(Datasets):
 
     @property
     def warnings(self) -> dict[str, list[str]]:
-        """Why results of an analysis may be wrong, or not mean what they seem to; by analysis, where there is any."""
+        """Reasons why results may be wrong or misleading, by analysis."""
         return self._texts("warnings")
 
     @property
     def notes(self) -> dict[str, list[str]]:
-        """What is worth knowing of right results of an analysis; by analysis, where there is any."""
+        """Properties of correct results, by analysis."""
         return self._texts("notes")
 
     def _texts(self, kind: str) -> dict[str, list[str]]:
@@ -56,7 +56,7 @@ class AnalysisAccess(Datasets):
         return {name: [str(text) for text in texts] for name, texts in texts_of.items() if len(texts)}
 
     def histories(self, analysis: str) -> list[str]:
-        """Names, inside an analysis, of its datasets with a row for each output."""
+        """Names of the histories of an analysis: datasets over its outputs."""
         known: dict[str, list[str]] = self.__dict__.setdefault("_histories", {})  # a walk through a file takes ms
         if analysis not in known:
             found, outputs = known.setdefault(analysis, []), len(self.time(analysis))
@@ -69,7 +69,7 @@ class AnalysisAccess(Datasets):
         return list(known[analysis])
 
     def columns(self, analysis: str) -> dict[str, Array]:
-        """Everything an analysis holds over time, one (T,) array each.
+        """All histories of an analysis, one (T,) array each.
 
         The name is the dataset's inside the analysis, with the column where it has several:
         `points/link2.tip/position[0]`.
@@ -83,7 +83,7 @@ class AnalysisAccess(Datasets):
         return found
 
     def frame(self, analysis: str) -> DataFrame:
-        """`columns` of an analysis as a table of pandas, by time (s)."""
+        """Histories of an analysis as a pandas DataFrame, indexed by time (s)."""
         with extras():
             from pandas import DataFrame
 
@@ -102,7 +102,7 @@ class AnalysisAccess(Datasets):
             return labelled(self, analysis, self.histories(analysis))
 
     def linear(self, analysis: str) -> tuple[LinearModel, ...]:
-        """The linear models of an analysis, one for each of its times. Raises `InputError` where it has none."""
+        """Linear models of an analysis, one for each of its times. Raises `InputError` if there is none."""
         if not self.has(f"{analysis}/linear"):
             raise InputError(
                 f'{self.path}: expected a linear analysis ({quoted(self._with_models())}), found "{analysis}"'
@@ -112,14 +112,14 @@ class AnalysisAccess(Datasets):
         return read_linear(self._file, analysis)
 
     def linear_analysis(self, analysis: str | None) -> str:
-        """`analysis`, or the first that has linear models. Raises `InputError` where there is none."""
+        """`analysis`, or the first one with linear models. Raises `InputError` if there is none."""
         known = self._with_models()
         if analysis is None and not known:
             raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none')
         return analysis or known[0]
 
     def export_linear(self, analysis: str | None, path: Path) -> str:
-        """Write the linear models of an analysis, the first that has any if not named, to .npz or .mat; its name."""
+        """Write the linear models of an analysis (default: the first with any) to .npz or .mat; returns its name."""
         from .linear import save_models
 
         save_models(self.linear(name := self.linear_analysis(analysis)), path)

@@ -68,11 +68,11 @@ class Datasets:
         self.close()
 
     def close(self) -> None:
-        """Close the file; nothing can be read afterwards."""
+        """Close the file."""
         self._file.close()
 
     def keys(self) -> list[str]:
-        """Names of all datasets, as `results[…]` takes them."""
+        """Names of all datasets, for `results[NAME]`."""
         names: list[str] = []
         self._file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
         return [name for name in names if "/resume/" not in name]
@@ -88,7 +88,7 @@ class Datasets:
         return iter(self.keys())
 
     def save(self, path: PathLike[str] | str) -> Path:
-        """Write results that are in memory only to the file `path`, or a copy of those that are in one.
+        """Write the results, or a copy of their file, to the file `path`.
 
         Raises `InputError` where that would cost a file of another kind, `SolveError` where it cannot be written.
         """
@@ -99,7 +99,7 @@ class Datasets:
 
     @contextmanager
     def on_disk(self) -> Iterator[Path]:
-        """The file of the results; of those in memory a temporary one."""
+        """Path of the results file; a temporary file for results in memory."""
         if not self._in_memory:
             yield self.path
             return
@@ -116,7 +116,7 @@ class Datasets:
         return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
 
     def settling(self, point: str, option: str = "settling") -> tuple[str, Mapping[str, Any]]:
-        """The first analysis with residual vibration of "BODY.POINT", and the numbers; "ANALYSIS/BODY.POINT" names it.
+        """First analysis with residual vibration of "BODY.POINT" (or of "ANALYSIS/BODY.POINT"), and its numbers.
 
         Raises `InputError`, with the `option` that names the point, where there is none.
         """
@@ -133,19 +133,19 @@ class Datasets:
         )
 
     def names(self, group: str) -> list[str]:
-        """Names inside a group such as `inverse/points`, 2 before 10; none when the file does not have it."""
+        """Names in a group such as `inverse/points`, in natural order; empty if the file does not have the group."""
         return sorted(self._file.get(group, ()), key=_natural)
 
     def group(self, name: str) -> h5py.Group:
-        """An analysis as h5py has it, for what reads groups."""
+        """h5py group of an analysis."""
         return self._file[name]
 
     def has(self, dataset: str) -> bool:
-        """Whether the file holds this dataset or group."""
+        """Whether the file contains this dataset or group."""
         return dataset in self._file
 
     def __getitem__(self, dataset: str) -> Array:
-        """A dataset with the shape it has in the file. Raises `InputError` if absent."""
+        """Dataset with its shape in the file. Raises `InputError` if absent."""
         item = self._file.get(dataset)
         if isinstance(item, h5py.Group):
             inside = quoted(f"{dataset}/{name}" for name in item)

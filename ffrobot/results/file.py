@@ -91,7 +91,7 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
 
 
 class Results(LinkAccess, AnalysisAccess):
-    """An open results file. Datasets are named as in the file: `inverse/points/link2.tip/position`.
+    """Open results file; datasets have the names of the file, such as `inverse/points/link2.tip/position`.
 
     Raises `InputError` where `path` is no results file.
     """

@@ -141,26 +141,26 @@ class PatchNeed:
 
 @struct
 class AnalysisVerdict:
-    """What one analysis says.
+    """Verdict of one analysis.
 
     Attributes:
         name, kind, status: of the analysis; `cause` why it ended early.
         reached: s, the last output, and the requested end.
         answer: in words, whether motors and patches suffice, the verdict of closed-loop control, or the distance from
             the path under computed inputs; empty where nothing is asked.
-        feasible: whether they can; None where that is not asked.
+        feasible: whether motors and patches suffice; None without a requirement.
         motors: by joint, in the order of the scene: peaks, RMS and limits at the joint.
         units: of the force along each of these joints, "N·m" or "N".
         patches: by body, of an inverse analysis.
-        tool_error: how far the point of a path is off it, under control and open loop.
-        deflection: largest of a point, m, which, and when.
-        stress: largest von Mises, Pa, the body, and when; None if not requested.
+        tool_error: distance of a point from its path, m, under control and open loop.
+        deflection: largest deflection, m, its point and time.
+        stress: largest von Mises stress, Pa, its body and time; None if not requested.
         margins: gain and delay margins of closed-loop runs by their linear model, in words; empty where not known.
         settled: of the point that vibrates most after the paths; None where these move to the end.
         held: natural frequencies and least stiffness with motors at rest, in words; empty if not requested.
-        warnings: why results may be wrong, or not mean what they seem to.
-        notes: what is worth knowing of results that are right.
-        advice: what to try next, a text each.
+        warnings: reasons why results may be wrong or misleading.
+        notes: properties of correct results.
+        advice: remedies to try.
     """
 
     name: str
@@ -184,7 +184,7 @@ class AnalysisVerdict:
     advice: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
-        """As text: the answer, then a line each, indented."""
+        """Text lines: the answer, then indented details."""
         ended = "" if self.status == "completed" else f"ended early ({self.status})"
         yield f"{self.name}: {'; '.join(text for text in (ended, self.answer) if text) or 'completed'}"
         if self.feasible is not None:  # of closed loops, a table has them
@@ -203,7 +203,7 @@ class AnalysisVerdict:
 
     @property
     def in_short(self) -> str:
-        """The answer in two words; empty where nothing is asked."""
+        """Short answer; empty without a requirement."""
         if self.status != "completed":
             return "ended early"
         if self.feasible is None:
@@ -215,13 +215,13 @@ class AnalysisVerdict:
 
     @property
     def reached_in_words(self) -> str:
-        """The last output, s; of a run that ended early also where it should have ended."""
+        """Time of the last output, s, and the requested end of a stopped run."""
         reached, end = self.reached
         return f"{reached:g}" if self.status == "completed" else f"{reached:g} of {end:g}"
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The actuator that is nearest to its limit, or farthest beyond, with the ratio; "" and 0 without limits."""
+        """Actuator with the largest ratio to its limit, and that ratio; "" and 0 without limits."""
         motors = [(f"motor {name}", motor.factor) for name, motor in self.motors.items()]
         patches = [(f"patches of {name}", need.factor) for name, need in self.patches.items()]
         return max((*motors, *patches), key=lambda one: one[1], default=("", 0.0))
@@ -229,12 +229,12 @@ class AnalysisVerdict:
 
 @struct
 class Verdict:
-    """What every analysis of a results file says, in the order of the scene. Printed, it is that text."""
+    """Verdicts of all analyses of a results file, in the order of the scene; `print` shows them as text."""
 
     analyses: tuple[AnalysisVerdict, ...]
 
     def __getitem__(self, name: str) -> AnalysisVerdict:
-        """Verdict of one analysis. Raises `KeyError` where there is none of that name."""
+        """Verdict of one analysis. Raises `KeyError` for an unknown name."""
         for one in self.analyses:
             if one.name == name:
                 return one

@@ -47,7 +47,7 @@ UNAVAILABLE = {
 def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
     """Read and validate a scene file; paths in it become relative to its folder.
 
-    What depends on modal bodies (their points, the length of a link) is checked when these are known.
+    `solve` checks values that depend on modal bodies, such as points and lengths of links.
 
     Args:
         path: the scene file.
