@@ -46,9 +46,9 @@ def link(
         raise InputError("--unit, --density: expected --inspect with them, found none")
     from ..fe_models.link import make_link
     from ..fe_models.link_file import read_link
+    from ..fe_models.remarks import remarks_on_link
     from ..present.console import Display
     from ..run.inputs import files_of
-    from ..scene.plausibility import remarks_on_link
 
     protect(files_of(link_file))
     with Display() as display:

@@ -6,14 +6,15 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import combinations
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..common.errors import InputError
+from ..fe_models.remarks import LONGEST, is_beam, remarks_on_length, remarks_on_link
 from ..mbs.scene.bodies import ROUNDING, RigidBody, tensor
 
-if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links, remarks on links without those of scenes
+if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links
     from ..actuation.patches.records import PztLayout
     from ..common.arrays import Array
     from ..fe_models.link_records.link import BeamLink, Link
@@ -21,16 +22,11 @@ if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links, rem
 
 TURNS = 4 * np.pi  # rad: joints of robots that come to rest do so within two turns
 SPINNING = 0.1  # rate at the end over the largest: what still turns then is a wheel
-LONGEST = 50.0  # m: booms of concrete pumps and cranes have less
-LIGHTEST, HEAVIEST = 1.0, 3e4  # kg/m³: foams have more, osmium has 2.3e4
-SLOWEST, FASTEST = 20.0, 5e4  # m/s, √(E/ρ): silicone rubber has 30, diamond 1.8e4
-SLOW, QUICK = 0.02, 1e5  # Hz: the first frequency of a link that is clamped at its root
 HEAVIEST_BODY = 1e5  # kg
 CARRIED = 100.0  # times its own mass: no robot carries more
 WIDEST = 3.0  # radius of gyration over the length of all bodies: kg·cm² in place of kg·m² is a factor of 100
 HEAVIEST_ROTOR = 10.0  # kg·m²: motors of 100 kW have less
 HEAVIEST_FALL = 100.0  # m/s²: Jupiter has 25
-OVERDAMPED = 1.0  # damping ratio: links have less
 SOFTEST_PATCH, LARGEST_D31 = 1e7, 1e-7  # Pa, m/V: polymers have 2e9, single crystals 1e-9
 RESTING = 3.0  # how many times longer than its path a run may take
 SAMPLES = 201
@@ -54,13 +50,13 @@ def remarks(scene: Scene) -> Iterator[str]:
                 link, made = body.modal.with_suffix(".toml").name, body.modal.name
                 yield f"{made} is older than {link}, or than the program: ffrobot link {link} makes it again"
         elif body.rigid is not None:
-            yield from _long(_size(body.rigid), f'body "{body.name}"')
+            yield from remarks_on_length(_size(body.rigid), f'body "{body.name}"')
     if (fall := float(np.linalg.norm(scene.gravity))) > HEAVIEST_FALL:
         yield f"gravity of {fall:g} m/s²: units are SI; is it in mm/s²?"
     yield from _joints(scene)
     for tool in scene.tool:
         label = f'tool "{tool.name}"'
-        yield from _long(float(np.linalg.norm(tool.at)), label)
+        yield from remarks_on_length(float(np.linalg.norm(tool.at)), label)
         if (angle := max(map(abs, (*tool.rpy, tool.angle)))) > TURNS / 2:
             yield f"{label} is turned by {angle:g} rad: angles are in rad; is it in degrees (45*deg)?"
     yield from _masses(scene, links)
@@ -76,43 +72,6 @@ def remarks(scene: Scene) -> Iterator[str]:
             yield from remarks_on_memory(outputs, len(scene.body), memory(), f'analysis "{analysis.name}"')
 
 
-def remarks_on_link(link: Link, label: str) -> Iterator[str]:
-    """Of a link, which `label` names: its length, its material, its damping."""
-    yield from _long(link.geometry.length, label)
-    if (ratio := float(np.max(link.damping.ratio or 0.0))) >= OVERDAMPED:
-        yield f"{label}: a damping ratio of {ratio:g} is above critical damping, 1: is it in percent?"
-    density, modulus = link.material.density, float(np.max(link.material.youngs_modulus))
-    if not LIGHTEST <= density <= HEAVIEST:
-        yield f"{label}: density {density:g} kg/m³: units are SI; is it in g/cm³ or t/mm³?"
-    elif not SLOWEST <= (speed := np.sqrt(modulus / density)) <= FASTEST:
-        likely = "density in g/cm³" if speed > FASTEST else "it in MPa or GPa"
-        yield (
-            f"{label}: youngs_modulus {modulus:g} Pa, at {density:g} kg/m³ a speed of sound of {speed:.2g} m/s: units"
-            f" are SI; is {likely}?"
-        )
-    elif _is_beam(link):
-        yield from _beam(link, label)
-
-
-def _is_beam(link: Link | None) -> TypeGuard[BeamLink]:
-    return link is not None and link.geometry.kind == "beam"
-
-
-def _beam(link: BeamLink, label: str) -> Iterator[str]:
-    """Of sections that are wider than the link is long, and of its lowest frequency as a cantilever."""
-    section, length = link.sections[0], link.geometry.length
-    if (widest := max(section.height, section.width)) > length:
-        yield f"{label} has a section of {widest:g} m at a length of {length:g} m: units are SI; is it in mm?"
-        return
-    EI = min(section.I_yy, section.I_zz) * link.material.youngs_modulus
-    frequency = 0.56 / length**2 * np.sqrt(EI / (link.material.density * section.area))
-    if not SLOW <= frequency <= QUICK and length <= LONGEST:
-        yield (
-            f"{label} vibrates at {frequency:.2g} Hz as a cantilever: units are SI; is a length in mm, or the modulus"
-            " in MPa?"
-        )
-
-
 def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
     robot = 0.0
     for body in scene.body:
@@ -120,7 +79,7 @@ def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             robot += body.rigid.mass
             if body.rigid.mass > HEAVIEST_BODY:
                 yield f'body "{body.name}" has a mass of {body.rigid.mass:g} kg: units are SI; is it in g?'
-        elif _is_beam(link := links.get(body.name)):
+        elif is_beam(link := links.get(body.name)):
             robot += link.material.density * link.sections[0].area * link.geometry.length
         else:
             return  # known after stage 1 alone
@@ -173,7 +132,7 @@ def _joints(scene: Scene) -> Iterator[str]:
         if scene.space == "spatial" and first > TURNS:
             yield f"{label} begins at {first:g} rad: angles are in rad; is it in degrees (45*deg)?"
     for payload in scene.payload:
-        yield from _long(float(np.linalg.norm(payload.center)), f'payload at "{payload.point}": center')
+        yield from remarks_on_length(float(np.linalg.norm(payload.center)), f'payload at "{payload.point}": center')
 
 
 def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
@@ -183,7 +142,7 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             yield f"{label}: a modulus of {layout.modulus:g} Pa: units are SI; is it in GPa?"
         if abs(layout.d31) > LARGEST_D31:
             yield f"{label}: a d31 of {layout.d31:g} m/V: units are SI; is it in pm/V?"
-        if not _is_beam(link := links.get(layout.body)):
+        if not is_beam(link := links.get(layout.body)):
             continue
         thick, face = _thickness_and_face(layout, link)
         if layout.width > face * (1.0 + ROUNDING):
@@ -194,7 +153,7 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
     for first, second in combinations((one for one in scene.pzt if one.face is not None), 2):
         from ..actuation.patches.patches import patch_edges
 
-        if first.body != second.body or first.normal != second.normal or not _is_beam(link := links.get(first.body)):
+        if first.body != second.body or first.normal != second.normal or not is_beam(link := links.get(first.body)):
             continue
         is_one_face = "both" in (first.face, second.face) or first.face == second.face
         begin, end = _shared(*(patch_edges(one, link.geometry.length) for one in (first, second)))
@@ -253,11 +212,6 @@ def memory() -> float:
         return np.inf
 
 
-def _long(length: float, label: str) -> Iterator[str]:
-    if length > LONGEST:
-        yield f"{label} is {length:g} m long: units are SI; is this in mm?"
-
-
 def _angles(scene: Scene) -> Iterator[str]:
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
     sliding = {joint.name for joint in scene.joint if joint.type == "prismatic"}
@@ -271,7 +225,7 @@ def _angles(scene: Scene) -> Iterator[str]:
         if one.joint in sliding:
             for function in one.components.values():
                 value = np.abs(function.sample(np.linspace(0.0, last, SAMPLES))[0])
-                yield from _long(float(np.nan_to_num(value).max()), f'the way of trajectory "{one.name}"')
+                yield from remarks_on_length(float(np.nan_to_num(value).max()), f'the way of trajectory "{one.name}"')
         if (
             getattr(one, "angle", None) is None
             and one.joint not in turning

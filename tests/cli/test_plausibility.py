@@ -10,7 +10,8 @@ from beam_links import beam_link, tube
 import ffrobot as program
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.link_source import LinkTable
-from ffrobot.scene.plausibility import remarks, remarks_on_link, remarks_on_memory
+from ffrobot.fe_models.remarks import remarks_on_link
+from ffrobot.scene.plausibility import remarks, remarks_on_memory
 
 CASES = Path(__file__).parents[2] / "cases"
 BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
