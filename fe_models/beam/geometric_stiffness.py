@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from scipy.special import roots_legendre
+from numpy.polynomial.legendre import leggauss
 
 from ...common.arrays import Array
 from ..link_records.link import BeamLink
@@ -63,7 +63,7 @@ def geometric_stiffness(
 
 def _at_gauss_points(stations: Functions, fields: Array) -> tuple[Array, Array, Array, Array]:
     """Points x (g,) m with their weights (g,) m, and fields (6, g, n) there with their derivatives by x."""
-    nodes, weights = roots_legendre(POINTS)
+    nodes, weights = leggauss(POINTS)
     lengths = stations.lengths[:, None]
     at = (stations.nodes[:-1, None] + lengths * 0.5 * (nodes + 1)).ravel()
     values, slopes = (np.array([stations.at(at, order) @ field for field in fields]) for order in (0, 1))

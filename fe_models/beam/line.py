@@ -6,7 +6,7 @@ from math import perm
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.special import roots_legendre
+from numpy.polynomial.legendre import leggauss
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
@@ -54,7 +54,7 @@ class Functions:
 
     def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
         """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements."""
-        points, weights = roots_legendre(GAUSS)
+        points, weights = leggauss(GAUSS)
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
         scale = np.sqrt((weight * self.lengths)[:, None] * (0.5 * weights))

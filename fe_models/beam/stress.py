@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.special import roots_legendre
+from numpy.polynomial.legendre import leggauss
 
 from ...common.arrays import Array, Integers
 from ..link_records.link import BeamLink
@@ -89,7 +89,7 @@ def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array
     element = np.concatenate([np.arange(len(nodes)), cut])
     start, end = np.append(starts, np.full(len(cut), x)), np.append(ends, ends[cut])
     end[cut] = x
-    gauss, weights = roots_legendre(3)  # exact: arm × cubic
+    gauss, weights = leggauss(3)  # exact: arm × cubic
     half = 0.5 * (end - start)[:, None]
     s = (0.5 * (start + end)[:, None] + half * gauss).ravel()
     moved = through(stations, np.repeat(stations.element[element], gauss.size, axis=0), s)
