@@ -4,8 +4,9 @@
 
 h: a bar of 0.5 × 0.06 × 0.06 m in 27-node hexahedra; t: a plate of 0.4 × 0.2 × 0.03 m with six bores in ten-node
 tetrahedra by gmsh; the number is that of unknowns in thousands. Each is clamped by its mean at the root and has 20
-modes and the attachment modes. `--ccx` writes the plate as CalculiX' input, for the same modes. One process each: the
-program that is measured is the one on the path of this Python.
+modes and the attachment modes. `--ccx` writes the plate as CalculiX' input, for the same modes. `--rounds N` has each
+eigensolver find the modes N times, in turn and by the same factors. One process each: the program that is measured is
+the one on the path of this Python.
 """
 
 import argparse
@@ -79,10 +80,12 @@ def plate(folder: Path, name: str, ccx: bool) -> None:
     gmsh.finalize()
 
 
-def measured(path: Path) -> None:
+def measured(path: Path, rounds: int) -> None:
     """Print the phases of one run, in this process."""
     from ffrobot.fe_models.link_file import read_link
-    from ffrobot.fe_models.solid.link import solid_modal_body
+    from ffrobot.fe_models.modal_body.krylov_schur import KrylovSchur
+    from ffrobot.fe_models.solid import link as stage
+    from ffrobot.fe_models.solid.factors import Factors
 
     began = [time.process_time()]
 
@@ -91,7 +94,28 @@ def measured(path: Path) -> None:
         print(f"{now - began[-1]:9.2f} s {peak:7.2f} GB", f"  {text}", sep="\n", flush=True)
         began.append(now)
 
-    solid_modal_body(read_link(path), path, phase)
+    wanted, complete, solve, solves = stage.wanted_modes, KrylovSchur.complete, Factors.solve, []
+
+    def by_each(link, flexibility, *others):
+        for solver in ("slepc", "block-lanczos") * rounds:
+            phase(f"modes by {solver}")
+            asked = link.modes.model_copy(update={"solver": solver})
+            modes = wanted(link.model_copy(update={"modes": asked}), flexibility, *others)
+            phase("the rest")
+        return modes
+
+    def told(search, count):
+        phase(f"is one missing? {len(solves)} solves for {sum(solves)} vectors before it")
+        return complete(search, count)
+
+    def counted(factors, loads):
+        solves.append(loads.shape[1])
+        return solve(factors, loads)
+
+    KrylovSchur.complete, Factors.solve = told, counted
+    if rounds:
+        stage.wanted_modes = by_each
+    stage.solid_modal_body(read_link(path), path, phase)
     phase(f"end: {time.process_time() - began[0]:.2f} s")
 
 
@@ -100,14 +124,15 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("parts", nargs="+")
     parser.add_argument("--ccx", action="store_true")
+    parser.add_argument("--rounds", type=int, default=0)
     parser.add_argument("--folder", type=Path, help="where the link files go, and stay")
     options = parser.parse_args()
     if options.parts[0].endswith(".toml"):
-        return measured(Path(options.parts[0]))
+        return measured(Path(options.parts[0]), options.rounds)
     with tempfile.TemporaryDirectory() as name:
         for part in options.parts:
             link = link_file(part, options.folder or Path(name), options.ccx)
-            subprocess.run([sys.executable, __file__, str(link)], check=True)
+            subprocess.run([sys.executable, __file__, str(link), "--rounds", str(options.rounds)], check=True)
 
 
 if __name__ == "__main__":
