@@ -10,6 +10,7 @@ import statistics
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -90,6 +91,14 @@ def test_a_solve_loads_what_its_scene_needs(ffrobot, tmp_path):
     results = scene.with_suffix(".results.h5")
     shown = loaded(f"sys.argv = ['ffrobot', 'info', {str(results)!r}]\nfrom ffrobot.cli import main\nmain()")
     assert not {"pydantic", "ffrobot.mbs._core"} & shown
+
+
+def test_a_link_loads_nothing_of_scenes(tmp_path):
+    link = Path(__file__).parents[1] / "cases" / "two_link" / "link1.toml"
+    argv = ["ffrobot", "link", str(link), "-o", str(tmp_path / "link1.h5")]
+    found = loaded(f"sys.argv = {argv}\nfrom ffrobot.cli import main\nmain()")
+    assert "ffrobot.fe_models.remarks" in found
+    assert not [name for name in found if name.startswith(("ffrobot.mbs", "ffrobot.scene", "ffrobot.actuation"))]
 
 
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
