@@ -104,7 +104,7 @@ def make_link(
     if path != cached:
         on_first(lambda: check_output(path, FORMAT))
     earlier = [] if force else [path, *beside]
-    return _compute(checked, link_path(source), path, digest, start, progress, earlier, cached, force=force)
+    return _compute(checked, link_path(source), path, earlier, start=start, progress=progress, force=force)
 
 
 def _source(link: AnyPath | LinkTable | Mapping[str, Any]) -> LinkSource:
@@ -126,7 +126,7 @@ def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> L
     for candidate in (*beside, path):
         if (body := _up_to_date(candidate, digest, path)) is not None:
             return LinkOutcome(candidate, body, False, time.perf_counter() - start)
-    return _compute(link, link_path(source), path, digest, start, progress, beside, path)
+    return _compute(link, link_path(source), path, beside, start=start, progress=progress)
 
 
 def computed_modal_body(source: LinkSource) -> ModalBody:
@@ -142,7 +142,6 @@ def computed_modal_body(source: LinkSource) -> ModalBody:
 
 
 def _beside(source: LinkSource) -> list[Path]:
-    """Where `make_link` puts the modal body of a link file."""
     return [source.with_suffix(".h5")] if isinstance(source, Path) else []
 
 
@@ -155,15 +154,14 @@ def _compute(
     link: Link,
     source_path: Path,
     path: Path,
-    digest: str,
+    earlier: Sequence[Path],
+    *,
     start: float,
     progress: Progress | None,
-    earlier: Sequence[Path],
-    cached: Path,
-    *,
     force: bool = False,
 ) -> LinkOutcome:
     """Make the file at `path`: of the same modes where one of `earlier` or the cache has them, unless `force`."""
+    cached = _cached(link)
 
     def write(body: ModalBody) -> None:
         write_modal_body(path, body, in_cache=path == cached)
@@ -185,7 +183,7 @@ def _compute(
         from ..mesh.compat import assembly
         from .modal_body.krylov_schur import eigensolver
 
-        hashes: dict[str, Any] = {"input_hash": digest, "modes_hash": modes_hash(link)}
+        hashes: dict[str, Any] = {"input_hash": input_hash(link), "modes_hash": modes_hash(link)}
         by = eigensolver("slepc" if isinstance(link, BeamLink) else link.modes.solver)
         return replace(body, **hashes, assembly=assembly(), eigensolver=by)
 

@@ -135,7 +135,6 @@ class _Assembled:
         return found
 
     def _sides(self, own: str, keyword: Keyword) -> Iterator[tuple[int, ...]]:
-        """Corners of the sides of solids that a surface consists of."""
         if keyword.options.get("TYPE", "ELEMENT").upper() != "ELEMENT":
             return
         sets = self.scopes[own].scope.elsets
@@ -209,7 +208,6 @@ class _Assembled:
         return None
 
     def _surface_node_list(self, own: str, keyword: Keyword) -> list[int]:
-        """The nodes of *SURFACE, TYPE=NODE."""
         if keyword.options.get("TYPE", "").upper() != "NODE":
             return []
         sets = self.scopes[own].scope.nsets

@@ -72,7 +72,6 @@ def keywords(path: Path) -> Iterator[Keyword]:
 
 
 def _data_of(keyword: Keyword, path: Path) -> Iterator[Line]:
-    """The data lines of *NODE, INPUT=FILE."""
     name = keyword.options["INPUT"]
     file = included(name, path, path)
     if file is None:
@@ -83,7 +82,6 @@ def _data_of(keyword: Keyword, path: Path) -> Iterator[Line]:
 
 
 def _included(following: Iterator[str], line: str) -> str | None:
-    """The file of *INCLUDE."""
     text = line.lstrip()
     if not text.startswith("*") or text.startswith("**") or "INCLUDE" not in text.upper():
         return None

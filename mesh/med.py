@@ -98,7 +98,6 @@ def _cells(of: h5py.Group, width: int) -> Integers:
 
 
 def _groups(families: Mapping[str, Any]) -> dict[int, list[str]]:
-    """Names of the groups that the members of each family belong to."""
     found = dict[int, list[str]]()
     for family in families.values():
         names = family["GRO/NOM"][()] if "GRO" in family else ()
@@ -108,7 +107,6 @@ def _groups(families: Mapping[str, Any]) -> dict[int, list[str]]:
 
 
 def _members(of: h5py.Group, groups: Mapping[int, list[str]], count: int) -> Iterator[tuple[str, Integers]]:
-    """The members of each group among `count` nodes or cells."""
     family = np.asarray(of["FAM"][()]) if "FAM" in of else np.zeros(count, dtype=np.int64)
     if family.shape != (count,):
         raise InputError(f"expected a family for each of {count} cells or nodes, found {family.size}")

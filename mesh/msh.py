@@ -155,7 +155,6 @@ class _Version2:
         return number, points
 
     def _names(self) -> dict[tuple[int, int], str]:
-        """Names of physical groups by dimension and tag."""
         lines = self._section(self._content, b"PhysicalNames").decode("utf-8", errors="replace").splitlines()[1:]
         rows = [line.split(maxsplit=2) for line in lines if line.strip()]
         return {(int(row[0]), int(row[1])): row[2].strip().strip('"') for row in rows}

@@ -206,8 +206,6 @@ def read_nastran(path: Path, where: str) -> RawMesh:
 
 
 class _Deck:
-    """The cards that make a mesh, by number."""
-
     def __init__(self, path: Path) -> None:
         self.grids: dict[int, Card] = {}
         self.systems: dict[int, tuple[Card, int]] = {}  # with the field where a CORD1x's points begin
@@ -234,7 +232,11 @@ class _Deck:
         elif name[:5] in ("CORD1", "CORD2") and name[5:] in _SYSTEMS:
             for begin in (0, 4) if name[4] == "1" else (0,):
                 if card.text(begin):
-                    self._add_system(card, begin)
+                    number = card.whole(begin)
+                    if self.systems.setdefault(number, (card, begin))[0].fields != card.fields:
+                        raise InputError(
+                            f"{card}: expected coordinate systems with unique numbers, found {number} again"
+                        )
         elif name in _SHELLS:
             _add(self.shells, card, card.whole(0))
             self.others[name] += 1
@@ -248,12 +250,6 @@ class _Deck:
             self.not_read["PARAM WTMASS"] += 1
         else:
             self.not_read[name] += name not in _OF_THE_LINK
-
-    def _add_system(self, card: Card, begin: int) -> None:
-        number = card.whole(begin)
-        if number in self.systems and self.systems[number][0].fields != card.fields:
-            raise InputError(f"{card}: expected coordinate systems with unique numbers, found {number} again")
-        self.systems[number] = card, begin
 
     def mesh(self) -> RawMesh:
         if not self.grids and not self.solids:
@@ -310,7 +306,6 @@ class _Deck:
         return points
 
     def _frame(self, number: int, asked: Card) -> Frame:
-        """A coordinate system in the basic one."""
         if number in self._frames:
             frame = self._frames[number]
             if frame is None:
@@ -358,7 +353,6 @@ def _add(cards: dict[int, Card], card: Card, number: int) -> None:
 
 
 def _nodes(card: Card) -> tuple[str, list[int]]:
-    """Type of a solid element, and its nodes."""
     corners, most, linear, quadratic = _SOLIDS[card.name]
     fields = card.fields[2:]
     if any(fields[most:]):

@@ -20,7 +20,6 @@ from .records import (
     BAR,
     CIRCLE,
     CircleSection,
-    Hole,
     Outlines,
     PartTables,
     RectangleSection,
@@ -47,7 +46,9 @@ def mesh_shape(tables: PartTables) -> Source:
     with gmsh_session():
         body = _body(geometry)
         for hole in geometry.hole:
-            body, _ = gmsh.model.occ.cut(body, [_hole(hole, geometry.section)])
+            reach = 2 * max(_breadths(geometry.section))
+            across = hole.position, hole.offset, -reach / 2, 0, 0, reach, hole.diameter / 2
+            body, _ = gmsh.model.occ.cut(body, [(_VOLUME, gmsh.model.occ.addCylinder(*across))])
         if outlines is not None:
             _outline(body, geometry, outlines)
         gmsh.model.occ.synchronize()
@@ -98,22 +99,13 @@ def _box(length: float, height: float, width: float) -> tuple[int, int]:
 
 
 def _wire(x: float, section: RectangleSection) -> int:
-    """The outline of a rectangle at x."""
     occ, h, w = gmsh.model.occ, section.height / 2, section.width / 2
     points = [occ.addPoint(x, y, z) for y, z in ((-h, -w), (h, -w), (h, w), (-h, w))]
     lines = [occ.addLine(first, second) for first, second in zip(points, points[1:] + points[:1], strict=True)]
     return int(occ.addWire(lines))
 
 
-def _hole(hole: Hole, section: SectionRecord | None) -> tuple[int, int]:
-    reach = 2 * max(_breadths(section))
-    z = -reach / 2
-    cylinder = gmsh.model.occ.addCylinder(hole.position, hole.offset, z, 0, 0, reach, hole.diameter / 2)
-    return _VOLUME, cylinder
-
-
 def _breadths(section: SectionRecord | None) -> tuple[float, float]:
-    """Extent along y and z of a section."""
     if isinstance(section, RectangleSection):
         return section.height, section.width
     if isinstance(section, CircleSection):

@@ -70,7 +70,6 @@ def _above(f: Array, at_end: bool, tolerance: float) -> Booleans:
 
 
 def _extent(mesh: Mesh) -> tuple[float, float]:
-    """Smallest and largest x of the whole part."""
     x = mesh.geometry.x[:, 0]
     local = (x.min(), x.max()) if x.size else (np.inf, -np.inf)
     if mesh.comm.size == 1:

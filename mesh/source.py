@@ -106,7 +106,10 @@ def source_from(raw: RawMesh, where: str) -> Source:
     cell, degree = _SUPPORTED[kind]
     cells = np.concatenate([block for _, block in raw.blocks])
     _check_nodes(raw, cells, where)
-    cells, once = _each_once(cells)
+    _, first, like = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
+    kept = np.sort(first)  # each cell once, in the file's order
+    once = np.searchsorted(kept, first)[like.reshape(-1)]
+    cells = cells[kept]
     regions = {name: np.unique(once[members]) for name, members in raw.regions.items() if members.size}
     cell_tag, tags = _tags(len(cells), regions)
     straight = degree == 2 and _is_straight(raw.points, cells, cell)
@@ -185,13 +188,6 @@ def _left_out(raw: RawMesh, cells: Integers, cell: CellName) -> Iterator[str]:
             yield f"{loose} lines that are no edge of a volume element (beams?) are left out"
 
 
-def _each_once(cells: Integers) -> tuple[Integers, Integers]:
-    """The different ones of `cells` in their order, and (c,) which of these each of `cells` is."""
-    _, first, like = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
-    kept = np.sort(first)
-    return cells[kept], np.searchsorted(kept, first)[like.reshape(-1)]
-
-
 def _tags(count: int, regions: Mapping[str, Integers]) -> tuple[NDArray[np.int32], dict[str, tuple[int, ...]]]:
     """A tag for each set of regions that a cell belongs to, and the tags of each region, the largest region first.
 
@@ -213,7 +209,6 @@ def _tags(count: int, regions: Mapping[str, Integers]) -> tuple[NDArray[np.int32
 
 
 def _only_kind(raw: RawMesh, where: str) -> str:
-    """The type of all the volume elements."""
     counts: dict[str, int] = {}
     for kind, cells in raw.blocks:
         counts[kind] = counts.get(kind, 0) + len(cells)

@@ -37,8 +37,10 @@ class FamilyModel:
 def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Array) -> FamilyModel:
     """The eigenproblem of `family` on the elements of `forms`, read at `stations` (k,), in m."""
     if family in ("axial", "torsion"):
-        K, M, strain, values = _rod(link, forms, stations, *rod_properties(link, family))
-        fields, held = {U_X if family == "axial" else R_X: values}, [0]
+        V = lagrange(forms.nodes, 3)  # K = ∫EA u' v' dx, M = ∫ρA u v dx
+        EA, rhoA = (cellwise(link, forms.nodes, each) for each in rod_properties(link, family))
+        K, M, strain = forms.matrix(EA, V, 1), forms.matrix(rhoA, V), V.root(EA, 1)
+        fields, held = {U_X if family == "axial" else R_X: V.at(stations)}, [0]
     else:
         bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
         K, M, strain, deflection, slope, held = bending(link, forms, stations, second_moment(family))
@@ -48,15 +50,6 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
     free = np.setdiff1d(np.arange(strain.shape[1]), held)
     K, M = (A[free][:, free] for A in (K, M))
     return FamilyModel(K, M, strain[:, free], {row: values[:, free] for row, values in fields.items()})
-
-
-def _rod(
-    link: BeamLink, forms: BeamForms, stations: Array, stiffness: Property, inertia: Property
-) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
-    """Axial or torsional motion on cubic Lagrange elements: K = ∫EA u' v' dx, M = ∫ρA u v dx; stations read u."""
-    V = lagrange(forms.nodes, 3)
-    EA, rhoA = (cellwise(link, forms.nodes, each) for each in (stiffness, inertia))
-    return forms.matrix(EA, V, 1), forms.matrix(rhoA, V), V.root(EA, 1), V.at(stations)
 
 
 # K, M, strains, deflection and rotation at the stations, held degrees of freedom.

@@ -70,7 +70,6 @@ class BeamForms:
         return self._forms[key]
 
     def _space(self, degree: int) -> fem.FunctionSpace:
-        """Continuous functions, piecewise of a degree."""
         if degree not in self._spaces:
             self._spaces[degree] = function_space(self._mesh, degree)
         return self._spaces[degree]

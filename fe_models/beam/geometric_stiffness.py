@@ -16,7 +16,7 @@ have besides, N (I_p/A) φ'² of fibers that twist shortens, is left out, as in 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -56,8 +56,11 @@ def geometric_stiffness(
         total += np.tensordot(weighted_forces[:, row], products, axes=1)
     matrices = dict(zip(names, 0.5 * (total + total.transpose(0, 2, 1)), strict=True))
     if link.model.theory == "timoshenko":
-        for name, matrix in _of_turning_sections(link, stations, fields[R_X:]):
-            matrices[name] = matrices[name] + matrix
+        for k, (moment, _) in enumerate(ROTARY, start=1):
+            W = weighted(link, stations, moment, link.material.density)
+            products = np.array([[a.T @ (W @ b) for b in fields[R_X:]] for a in fields[R_X:]])
+            for name, matrix in of_turning(np.diag(np.eye(3)[k]), products).items():
+                matrices[name] = matrices[name] + matrix
     return matrices
 
 
@@ -149,11 +152,3 @@ def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:
         lower = np.clip(x, start, end)
         total += link.material.density * moment(section) * (end ** (power + 1) - lower ** (power + 1)) / (power + 1)
     return total
-
-
-def _of_turning_sections(link: BeamLink, stations: Functions, phi: Array) -> Iterator[tuple[str, Array]]:
-    """What sections with rotary inertia that turn by φ (3, k, n) add to K (n, n) of d'Alembert's loads."""
-    for k, (moment, _) in enumerate(ROTARY, start=1):
-        W = weighted(link, stations, moment, link.material.density)
-        products = np.array([[a.T @ (W @ b) for b in phi] for a in phi])
-        yield from of_turning(np.diag(np.eye(3)[k]), products).items()

@@ -199,8 +199,6 @@ class StressRecovery(Record):
 
 
 class _Link(Record):
-    """What all link files have."""
-
     name: Title
     """Name of the link; in a scene by default that of its body."""
     reference: Reference

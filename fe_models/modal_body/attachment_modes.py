@@ -63,11 +63,6 @@ class Modes:
     families: tuple[str, ...]
     X: Array
 
-    def up_to(self, omega2: float) -> Modes:
-        """Those with at most that ω²."""
-        count = int(np.searchsorted(self.omega2, omega2, side="right"))
-        return Modes(self.omega2[:count], self.families[:count], self.X[:, :count])
-
     def followed_by(self, more: Modes) -> Modes:
         """These, and others after them."""
         omega2 = np.concatenate([self.omega2, more.omega2])
@@ -92,7 +87,9 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highe
             found = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
             families += [family] * found.shape[1]
             known = np.concatenate([known, found], axis=1)
-    return _uncoupled(known[:, X.shape[1] :], families, inertia).up_to(STIFFEST**2 * highest)
+    modes = _uncoupled(known[:, X.shape[1] :], families, inertia)
+    count = int(np.searchsorted(modes.omega2, STIFFEST**2 * highest, side="right"))
+    return Modes(modes.omega2[:count], modes.families[:count], modes.X[:, :count])
 
 
 def _energies(shapes: Array, loads: Array, inertia: Inertia) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -57,16 +56,13 @@ class Frozen:
 
     def __getstate__(self) -> dict[str, object]:
         """For copies and other processes, where views of mappings cannot go."""
-        state = {name: value for name, value in vars(self).items() if name in _fields_of(self)}
+        own = {field.name for field in fields(self)}  # type: ignore[arg-type]
+        state = {name: value for name, value in vars(self).items() if name in own}
         return {name: dict(value) if isinstance(value, Mapping) else value for name, value in state.items()}
 
     def __setstate__(self, state: Mapping[str, object]) -> None:
         vars(self).update(state)
         Frozen.__post_init__(self)
-
-
-def _fields_of(record: Any) -> set[str]:
-    return {field.name for field in fields(record)}
 
 
 def _frozen(value: object) -> object:

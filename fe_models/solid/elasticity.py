@@ -141,10 +141,6 @@ class Mass:
             product = product + B.T @ (weights[:, None] * self.model.total(B @ U))
         return product
 
-    def motion_of_attached(self, U: Array) -> list[tuple[Array, Array]]:
-        """For each attached mass its motion (6, n) and weights (6,); collective."""
-        return [(self.model.total(B @ U), weights) for B, weights in self.attached]
-
 
 def material_map(
     mesh: Mesh, material: AnyMaterial, regions: Sequence[tuple[NDArray[np.int32], AnyMaterial]] = ()

@@ -84,7 +84,6 @@ class Factors:
             self._remove()
 
     def _dense(self, block: Array) -> PETSc.Mat:
-        """PETSc's view of an array (own, k) in Fortran's order."""
         matrix = PETSc.Mat().createDense((self._sizes, (None, block.shape[1])), array=block, comm=self.matrix.comm)
         matrix.assemble()
         return matrix

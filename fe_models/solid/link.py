@@ -92,7 +92,11 @@ def solid_modal_body(
         fixed_interfaces(flexibility, link.families, places.rows) if fixed else flexibility,
         mass,
         lambda X: section_motion(
-            sections, x, element, *sections.of(model, model.with_ghosts(X)), mass.motion_of_attached(X)
+            sections,
+            x,
+            element,
+            *sections.of(model, model.with_ghosts(X)),
+            [(model.total(B @ X), weights) for B, weights in mass.attached],
         ),
         str(path),
     )

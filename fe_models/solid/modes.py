@@ -87,7 +87,6 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
 
 
 def _lowest_of_each(hits: Sequence[int], kinds: Sequence[str]) -> list[int]:
-    """Of the modes `hits`, as many of each family as a link has by default."""
     taken: Counter[str] = Counter()
     chosen = []
     for k in hits:

@@ -21,7 +21,7 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ...common.arrays import Array, Integers, NDArray, as_floats
+from ...common.arrays import Array, Integers, as_floats
 from ...common.structs import struct
 from .elasticity import SolidModel, stiffness_matrix
 from .factors import Factors
@@ -46,7 +46,8 @@ class Flexibility:
 
     def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Array | None) -> None:
         self.model, self.faces = model, faces
-        self.R = rigid_motions(model.x)
+        # Translations along, and rotations about, the axes through the origin, of all nodes.
+        self.R = _plate(model.x, np.zeros(3)).reshape(-1, 6)
         self.B = B
         clamped = np.zeros((model.owned, 3), dtype=bool)
         for face in faces:
@@ -62,18 +63,11 @@ class Flexibility:
     def _supported(self, faces: Sequence[RigidFace]) -> PETSc.Mat:
         """K_0."""
         if faces:
-            held = np.flatnonzero(self.clamped[::3]).astype(np.int32)
-            held = np.concatenate([held, self._ghosts_held()])
-            return stiffness_matrix(self.model, [fem.dirichletbc(np.zeros(3), held, self.model.V)])
+            held = np.flatnonzero(self.model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0])
+            return stiffness_matrix(self.model, [fem.dirichletbc(np.zeros(3), held.astype(np.int32), self.model.V)])
         K = stiffness_matrix(self.model)
         _add_springs(self.model, K, self.R)
         return K
-
-    def _ghosts_held(self) -> NDArray[np.int32]:
-        """Clamped nodes that other ranks own."""
-        seen = self.model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0] > 0
-        seen[: self.model.owned] = False
-        return np.flatnonzero(seen).astype(np.int32)
 
     def _condense(self, T: Array, KT: Array) -> None:
         """W and S⁻¹; where only mean supports hold the body, springs on the first face make S positive definite."""
@@ -91,7 +85,11 @@ class Flexibility:
 
     def __matmul__(self, loads: Array) -> Array:
         """F f of loads (3 owned, k); collective."""
-        return self._projected(self._condensed_solve(self.supported(loads)))
+        f = self.supported(loads)
+        U = self._factor.solve(np.where(self.clamped[:, None], 0.0, f))
+        if self.W.shape[1]:
+            U += self.W @ (self._S_inverse @ self.model.total(self.W.T @ f))
+        return U if self.B is None else np.asarray(U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U)))
 
     @property
     def rank(self) -> int:
@@ -103,19 +101,6 @@ class Flexibility:
         """Free the factors: no loads after that; collective."""
         self._factor.release()
 
-    def _condensed_solve(self, loads: Array) -> Array:
-        """G f."""
-        result = self._factor.solve(np.where(self.clamped[:, None], 0.0, loads))
-        if self.W.shape[1]:
-            result += self.W @ (self._S_inverse @ self.model.total(self.W.T @ loads))
-        return result
-
-    def _projected(self, U: Array) -> Array:
-        """P U."""
-        if self.B is None:
-            return U
-        return np.asarray(U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U)))
-
     def reactions(self, loads: Array) -> Array:
         """(6, k) forces along the rows of B with which mean supports bear `loads` (3 owned, k); none of rigid faces."""
         if self.B is None:
@@ -125,11 +110,6 @@ class Flexibility:
     def supported(self, loads: Array) -> Array:
         """Pᵀ f: `loads` with the forces of mean supports."""
         return loads if self.B is None else np.asarray(loads + self.B.T @ self.reactions(loads))
-
-
-def rigid_motions(x: Array) -> Array:
-    """R (3p, 6): translations along, and rotations about, the axes through the origin, of nodes x (p, 3)."""
-    return _plate(x, np.zeros(3)).reshape(-1, 6)
 
 
 def _plate(x: Array, center: Array) -> Array:
