@@ -167,15 +167,15 @@ def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any
 
 
 def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
-    found: dict[str, Array] = {}
+    matrices: dict[str, Array] = {}
 
     def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
-            found[name] = np.asarray(_numbers(item), dtype=np.float64)
+            matrices[name] = np.asarray(_numbers(item), dtype=np.float64)
 
     if "geometric_stiffness" in file:
         file["geometric_stiffness"].visititems(collect)
-    return found
+    return matrices
 
 
 def _array(group: h5py.Group, name: str) -> Array:

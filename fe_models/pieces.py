@@ -129,23 +129,23 @@ def _stiffness_damping(link: BeamLink, path: Path) -> float:
 
 def _interfaces(link: BeamLink, k: int, start: float, places: Mapping[str, tuple[int, str]]) -> list[dict[str, Any]]:
     """The interfaces of the link that are in piece k; masses of those on one cut are one."""
-    found: dict[str, dict[str, Any]] = {}
+    interfaces: dict[str, dict[str, Any]] = {}
     for record in link.interface:
         piece, name = places[record.name]
         if piece != k:
             continue
-        entry = found.setdefault(name, {"name": name, "mass": 0.0, "inertia": [0.0, 0.0, 0.0]})
+        entry = interfaces.setdefault(name, {"name": name, "mass": 0.0, "inertia": [0.0, 0.0, 0.0]})
         if name not in ("root", "tip"):
             entry["position"] = link.places[record.name] - start
         entry["mass"] += record.mass
         entry["inertia"] = [a + b for a, b in zip(entry["inertia"], record.inertia, strict=True)]
-    return list(found.values())
+    return list(interfaces.values())
 
 
 def _stress_points(link: BeamLink, k: int, start: float, count: int) -> dict[str, list[float]]:
     """The stress points of the link that are in piece k; at a cut, like at a step, the section beyond it counts."""
-    length, found = link.geometry.length / count, {}
+    length, points = link.geometry.length / count, {}
     for name, (x, y, z) in link.stress.points.items():
         if min(int(x / length + ON_A_CUT * count), count - 1) == k:
-            found[name] = [min(max(x - start, 0.0), length), y, z]
-    return found
+            points[name] = [min(max(x - start, 0.0), length), y, z]
+    return points

@@ -90,24 +90,24 @@ class _Assembled:
             raise InputError(f"{of}{where}: expected nodes that are there, found node {number}") from None
 
     def _regions(self) -> dict[str, Integers]:
-        found: dict[str, list[int]] = {}
+        members: dict[str, list[int]] = {}
         for name, scope, instance, number in self._members("elsets"):
             place = self.solid.get(instance, {}).get(number)
             if place is not None:
-                found.setdefault(name, []).append(place)
+                members.setdefault(name, []).append(place)
             elif number not in self.scopes[instance].scope.others:
                 raise InputError(f"*ELSET {name}{scope}: expected elements that are there, found element {number}")
-        return {name: np.array(cells, dtype=np.int64) for name, cells in found.items()}
+        return {name: np.array(cells, dtype=np.int64) for name, cells in members.items()}
 
     def _node_sets(self) -> dict[str, Integers]:
-        found: dict[str, list[int]] = {}
+        sets: dict[str, list[int]] = {}
         for name, scope, instance, number in self._members("nsets"):
-            found.setdefault(name, []).append(self._node(instance, number, f"*NSET {name}{scope}"))
+            sets.setdefault(name, []).append(self._node(instance, number, f"*NSET {name}{scope}"))
         for own, one in self.scopes.items():
             for keyword in one.scope.faces.values():
                 if nodes := self._surface_node_list(own, keyword):
-                    found.setdefault(keyword.options["NAME"], []).extend(nodes)
-        return {name: np.unique(np.array(nodes, dtype=np.int64)) for name, nodes in found.items()}
+                    sets.setdefault(keyword.options["NAME"], []).extend(nodes)
+        return {name: np.unique(np.array(nodes, dtype=np.int64)) for name, nodes in sets.items()}
 
     def _members(self, kind: str) -> Iterator[tuple[str, str, str, int]]:
         """Name of each set as it is spelled, its scope in words, instance and number of its members."""
@@ -121,18 +121,18 @@ class _Assembled:
 
     def _faces(self) -> dict[str, list[Integers]]:
         """Sides of solids by *SURFACE, and surface elements by set."""
-        found: dict[str, list[Integers]] = {}
+        faces: dict[str, list[Integers]] = {}
         for own, instance in self.scopes.items():
             for keyword in instance.scope.faces.values():
                 corners = [face for face in self._sides(own, keyword) if face]
                 for size in {len(face) for face in corners}:
                     rows = np.array([face for face in corners if len(face) == size], dtype=np.int64)
-                    found.setdefault(keyword.options["NAME"], []).append(rows)
+                    faces.setdefault(keyword.options["NAME"], []).append(rows)
         for name, _, own, number in self._members("elsets"):
             if (nodes := self.scopes[own].scope.surfaces.get(number)) is not None:
                 row = [self._node(own, node, f"element {number}") for node in nodes]
-                found.setdefault(name, []).append(np.array([row], dtype=np.int64))
-        return found
+                faces.setdefault(name, []).append(np.array([row], dtype=np.int64))
+        return faces
 
     def _sides(self, own: str, keyword: Keyword) -> Iterator[tuple[int, ...]]:
         if keyword.options.get("TYPE", "ELEMENT").upper() != "ELEMENT":
@@ -212,7 +212,7 @@ class _Assembled:
             return []
         sets = self.scopes[own].scope.nsets
         rows = [(place, sets.meant(row[0], place)) for row, place in keyword.rows()]
-        return [self._node(of or own, node, place) for place, found in rows for of, node, _ in found]
+        return [self._node(of or own, node, place) for place, members in rows for of, node, _ in members]
 
     def _masses(self) -> Iterator[PointMass]:
         for keyword in self.deck.masses:

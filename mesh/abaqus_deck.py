@@ -160,7 +160,7 @@ class Sets:
         elif name in self.members and name not in within:
             yield from self.numbers(name, within)
         elif of in self.of_instances and short in self.of_instances[of].members:
-            for found, number, _ in self.of_instances[of].numbers(short):
-                yield found or of, number, place
+            for instance, number, _ in self.of_instances[of].numbers(short):
+                yield instance or of, number, place
         else:
             raise InputError(f'{place}: expected {self.what} or a set of them, found "{entry}"')

@@ -115,17 +115,17 @@ class Scope:
         if not solid and _OTHER_SOLID.fullmatch(kind):
             raise InputError(f"{keyword}: expected solids of the types C3D4, C3D8, C3D10, C3D20, found TYPE={kind}")
         count = int(solid[1]) if solid else {"65": 6}.get(surface[1], int(surface[1])) if surface else 0
-        found: list[tuple[int, str]] = []
+        members: list[tuple[int, str]] = []
         for entries, place in _of_length(keyword, count + 1) if count else keyword.rows():
             if not count:
                 if entries[0].isdigit():
                     self.others[int(entries[0])] = kind
-                    found.append((int(entries[0]), place))
+                    members.append((int(entries[0]), place))
                     if kind == "MASS" and len(entries) > 1:
                         self.masses[int(entries[0])] = whole_of(entries[1], place)
                 continue
             number = whole_of(entries[0], place)
-            found.append((number, place))
+            members.append((number, place))
             nodes = tuple(whole_of(entry, place) for entry in entries[1:])
             if solid:
                 entry = _KINDS[count], nodes
@@ -135,7 +135,7 @@ class Scope:
                 self.others[number] = kind
                 self.surfaces[number] = nodes[: 3 if count in (3, 6) else 4]
         if name := keyword.options.get("ELSET"):
-            self.elsets.add(name, (("", number, place) for number, place in found))
+            self.elsets.add(name, (("", number, place) for number, place in members))
 
     def _nset(self, keyword: Keyword) -> None:
         if "ELSET" not in keyword.options:
@@ -193,19 +193,19 @@ class Instance:
         ):
             if whole := keyword.options.get(option):
                 sets.add(whole, [("", number, str(keyword)) for number in members])
-        found = cls(own, str(keyword))
+        instance = cls(own, str(keyword))
         if len(rows) > 2 or (rows and len(rows[0][0]) > 3):
             raise InputError(f"{keyword}: expected a line of 3 numbers (translation) and one of 7 (rotation) at most")
         if rows:
-            found.moved = np.array([*rows[0][0], 0.0, 0.0, 0.0][:3])
+            instance.moved = np.array([*rows[0][0], 0.0, 0.0, 0.0][:3])
         if len(rows) > 1:
             values, place = rows[1]
             axis = np.subtract(values[3:6], values[:3]) if len(values) == 7 else np.zeros(3)
             if not np.linalg.norm(axis) > 0:
                 raise InputError(f"{place}: expected two points on an axis and an angle, found {values}")
-            found.center = np.array(values[:3])
-            found.rotation = Rotation.from_rotvec(np.radians(values[6]) * axis / np.linalg.norm(axis))
-        return found
+            instance.center = np.array(values[:3])
+            instance.rotation = Rotation.from_rotvec(np.radians(values[6]) * axis / np.linalg.norm(axis))
+        return instance
 
     def points(self) -> Array:
         """(p, 3) of its nodes, in the assembly."""

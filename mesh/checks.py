@@ -128,11 +128,11 @@ def check_boundary(part: PartMesh, where: str) -> None:
     reach = np.linalg.norm(x - middle[:, None], axis=2).max(axis=1)
     tree = cKDTree(probes)
     near = np.flatnonzero(tree.query(middle)[0] <= reach)
-    found = tree.query_ball_point(middle[near], reach[near])
+    neighbors = tree.query_ball_point(middle[near], reach[near])
     inside = np.zeros(len(facets), dtype=bool)
     for some in np.array_split(np.arange(near.size), near.size // 100_000 + 1):
-        probe = np.array([k for of in found[some] for k in of], dtype=np.int64)
-        of = np.repeat(near[some], [len(found[k]) for k in some])
+        probe = np.array([k for of in neighbors[some] for k in of], dtype=np.int64)
+        of = np.repeat(near[some], [len(neighbors[k]) for k in some])
         other = of // len(split) != owner[probe]
         probe, of = probe[other], of[other]
         edges = (x[of, 1:] - x[of, :1]).transpose(0, 2, 1)

@@ -137,9 +137,9 @@ def _end_face(boundary: Boundary, name: str, x: float, outward: float, length: f
     """The facets in the plane at `x` that face away from the link."""
     corners = boundary.points[boundary.facets, 0]
     flat = np.all(np.abs(corners - x) <= IN_PLANE * length, axis=1)
-    found = np.flatnonzero(flat & (outward * boundary.normal[:, 0] > 0.99))
-    if found.size:
-        return found
+    facets = np.flatnonzero(flat & (outward * boundary.normal[:, 0] > 0.99))
+    if facets.size:
+        return facets
     sign = "-" if outward < 0 else "+"
     expected = f"a plane face at x = {x:g} with the outward normal {sign}x, or an [[interface]] table of that name"
     _reject(f"{path}: {name}", expected, "none", boundary)
@@ -152,10 +152,10 @@ def _group(source: Source, boundary: Boundary, group: str, where: str) -> Choice
         own = facet_keys(boundary.facets, len(boundary.points))
         outside = int(np.sum(~np.isin(wanted, own) | np.any(source.facet_groups[group] < 0, axis=1)))
         if outside:
-            found = (
+            facets = (
                 f"{outside} of the {wanted.size} facets of the group elsewhere: not connected to the volume, or inside"
             )
-            raise InputError(f"{where}: expected a face on the boundary of the part, found {found}")
+            raise InputError(f"{where}: expected a face on the boundary of the part, found {facets}")
         return np.flatnonzero(np.isin(own, wanted))
     if group in source.point_groups:
         found_facets = np.flatnonzero(np.all(np.isin(boundary.facets, source.point_groups[group]), axis=1))

@@ -150,13 +150,13 @@ def _growing_field(begin: float, end: float, faces: list[int]) -> int:
 
 def own_entities(dim: int = -1) -> list[tuple[int, int]]:
     """Entities of a dimension, or of all, but for copies that partitions have of elements of others."""
-    found: list[tuple[int, int]] = gmsh.model.getEntities(dim)
-    return [entity for entity in found if not gmsh.model.getType(*entity).startswith("Ghost")]
+    entities: list[tuple[int, int]] = gmsh.model.getEntities(dim)
+    return [entity for entity in entities if not gmsh.model.getType(*entity).startswith("Ghost")]
 
 
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
-    (number, points), found = _points(), MeshBlocks()
+    (number, points), blocks = _points(), MeshBlocks()
     for dim, entity in [*own_entities(3), *gmsh.model.getEntities(2), *gmsh.model.getEntities(1)]:
         tags = gmsh.model.getPhysicalGroupsForEntity(dim, entity)
         names = [gmsh.model.getPhysicalName(dim, tag) or str(tag) for tag in tags]
@@ -164,12 +164,12 @@ def extract_mesh() -> RawMesh:
             groups = [(name, np.arange(len(cells))) for name in names]
             corners = cells[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
             if dim == 3:
-                found.add_solids(VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells, groups)
+                blocks.add_solids(VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells, groups)
             elif dim == 2:
-                found.add_surfaces(corners, groups)
+                blocks.add_surfaces(corners, groups)
             else:
-                found.lines.append(corners)
-    return found.mesh(points, {})
+                blocks.lines.append(corners)
+    return blocks.mesh(points, {})
 
 
 def _points() -> tuple[Integers, Array]:

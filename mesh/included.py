@@ -40,21 +40,21 @@ class Line(NamedTuple):
 def files_of(path: Path) -> list[Path]:
     """`path`, and the files that there are of those that it includes or that belong to it, in order."""
     pattern = _REFERENCES.get(path.suffix.lower())
-    found: dict[Path, None] = {}
+    files: dict[Path, None] = {}
 
     def add(file: Path) -> None:
-        found[file] = None
+        files[file] = None
         if pattern is None or not file.is_file():
             return
         for name in pattern.findall(text_of(file)):
             other = included(name, file, path)
-            if other is not None and other not in found:
+            if other is not None and other not in files:
                 add(other)
 
     add(path)
     if beside := _BESIDE.get(path.suffix.lower()):
-        found |= dict.fromkeys(sorted(path.parent.glob(beside.format(escape(path.stem)))))
-    return list(found)
+        files |= dict.fromkeys(sorted(path.parent.glob(beside.format(escape(path.stem)))))
+    return list(files)
 
 
 def text_of(file: Path) -> str:

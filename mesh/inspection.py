@@ -98,11 +98,11 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
 def _declared(file: Path) -> Unit | None:
     from .step import declared_unit
 
-    found: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
+    units: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
     millimeters = declared_unit(file.read_text(encoding="latin-1"))
-    if millimeters not in found:
+    if millimeters not in units:
         raise InputError(f"{file}: expected a part drawn in m, mm or in, found a unit of {millimeters:g} mm")
-    return found[millimeters]
+    return units[millimeters]
 
 
 def _part_face(boundary: Boundary, face: SmoothFace) -> PartFace:
@@ -138,10 +138,10 @@ def _cylinder(points: Array, face: SmoothFace) -> tuple[Array, Array, float] | N
         off, axis = points - (face.center + size * x[2:4] @ across), axis_of(x[:2])
         return as_floats(np.linalg.norm(off - np.outer(off @ axis, axis), axis=1))
 
-    found = least_squares(lambda x: distances(x) / size - x[4], [0.0, 0.0, 0.0, 0.0, 0.5], xtol=1e-15, ftol=1e-15)
-    axis, radius = axis_of(found.x[:2]), float(size * found.x[4])
-    if radius <= 0 or np.abs(distances(found.x) - radius).max() > FLAT * radius:
+    fit = least_squares(lambda x: distances(x) / size - x[4], [0.0, 0.0, 0.0, 0.0, 0.5], xtol=1e-15, ftol=1e-15)
+    axis, radius = axis_of(fit.x[:2]), float(size * fit.x[4])
+    if radius <= 0 or np.abs(distances(fit.x) - radius).max() > FLAT * radius:
         return None
-    on_axis = face.center + size * found.x[2:4] @ across
+    on_axis = face.center + size * fit.x[2:4] @ across
     along = (points - on_axis) @ axis
     return as_floats(on_axis + (along.min() + along.max()) / 2 * axis), axis, radius

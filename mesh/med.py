@@ -56,7 +56,7 @@ def _mesh(file: h5py.File) -> RawMesh:
     step = mesh if "NOE" in mesh else _only(mesh, "step of the mesh")[1]
     points = _columns(step["NOE/COO"], 3).astype(np.float64)
     families = file["FAS"][name] if name in file.get("FAS", ()) else {}
-    found, polygons = MeshBlocks(), False
+    blocks, polygons = MeshBlocks(), False
     groups = _groups(families.get("ELEME", {}))
     for kind, of in step["MAI"].items():
         if _text(of.attrs, "PFL") not in ("", _WHOLE):
@@ -64,19 +64,19 @@ def _mesh(file: h5py.File) -> RawMesh:
         if kind in _SOLIDS:
             width, name = _SOLIDS[kind]
             cells = in_gmsh_order(name, _cells(of, width), _AS_VTK)
-            found.add_solids(name, cells, _members(of, groups, len(cells)))
+            blocks.add_solids(name, cells, _members(of, groups, len(cells)))
         elif kind in _SURFACES:
             width, corners = _SURFACES[kind]
             cells = _cells(of, width)[:, :corners]
-            found.add_surfaces(cells, _members(of, groups, len(cells)))
+            blocks.add_surfaces(cells, _members(of, groups, len(cells)))
         elif kind in _LINES:
-            found.lines.append(_cells(of, _LINES[kind])[:, :2])
+            blocks.lines.append(_cells(of, _LINES[kind])[:, :2])
         elif kind.startswith("POG"):
             polygons = True
         elif kind != "PO1":  # points
             raise InputError(f"expected cells of {', '.join(_SOLIDS)}, found {kind} (polyhedra, or structure elements)")
     nodes = _members(step["NOE"], _groups(families.get("NOEUD", {})), len(points))
-    return found.mesh(points, dict(nodes), _remarks(attributes, polygons))
+    return blocks.mesh(points, dict(nodes), _remarks(attributes, polygons))
 
 
 def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:

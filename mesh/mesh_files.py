@@ -122,18 +122,18 @@ def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
     reader = pyvista.get_reader(path)
     reader.reader.AddObserver("ErrorEvent", lambda *_: failed.append(None))
     try:
-        found = reader.read()
+        data = reader.read()
     except RuntimeError:  # of later versions of PyVista
         failed.append(None)
     if failed:
         said.truncate(said.seek(0))
         raise ValueError("VTK finds an error in it")
-    _check_ghosts(found.cell_data)
-    types = getattr(found, "celltypes", None)
+    _check_ghosts(data.cell_data)
+    types = getattr(data, "celltypes", None)
     if types is not None and (flat := np.isin(types, list(_VTK_TYPES))).any() and not flat.all():
-        found = found.extract_cells(~flat)
-        found.cell_data.pop("vtkOriginalCellIds", None)  # integers that are no groups
-    return pyvista.to_meshio(found)
+        data = data.extract_cells(~flat)
+        data.cell_data.pop("vtkOriginalCellIds", None)  # integers that are no groups
+    return pyvista.to_meshio(data)
 
 
 def _check_ghosts(data: Mapping[str, Any]) -> None:
@@ -146,21 +146,21 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
     _check_ghosts(mesh.cell_data)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    found = MeshBlocks()
+    blocks = MeshBlocks()
     for block, groups in zip(mesh.cells, _groups(mesh), strict=True):
         cells = np.asarray(block.data, dtype=np.int64)
         if other := _OTHERS.fullmatch(block.type):
             if other[1] == "line":
-                found.lines.append(cells[:, :2])
+                blocks.lines.append(cells[:, :2])
             elif other[1] != "vertex":
-                found.add_surfaces(cells[:, : _CORNERS[other[1]]], groups.items())
+                blocks.add_surfaces(cells[:, : _CORNERS[other[1]]], groups.items())
         else:  # of unknown types, too: these are rejected by name
             kind = "hexahedron" if block.type == "voxel" else block.type
             kind = _LAGRANGE.get((kind, cells.shape[1]), kind)
             cells = cells[:, _VOXEL] if block.type == "voxel" else in_gmsh_order(kind, cells)
-            found.add_solids(kind, cells, groups.items())
+            blocks.add_solids(kind, cells, groups.items())
     sets = mesh.point_sets or {}
-    return found.mesh(points, {name: np.asarray(group, dtype=np.int64) for name, group in sets.items()})
+    return blocks.mesh(points, {name: np.asarray(group, dtype=np.int64) for name, group in sets.items()})
 
 
 def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
@@ -168,16 +168,16 @@ def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
     values = _numbered(mesh)
     titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()}
     for k, block in enumerate(mesh.cells):
-        found: dict[str, Integers] = {}  # cells may belong to several
+        members: dict[str, Integers] = {}  # cells may belong to several
         if values is not None:
             for value in np.unique(values[k]).tolist():
-                found[titles.get(value, str(value))] = np.flatnonzero(values[k] == value)
+                members[titles.get(value, str(value))] = np.flatnonzero(values[k] == value)
         for name, sets in mesh.cell_sets.items():
             rows = np.asarray(sets[k] if k < len(sets) and sets[k] is not None else [], dtype=np.int64)
             if np.any((rows < 0) | (rows >= len(block.data))):
                 raise ValueError(f"cells of the set {name} that are not there")
-            found[name] = rows
-        yield {name: rows for name, rows in found.items() if rows.size}
+            members[name] = rows
+        yield {name: rows for name, rows in members.items() if rows.size}
 
 
 def _numbered(mesh: meshio.Mesh) -> list[NDArray[np.generic]] | None:

@@ -48,10 +48,10 @@ def _by_gmsh(content: bytes) -> RawMesh:
         gmsh.merge(str(alone))
         elements = [tags for entity in own_entities() for tags in gmsh.model.mesh.getElements(*entity)[1]]
         for name, tags in ((b"Nodes", [gmsh.model.mesh.getNodes()[0]]), (b"Elements", elements)):
-            announced, found = _counts(content, name)[1], sum(map(len, tags))
-            if announced != found:
+            announced, counted = _counts(content, name)[1], sum(map(len, tags))
+            if announced != counted:
                 what = name.decode()
-                raise InputError(f"expected the {announced} {what.lower()} that ${what} announces, found {found}")
+                raise InputError(f"expected the {announced} {what.lower()} that ${what} announces, found {counted}")
         _check_partitions(content)
         return extract_mesh()
 
@@ -61,10 +61,10 @@ def _check_partitions(content: bytes) -> None:
     if b"$PartitionedEntities" not in content:
         return
     entities = [entity for entity in gmsh.model.getEntities(3) if gmsh.model.mesh.getElements(*entity)[0].size]
-    found = {int(number) for entity in entities for number in gmsh.model.getPartitions(*entity)}
+    partitions = {int(number) for entity in entities for number in gmsh.model.getPartitions(*entity)}
     announced = _counts(content, b"PartitionedEntities")[0]
-    if len(found) < announced:
-        raise InputError(f"expected all {announced} partitions of the mesh in one file, found {len(found)}")
+    if len(partitions) < announced:
+        raise InputError(f"expected all {announced} partitions of the mesh in one file, found {len(partitions)}")
 
 
 def _counts(content: bytes, name: bytes) -> tuple[int, int]:
@@ -100,7 +100,7 @@ class _Version2:
     def mesh(self) -> RawMesh:
         number, points = self._nodes()
         names = self._names()
-        found, partitions = MeshBlocks(), set[int]()
+        blocks, partitions = MeshBlocks(), set[int]()
         for kind, tags, nodes in (self._binary_elements if self._is_binary else self._text_elements)():
             cells, volume = number(nodes), kind in VOLUME_ELEMENTS
             of = tags[:, 0] if tags.size else np.zeros(len(cells), dtype=np.int64)
@@ -110,20 +110,20 @@ class _Version2:
                 for tag in np.unique(of[of != 0]).tolist()
             ]
             if volume:
-                found.add_solids(VOLUME_ELEMENTS[kind], cells, groups)
+                blocks.add_solids(VOLUME_ELEMENTS[kind], cells, groups)
             elif kind in GMSH_CORNERS:
-                found.add_surfaces(cells[:, : GMSH_CORNERS[kind]], groups)
+                blocks.add_surfaces(cells[:, : GMSH_CORNERS[kind]], groups)
             elif GMSH_NODES[kind] > 1:
-                found.lines.append(cells[:, :2])
+                blocks.lines.append(cells[:, :2])
         remarks = [f"all cells are of partition {number}: others may be in separate files" for number in partitions]
-        return found.mesh(points, {}, remarks if len(remarks) == 1 else ())
+        return blocks.mesh(points, {}, remarks if len(remarks) == 1 else ())
 
     @staticmethod
     def _section(content: bytes, name: bytes) -> bytes:
         """What stands between $NAME and $EndNAME, without the line ends around it; empty where there is none."""
-        _, found, rest = content.partition(b"$" + name)
+        _, mark, rest = content.partition(b"$" + name)
         inside, end, _ = rest.partition(b"$End" + name)
-        if found and not end:
+        if mark and not end:
             raise InputError(f"expected ${name.decode()} to end with $End{name.decode()}, found the end of the file")
         return inside.partition(b"\n")[2]
 
@@ -163,12 +163,12 @@ class _Version2:
         """Type, (c, t) tags of each element (physical group first, partition fourth) and (c, v) of its nodes."""
         lines = self._section(self._content, b"Elements").splitlines()
         rows: dict[tuple[int, int, int], list[list[bytes]]] = {}
-        found = 0
+        count = 0
         for line in filter(None, (line.split() for line in lines[1:])):
             rows.setdefault((int(line[1]), int(line[2]), len(line)), []).append(line)
-            found += 1
-        if found != int(lines[0]):
-            raise InputError(f"expected the {int(lines[0])} elements that $Elements announces, found {found}")
+            count += 1
+        if count != int(lines[0]):
+            raise InputError(f"expected the {int(lines[0])} elements that $Elements announces, found {count}")
         for (kind, tags, length), of in rows.items():
             data = np.array(of, dtype=np.int64)
             if length - 3 - tags != GMSH_NODES.get(kind):

@@ -45,10 +45,10 @@ def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: ob
         command = [sys.executable, "-c", f"from {__name__} import main; main()"]
         done = subprocess.run(command, input=request, capture_output=True, check=False, cwd=folder, env=environment)
     if done.returncode == 0:
-        found = pickle.loads(done.stdout)
-        if isinstance(found, FfrobotError):
-            raise found
-        return found
+        answer = pickle.loads(done.stdout)
+        if isinstance(answer, FfrobotError):
+            raise answer
+        return answer
     if done.returncode == -signal.SIGXCPU:
         seconds = done.stderr.decode().split()[-1]
         raise InputError(

@@ -220,5 +220,5 @@ def _tagged_facets(mesh: Mesh, known: Integers, tags: Tags, points: int) -> tupl
     if not sorted_keys.size or not keys.size:
         return np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int32)
     place = np.minimum(np.searchsorted(sorted_keys, keys), sorted_keys.size - 1)
-    found = sorted_keys[place] == keys
-    return facets[found].astype(np.int32), tags[order[place[found]]].astype(np.int32)
+    known_here = sorted_keys[place] == keys
+    return facets[known_here].astype(np.int32), tags[order[place[known_here]]].astype(np.int32)

@@ -199,11 +199,11 @@ def _tags(count: int, regions: Mapping[str, Integers]) -> tuple[NDArray[np.int32
         before, which = np.unique(tag[members], return_inverse=True)
         tag[members] = len(owners) + which
         owners += [(*owners[old], name) for old in before]
-    found: dict[str, list[int]] = {}
+    tags_of: dict[str, list[int]] = {}
     for number in np.unique(tag).tolist():
         for name in owners[number]:
-            found.setdefault(name, []).append(number)
-    ordered = {name: sorted(of, key=lambda number: len(owners[number])) for name, of in found.items()}
+            tags_of.setdefault(name, []).append(number)
+    ordered = {name: sorted(of, key=lambda number: len(owners[number])) for name, of in tags_of.items()}
     largest = sorted(ordered, key=lambda name: -regions[name].size)
     return tag, {name: tuple(ordered[name]) for name in largest}
 

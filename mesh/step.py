@@ -69,15 +69,15 @@ def declared_unit(content: str) -> float:
     for entity in units:
         if (other := re.search(r"CONVERSION_BASED_UNIT\('(\w+)'", entity)) and other[1] in _OTHER_UNITS:
             return _OTHER_UNITS[other[1]]
-    prefixes = [found[1] for entity in units if (found := re.search(r"SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", entity))]
+    prefixes = [match[1] for entity in units if (match := re.search(r"SI_UNIT\((\$|\.\w+\.),\.METRE\.\)", entity))]
     return _SI_PREFIXES.get(prefixes[0], 1.0) if prefixes else 1.0
 
 
 def _check_volumes(text: str, where: str) -> None:
-    found, declared = len(gmsh.model.getEntities(3)), len(_SOLID.findall(text))
-    if 0 < found < declared:
-        raise InputError(f"{where}: expected the {declared} solids of the file, found {found} that can be read")
-    if found:
+    volumes, declared = len(gmsh.model.getEntities(3)), len(_SOLID.findall(text))
+    if 0 < volumes < declared:
+        raise InputError(f"{where}: expected the {declared} solids of the file, found {volumes} that can be read")
+    if volumes:
         return
     faces = len(gmsh.model.getEntities(2))
     instead = (

@@ -31,11 +31,11 @@ def attachment_modes(
     of the link: a unit force goes with a moment of force times length. `twists_along`: whether torsion has the shape
     under a torque along the link, which bent links bear, too.
     """
-    found = list[tuple[float, Family, Array]]()
+    static = list[tuple[float, Family, Array]]()
     for family, model in models.items():
         modes = _of_family(family, model, known[family], list(places), length, twists_along)
-        found += [(float(square), family, x) for square, x in zip(modes.omega2, modes.X.T, strict=True)]
-    return found
+        static += [(float(square), family, x) for square, x in zip(modes.omega2, modes.X.T, strict=True)]
+    return static
 
 
 def _of_family(
@@ -90,6 +90,6 @@ def ritz_modes(
     X = np.concatenate([fixed, static], axis=1)
     strain = model.strain @ X
     known = [False] * fixed.shape[1] + [True] * static.shape[1]
-    found = in_order(strain.T @ strain, [family] * X.shape[1], known)
-    modes = [(float(square), family, x) for square, x in zip(found.omega2, (X @ found.X).T, strict=True)]
+    ritz = in_order(strain.T @ strain, [family] * X.shape[1], known)
+    modes = [(float(square), family, x) for square, x in zip(ritz.omega2, (X @ ritz.X).T, strict=True)]
     return modes[: fixed.shape[1]], modes[fixed.shape[1] :]

@@ -49,12 +49,12 @@ class BeamForms:
         by = of if by is None else by
         order = derivative if derivative_by is None else derivative_by
         self._weight.x.array[:] = weight[self._element]
-        found = fem_petsc.assemble_matrix(self._form(of.degree, derivative, by.degree, order))
-        found.assemble()
-        indptr, indices, values = found.getValuesCSR()
+        assembled = fem_petsc.assemble_matrix(self._form(of.degree, derivative, by.degree, order))
+        assembled.assemble()
+        indptr, indices, values = assembled.getValuesCSR()
         rows, columns = (self._points(functions.degree) for functions in (of, by))
         A = sp.csr_matrix((values, indices, indptr), shape=(rows.size, columns.size))
-        found.destroy()
+        assembled.destroy()
         # Degrees of freedom of Lagrange functions are values at points.
         return (of.at(rows).T @ A @ by.at(columns)).tocsr()
 

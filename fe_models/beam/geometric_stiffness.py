@@ -132,7 +132,7 @@ def _of_inertia(
         for moment, inertia in rotary
     ]
     at_0, at_1 = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3))) for place in (0 * e1, e1))
-    found = {}
+    forces = {}
     for load in at_0:
         a = at_0[load][0, :3, None]
         b = at_1[load][0, :3, None] - a
@@ -140,8 +140,8 @@ def _of_inertia(
         m = _lever(a * M[1] + b * M[2] - np.append(x, 0.0) * n)
         m = m + sum(wrenches[load][0, 3:, None] * J for J, wrenches in turning)
         both = np.concatenate([n, m])
-        found[load] = both[:, :-1], both[:, -1:]
-    return found
+        forces[load] = both[:, :-1], both[:, -1:]
+    return forces
 
 
 def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:

@@ -150,8 +150,8 @@ def _ritz(
     lower, higher = list[Mode](), list[Mode]()
     for family, model in models.items():
         pair = ritz_modes(model, family, _together(model, family, modes), _together(model, family, static))
-        for found, of_family in zip((lower, higher), pair, strict=True):
-            found += [Mode(*mode) for mode in of_family]
+        for kept, of_family in zip((lower, higher), pair, strict=True):
+            kept += [Mode(*mode) for mode in of_family]
     return _by_frequency(lower), _by_frequency(higher)
 
 

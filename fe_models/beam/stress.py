@@ -98,10 +98,10 @@ def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array
     inertia = np.concatenate([np.tile([one.area for one in sections], (3, 1)), turning])
     motion = np.concatenate([moved.translation, moved.rotation], axis=1).transpose(1, 0, 2)
     load = (link.material.density * (half * weights).ravel() * inertia)[:, :, None] * motion @ W  # (6, q, n)
-    found = of_load(load[:, s > x], (s[s > x] - x)[:, None]).sum(axis=1)
+    forces = of_load(load[:, s > x], (s[s > x] - x)[:, None]).sum(axis=1)
     if link.reference.holds_root:
-        return found
-    return found + of_tip_support(link, np.array([x]), of_load(load, s[:, None]).sum(axis=1))
+        return forces
+    return forces + of_tip_support(link, np.array([x]), of_load(load, s[:, None]).sum(axis=1))
 
 
 def segments(link: BeamLink, x: Array) -> Integers:

@@ -291,11 +291,11 @@ class SolidLink(_Link):
         The others follow [reference] where they do not say it themselves; a tip that nothing holds has its mean.
         """
         tip: Coupling = "mean" if self.reference.holds_root else self.coupling
-        found: dict[str, Coupling] = {"root": self.coupling, "tip": tip}
+        couplings: dict[str, Coupling] = {"root": self.coupling, "tip": tip}
         for record in self.interface:
             inside = isinstance(record.position, float)
-            found[record.name] = "mean" if inside else record.coupling or found.get(record.name, self.coupling)
-        return found
+            couplings[record.name] = "mean" if inside else record.coupling or couplings.get(record.name, self.coupling)
+        return couplings
 
 
 Link = BeamLink | SolidLink

@@ -69,8 +69,8 @@ def _check_header(path: Path, header: list[str]) -> None:
             known = f"columns among {quoted(COLUMNS)}"
             raise InputError(f'{path}: line 1: expected {known}, found "{shown(name)}"{did_you_mean(name, COLUMNS)}')
     if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
-        found = shown(",".join(header))
-        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio, found {found!r}")
+        columns = shown(",".join(header))
+        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio, found {columns!r}")
 
 
 def _row(path: Path, line: int, header: list[str], row: list[str], families: tuple[str, ...]) -> MeasuredMode:

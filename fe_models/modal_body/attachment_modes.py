@@ -84,9 +84,9 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highe
             moved = own > IMMOBILE * largest
             if not moved.any():
                 continue
-            found = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
-            families += [family] * found.shape[1]
-            known = np.concatenate([known, found], axis=1)
+            independent = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
+            families += [family] * independent.shape[1]
+            known = np.concatenate([known, independent], axis=1)
     modes = _uncoupled(known[:, X.shape[1] :], families, inertia)
     count = int(np.searchsorted(modes.omega2, STIFFEST**2 * highest, side="right"))
     return Modes(modes.omega2[:count], modes.families[:count], modes.X[:, :count])

@@ -117,11 +117,11 @@ def interface_loads(
     K φ = ω² M φ + B c of a fixed-interface mode, held by loads c; K ψ = B c of a constraint mode. So in all modes the
     inertia is that of fixed-interface modes N: KX = M X N Nᵀ Ω² + B c, and Xᵀ of it gives c.
     """
-    found = interface_coordinates(omega2, families, static, interfaces)
-    W = found.fixed @ (found.fixed.T * omega2)
-    c = found.constraint.T @ (np.diag(omega2) - W)
+    coordinates = interface_coordinates(omega2, families, static, interfaces)
+    W = coordinates.fixed @ (coordinates.fixed.T * omega2)
+    c = coordinates.constraint.T @ (np.diag(omega2) - W)
     loads: dict[str, Array] = {name: np.zeros((6, len(omega2))) for name in interfaces}
-    for name, row in zip(found.names, c, strict=True):
+    for name, row in zip(coordinates.names, c, strict=True):
         place, component = name.split("/")
         loads[place][AXES.index(component)] = row
     return W, loads
@@ -141,12 +141,14 @@ def craig_bampton(body: ModalBody) -> CraigBampton:
     """Of a body with reference condition "craig-bampton", from its invariants: nothing new is approximated."""
     omega2 = np.diag(body.stiffness)
     static = body.mode_count - body.eigenmode_count
-    found = interface_coordinates(omega2, body.family, static, body.interfaces)
-    rigid = np.array([_rigid_row(body, name) for name in found.names]).reshape(-1, 6)
+    coordinates = interface_coordinates(omega2, body.family, static, body.interfaces)
+    rigid = np.array([_rigid_row(body, name) for name in coordinates.names]).reshape(-1, 6)
     # A root beside the origin: the frame turns about it.
     of_root = np.eye(6)
     of_root[:3, 3:] = np.einsum("kab,b->ka", LEVI_CIVITA, -body.interfaces[ROOT].position)
-    recovery = np.concatenate([-found.constraint @ rigid @ of_root, found.constraint, found.fixed], axis=1)
+    recovery = np.concatenate(
+        [-coordinates.constraint @ rigid @ of_root, coordinates.constraint, coordinates.fixed], axis=1
+    )
     frame = np.zeros((6, recovery.shape[1]))
     frame[:, :6] = of_root
     turn = np.einsum("akl,kln->an", LEVI_CIVITA, body.I_bar)  # ∫ρ x × Φ dV
@@ -155,8 +157,8 @@ def craig_bampton(body: ModalBody) -> CraigBampton:
     coupling = np.concatenate([body.S_bar, turn])
     cross = frame.T @ coupling @ recovery
     mass = frame.T @ _rigid_mass(body) @ frame + cross + cross.T + recovery.T @ recovery
-    names = [f"{ROOT}/{axis}" for axis in AXES] + found.names
-    names += [f"mode/{k + 1}" for k in range(found.fixed.shape[1])]
+    names = [f"{ROOT}/{axis}" for axis in AXES] + coordinates.names
+    names += [f"mode/{k + 1}" for k in range(coordinates.fixed.shape[1])]
     return CraigBampton(names, mass, recovery.T @ (omega2[:, None] * recovery), recovery)
 
 

@@ -91,9 +91,9 @@ class KrylovSchur:
         """
         if self._theta.size < min(count, self._rank):
             self._add(count - self._theta.size)
-        found = int(np.sum(self._theta > ROUNDING * self._theta.max(initial=0.0)))
-        if found < count:
-            raise SolveError(f"eigenproblem: {found} of {count} modes are above round-off; request fewer modes")
+        sound = int(np.sum(self._theta > ROUNDING * self._theta.max(initial=0.0)))
+        if sound < count:
+            raise SolveError(f"eigenproblem: {sound} of {count} modes are above round-off; request fewer modes")
         return self._X[:, :count]
 
     def complete(self, count: int) -> bool:
@@ -106,10 +106,10 @@ class KrylovSchur:
     def _add(self, count: int) -> None:
         """The lowest `count` modes beside those known."""
         search = self._blocks if self._by_blocks else self._krylov_schur
-        found, theta = search(min(count, self._rank - self._theta.size), self._tolerance)
+        X, theta = search(min(count, self._rank - self._theta.size), self._tolerance)
         order = np.argsort(np.append(-self._theta, -theta), kind="stable")
         self._theta = np.append(self._theta, theta)[order]
-        self._X = self._orthonormal(np.hstack([self._X, found]))[:, order]
+        self._X = self._orthonormal(np.hstack([self._X, X]))[:, order]
 
     def _blocks(self, count: int, tolerance: float) -> tuple[Array, Array]:
         """X (m, count) and θ (count,) of the lowest modes beside those known, by block Lanczos."""
@@ -117,7 +117,7 @@ class KrylovSchur:
         W = V = np.empty((self._rows, 0))  # the basis, and what comes next: F M V = V H + W R but for rounding
         H = R = np.empty((0, 0))
         while True:
-            theta, Y = (found[..., ::-1] for found in np.linalg.eigh(H))
+            theta, Y = (part[..., ::-1] for part in np.linalg.eigh(H))
             if len(H) >= count:
                 residual = np.linalg.norm(R @ Y[len(H) - R.shape[1] :, :count], axis=0)
                 if len(H) == left or np.all(residual <= tolerance * theta[:count]):

@@ -138,5 +138,5 @@ def of_turning(E: Array, products: Array) -> dict[str, Array]:
     K_x = np.einsum("kl,aamn->klmn", E, products) - np.einsum("kb,blmn->klmn", E, products)
     K_omega = np.einsum("ij,kkmn->ijmn", np.eye(3), K_x) - 0.5 * (K_x + K_x.transpose(1, 0, 2, 3))
     K_r = np.einsum("abc,bcmn->amn", LEVI_CIVITA, K_x)
-    found = {f"r_{axis}": -K_r[a] for a, axis in enumerate("xyz")}  # of d'Alembert's loads
-    return found | {f"omega_{name}": K_omega[i, j] * (1.0 if i == j else 2.0) for name, (i, j) in PAIRS.items()}
+    by_load = {f"r_{axis}": -K_r[a] for a, axis in enumerate("xyz")}  # of d'Alembert's loads
+    return by_load | {f"omega_{name}": K_omega[i, j] * (1.0 if i == j else 2.0) for name, (i, j) in PAIRS.items()}

@@ -40,18 +40,18 @@ def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> dict[str, Array]:
     """
     e = np.eye(3)
     m = mass[:, None]
-    found = dict[str, Array]()
+    wrenches = dict[str, Array]()
     for axis, unit in zip("xyz", e, strict=True):
-        found[f"t_{axis}"] = np.hstack([-m * unit, np.zeros_like(x)])
+        wrenches[f"t_{axis}"] = np.hstack([-m * unit, np.zeros_like(x)])
     for axis, unit in zip("xyz", e, strict=True):
-        found[f"r_{axis}"] = np.hstack([-m * np.cross(unit, x), -inertia * unit])
+        wrenches[f"r_{axis}"] = np.hstack([-m * np.cross(unit, x), -inertia * unit])
     for name, (k, j) in PAIRS.items():
         wrench = np.zeros((len(x), 6))
         for a, b in [(k, j)] if k == j else [(k, j), (j, k)]:
             wrench[:, :3] -= m * np.cross(e[a], np.cross(e[b], x))
             wrench[:, 3:] -= np.cross(e[a], inertia * e[b])
-        found[f"omega_{name}"] = wrench
-    return found
+        wrenches[f"omega_{name}"] = wrench
+    return wrenches
 
 
 def work_on_modes(
@@ -62,17 +62,17 @@ def work_on_modes(
     `h_spin` (n,) = ∫ρI_p φ dx of a line of mass, which Ī does not have.
     """
     cross = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
-    found = dict[str, Array]()
+    work = dict[str, Array]()
     for k, axis in enumerate("xyz"):
         i, j = cross[axis]
-        found[f"t_{axis}"] = -S_bar[k]
-        found[f"r_{axis}"] = I_bar[j, i] - I_bar[i, j]  # −∫ρ (e × x)·Φ
+        work[f"t_{axis}"] = -S_bar[k]
+        work[f"r_{axis}"] = I_bar[j, i] - I_bar[i, j]  # −∫ρ (e × x)·Φ
     if h_spin is not None:
-        found["r_x"] = found["r_x"] - h_spin
+        work["r_x"] = work["r_x"] - h_spin
     trace = I_bar[0, 0] + I_bar[1, 1] + I_bar[2, 2]
     for name, (a, b) in PAIRS.items():  # −e_a × (e_b × x) = δ_ab x − x_a e_b
-        found[f"omega_{name}"] = trace - I_bar[a, a] if a == b else -(I_bar[a, b] + I_bar[b, a])
+        work[f"omega_{name}"] = trace - I_bar[a, a] if a == b else -(I_bar[a, b] + I_bar[b, a])
     for name, at in interfaces.items():
         rows = np.concatenate([at.translation, at.rotation])
-        found |= dict(zip(interface_load_names([name]), rows, strict=True))
-    return found
+        work |= dict(zip(interface_load_names([name]), rows, strict=True))
+    return work

@@ -89,5 +89,5 @@ def fixed_interfaces(
 def ritz_modes(model: SolidModel, both: Modes, count: int) -> Modes:
     """Modes in the space of `count` fixed-interface modes and static shapes behind them, in that order; collective."""
     K = strain_energy(model, np.ascontiguousarray(model.with_ghosts(both.X)))
-    found = in_order(K, both.families, [k >= count for k in range(len(both.families))])
-    return Modes(found.omega2, found.families, both.X @ found.X)
+    ritz = in_order(K, both.families, [k >= count for k in range(len(both.families))])
+    return Modes(ritz.omega2, ritz.families, both.X @ ritz.X)

@@ -56,11 +56,11 @@ class Places(NamedTuple):
 
     def motion(self, model: SolidModel, modes: Array) -> dict[str, Interface]:
         """What `modes` (3 (owned + ghosts), n) do at each; collective."""
-        found = {}
+        interfaces = {}
         for name, averages in self.averages.items():
             translation, rotation = averages.of(model, modes)
-            found[name] = Interface(averages.centroid[0], translation[0], rotation[0], self.couplings[name])
-        return found
+            interfaces[name] = Interface(averages.centroid[0], translation[0], rotation[0], self.couplings[name])
+        return interfaces
 
 
 def solid_modal_body(
@@ -159,9 +159,9 @@ def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
     """Materials of the cells, by region: of cells of several regions, that of the smallest."""
     for region in link.region:
         if region.group not in solid.regions:
-            found = ", ".join(sorted(solid.regions)) or "none"
+            groups = ", ".join(sorted(solid.regions)) or "none"
             raise InputError(
-                f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}"
+                f"{path}: region.group: expected a volume group of the mesh ({groups}), found {region.group}"
             )
     largest_first = list(solid.regions)
     ordered = sorted(link.region, key=lambda region: largest_first.index(region.group))

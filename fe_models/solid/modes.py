@@ -52,37 +52,37 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
         total=model.total,
         solver=link.modes.solver,
     )
-    found = 0
+    sought = 0
     while True:
-        if (family == "all" and needed > available) or found == available:
+        if (family == "all" and needed > available) or sought == available:
             raise InputError(
                 f"{where}: modes.{key}: expected at most the number of modes available in family "
                 f'"{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
                 f" all families, found {needed}"
             )
-        found = min(found + batch, most)
-        X = search.candidates(found)
+        sought = min(sought + batch, most)
+        X = search.candidates(sought)
         omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
         X = X @ Q
         motion = read(X)
         Q = aligned(omega2, motion, family)
         kinds = names(motion.turned(Q))
-        settled = available if found == available else _settled(omega2)
+        settled = available if sought == available else _settled(omega2)
         hits = [k for k, kind in enumerate(kinds[:settled]) if family == "all" or kind in family]
         if not numbers.size:
             hits = _lowest_of_each(hits, kinds)
         if len(hits) >= needed:
-            if not search.complete(found):
+            if not search.complete(sought):
                 batch = 0
                 continue
             chosen = np.array(hits)[numbers] if numbers.size else np.array(hits)
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
-        if found == most < available:
+        if sought == most < available:
             raise InputError(
                 f"{where}: modes.{key}: expected {needed} modes of family {quoted(link.families)} among the lowest"
-                f" {found}, found {len(hits)} (short, wide parts hardly bend): request fewer"
+                f" {sought}, found {len(hits)} (short, wide parts hardly bend): request fewer"
             )
-        share = max(len(hits), 1) / found
+        share = max(len(hits), 1) / sought
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
 
 

@@ -70,8 +70,8 @@ def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers,
     centers = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centers[:, None], axis=2).max()
     near = cKDTree(centers).query_ball_point(points, (1 + slack) * radius, return_sorted=True)
-    point = np.repeat(np.arange(len(points)), [len(found) for found in near])
-    cell = np.concatenate([np.asarray(found, dtype=np.int64) for found in near])
+    point = np.repeat(np.arange(len(points)), [len(cells) for cells in near])
+    cell = np.concatenate([np.asarray(cells, dtype=np.int64) for cells in near])
     low, high = corners.min(axis=1), corners.max(axis=1)
     pad = (slack + 0.1) * (high - low).max(axis=1, keepdims=True)  # a curved cell bulges out of its corners' box
     boxed = np.all((points[point] >= (low - pad)[cell]) & (points[point] <= (high + pad)[cell]), axis=1)
@@ -117,17 +117,17 @@ def recovered_stresses(
         return {}
     n, C = modes.shape[1], model.materials.C[model.materials.of_cell]
     fields = np.concatenate([modes, model.with_ghosts(np.stack(list(shapes.values()), axis=1))], axis=1)
-    found: dict[str, Any] = {"stress_loads": tuple(shapes)}
+    stresses: dict[str, Any] = {"stress_loads": tuple(shapes)}
     if link.stress.points:
         points = point_stresses(model.V, C, fields, link.stress.points, path)
-        found["stress"] = {
+        stresses["stress"] = {
             name: StressPoint(point.position, point.stress[:, :n], point.strain[:, :n], point.stress[:, n:])
             for name, point in points.items()
         }
     if link.stress.surface:
         both = surface_stresses(model.V, C, fields, surface)
-        found |= {"surface_stress": both[..., :n], "surface_static": both[..., n:]}
-    return found
+        stresses |= {"surface_stress": both[..., :n], "surface_static": both[..., n:]}
+    return stresses
 
 
 def point_stresses(
