@@ -77,10 +77,9 @@ class _Assembled:
             blocks.append((kind, in_gmsh_order(kind, block)))
         faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
         groups = {name: same[group] for name, group in self._node_sets().items()}
-        return RawMesh(
-            self.points, tuple(blocks), self._regions(), faces, groups, (), (), (*remarks, *self._left_out()),
-            tuple(self._masses()),
-        )  # fmt: skip
+        remarks += self._left_out()
+        masses = tuple(self._masses())
+        return RawMesh(self.points, blocks, self._regions(), faces, groups, remarks=remarks, masses=masses)
 
     def _node(self, instance: str, number: int, of: str) -> int:
         try:

@@ -87,12 +87,20 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
         face_of[face.facets] = k
     volume, center = volume_and_center(part.points[part.cells], part.cell, part.degree)
     return Inspection(
-        known, unit is not None or declared is not None,
-        part.points.min(axis=0), part.points.max(axis=0), volume, center,
-        [_part_face(boundary, face) for face in faces], boundary.points, boundary.facets, face_of,
-        [*part.regions, *source.facet_groups, *source.point_groups], part.remarks,
-        [replace(mass, point=as_floats(METRES[known] * mass.point)) for mass in source.masses],
-    )  # fmt: skip
+        unit=known,
+        is_declared=unit is not None or declared is not None,
+        low=part.points.min(axis=0),
+        high=part.points.max(axis=0),
+        volume=volume,
+        center=center,
+        faces=[_part_face(boundary, face) for face in faces],
+        points=boundary.points,
+        facets=boundary.facets,
+        face_of=face_of,
+        groups=[*part.regions, *source.facet_groups, *source.point_groups],
+        remarks=part.remarks,
+        masses=[replace(mass, point=as_floats(METRES[known] * mass.point)) for mass in source.masses],
+    )
 
 
 def _declared(file: Path) -> Unit | None:

@@ -271,7 +271,7 @@ class _Deck:
             corners = [self._place(place, card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
             faces.setdefault(str(card.whole(1, card.whole(0))), []).append(np.array([corners], dtype=np.int64))
         masses = tuple(map(self._mass, self.masses))
-        return RawMesh(self._points(), tuple(blocks), regions, faces, {}, (), (), tuple(self._left_out()), masses)
+        return RawMesh(self._points(), blocks, regions, faces, {}, remarks=[*self._left_out()], masses=masses)
 
     def _mass(self, card: Card) -> PointMass:
         """Of CONM1 or CONM2, whose offset is in rectangular axes; with CID = -1 it is the place in the basic ones."""

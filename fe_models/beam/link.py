@@ -119,9 +119,17 @@ def _with_sections(
         twist = (shear_modulus(link) * np.array([section.torsion for section in sections]))[segment]
     outlines = section_outlines(link.shapes)[segment]
     return Stations(
-        position, translation, rotation, height[segment], stations.element, outlines, rigidity[:, :2],
-        width[segment], rigidity[:, 2], twist,
-    )  # fmt: skip
+        position,
+        translation,
+        rotation,
+        height[segment],
+        stations.element,
+        outline=outlines,
+        rigidity=rigidity[:, :2],
+        width=width[segment],
+        out_of_plane_rigidity=rigidity[:, 2],
+        torsional_rigidity=twist,
+    )
 
 
 def _modes(

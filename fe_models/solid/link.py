@@ -234,9 +234,16 @@ def _stations(link: SolidLink, sections: Averages, x: Array, element: Integers, 
     middle, extents = _onward(sections.middle), np.stack([height, width], axis=1)
     is_off = np.any(np.abs(middle) > ROUNDING * extents)
     return Stations(
-        centroid, u, turn, height, element, rigidity=rigidity, width=width, out_of_plane_rigidity=lateral,
+        centroid,
+        u,
+        turn,
+        height,
+        element,
+        rigidity=rigidity,
+        width=width,
+        out_of_plane_rigidity=lateral,
         middle=middle if is_off else None,
-    )  # fmt: skip
+    )
 
 
 def _onward(values: Array) -> Array:
