@@ -11,10 +11,10 @@ import scipy.sparse as sp
 
 from ...common.arrays import Array
 from ..link_records.families import Family
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, residual_modes
 from ..modal_body.craig_bampton import in_order
 from .beam import FamilyModel
-from .eigen import Flexibility
+from .eigen import BeamFlexibility
 from .line import R_X
 
 
@@ -40,14 +40,14 @@ def attachment_modes(
 
 def _of_family(
     family: Family, model: FamilyModel, X: Array, places: list[int], length: float, twists_along: bool
-) -> Modes:
+) -> ModeSet:
     rows = [row for row in COMPONENTS[family] if row in model.fields]
     loads = [model.fields[row][place].toarray()[0] * (1.0 if row < R_X else length) for place in places for row in rows]
     if twists_along and family == "torsion":  # along the link as its inertia about the axis
         torque = model.M @ np.ones(model.M.shape[0])
         loads.append(torque * (length / torque.sum()))
     B = np.array(loads).T
-    static = Flexibility(model.K, model.strain) @ B
+    static = BeamFlexibility(model.K, model.strain) @ B
 
     def energy(U: Array) -> Array:
         strain = model.strain @ U

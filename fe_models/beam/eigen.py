@@ -28,7 +28,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
     = strainᵀ strain but for rounding. Raises `SolveError` where rounding errors spoil the modes.
     """
     try:
-        X = KrylovSchur(Flexibility(K, strain), M, *K.shape, tolerance=TOLERANCE).lowest(count)
+        X = KrylovSchur(BeamFlexibility(K, strain), M, *K.shape, tolerance=TOLERANCE).lowest(count)
     except (RuntimeError, np.linalg.LinAlgError):  # singular, or not finite
         raise SolveError(
             f"eigenproblem of size {K.shape[0]}: stiffness or mass is not positive definite in double precision; "
@@ -45,7 +45,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
     return omega2[order], X[:, order]
 
 
-class Flexibility:
+class BeamFlexibility:
     """K⁻¹ (m, m); factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
 
     K = strainᵀ strain but for rounding, which refinement by the strains (s, m) takes out.

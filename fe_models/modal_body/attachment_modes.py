@@ -56,20 +56,20 @@ class Inertia:
 
 
 @struct
-class Modes:
+class ModeSet:
     """Modes, ascending: ω² (n,) in rad²/s², the family of each or of its loads, X (m, n) with XᵀMX = I."""
 
     omega2: Array
     families: tuple[str, ...]
     X: Array
 
-    def followed_by(self, more: Modes) -> Modes:
+    def followed_by(self, more: ModeSet) -> ModeSet:
         """These, and others after them."""
         omega2 = np.concatenate([self.omega2, more.omega2])
-        return Modes(omega2, (*self.families, *more.families), np.concatenate([self.X, more.X], axis=1))
+        return ModeSet(omega2, (*self.families, *more.families), np.concatenate([self.X, more.X], axis=1))
 
 
-def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia) -> Modes:
+def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia) -> ModeSet:
     """Attachment modes from static shapes: by family K⁻¹B and the loads B, both (m, loads).
 
     B are forces, and moments of these times a length; X (m, n) eigenmodes with XᵀMX = I, `highest` their highest ω² in
@@ -89,7 +89,7 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highe
             known = np.concatenate([known, independent], axis=1)
     modes = _uncoupled(known[:, X.shape[1] :], families, inertia)
     count = int(np.searchsorted(modes.omega2, STIFFEST**2 * highest, side="right"))
-    return Modes(modes.omega2[:count], modes.families[:count], modes.X[:, :count])
+    return ModeSet(modes.omega2[:count], modes.families[:count], modes.X[:, :count])
 
 
 def _energies(shapes: Array, loads: Array, inertia: Inertia) -> Array:
@@ -111,12 +111,12 @@ def _independent(shapes: Array, known: Array, inertia: Inertia) -> Array:
     return shapes
 
 
-def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> Modes:
+def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> ModeSet:
     """Principal axes of the strain energy: in each family by itself, unless the link couples families."""
     of = np.array([FAMILIES.index(family) for family in families], dtype=np.int64)
     squares, turn, of = uncoupled(inertia.energy(X), of)
     order = ascending(squares, of)
-    return Modes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
+    return ModeSet(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
 
 
 def ascending(omega2: Array, family: Integers) -> Integers:

@@ -20,7 +20,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.structs import struct
 from ..link_records.families import FAMILIES, LOCAL
-from .attachment_modes import COMPONENTS, Modes, ascending, uncoupled
+from .attachment_modes import COMPONENTS, ModeSet, ascending, uncoupled
 from .body import ModalBody
 from .parts import LEVI_CIVITA, Interface
 
@@ -28,7 +28,7 @@ CONDITION, ROOT = "craig-bampton", "root"
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
-def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Modes:
+def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> ModeSet:
     """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of it.
 
     Those that stand for eigenmodes, then as many of each family as loads brought, if the link couples them no more than
@@ -47,7 +47,7 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
     residual[others[np.argsort(squares[others], kind="stable")[::-1]][:lacking]] = 1
     order = ascending(squares, of_modes)
     order = order[np.argsort(residual[order], kind="stable")]
-    return Modes(squares[order], tuple(names[of_modes[k]] for k in order), turn[:, order])
+    return ModeSet(squares[order], tuple(names[of_modes[k]] for k in order), turn[:, order])
 
 
 @struct

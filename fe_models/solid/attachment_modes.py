@@ -15,24 +15,24 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..link_records.families import Family
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, residual_modes
 from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.unit_loads import interface_load_names
-from .elasticity import Mass, SolidModel
+from .elasticity import MassMatrix, SolidModel
 from .strain_energy import strain_energy
 from .supports import Flexibility
 
 
 def attachment_modes(
     families: Sequence[Family],
-    mass: Mass,
-    modes: Modes,
+    mass: MassMatrix,
+    modes: ModeSet,
     loads: Mapping[str, Array],
     shapes: Mapping[str, Array],
     interfaces: Sequence[str],
     length: float,
     twists_along: bool,
-) -> Modes:
+) -> ModeSet:
     """Those of the loads that belong to `families`; collective.
 
     `loads` and `shapes` (3 owned,) are as `invariants.unit_loads` and `static_shapes` find them, `mass` has what is
@@ -86,8 +86,8 @@ def fixed_interfaces(
     )
 
 
-def ritz_modes(model: SolidModel, both: Modes, count: int) -> Modes:
+def ritz_modes(model: SolidModel, both: ModeSet, count: int) -> ModeSet:
     """Modes in the space of `count` fixed-interface modes and static shapes behind them, in that order; collective."""
     K = strain_energy(model, np.ascontiguousarray(model.with_ghosts(both.X)))
     ritz = in_order(K, both.families, [k >= count for k in range(len(both.families))])
-    return Modes(ritz.omega2, ritz.families, both.X @ ritz.X)
+    return ModeSet(ritz.omega2, ritz.families, both.X @ ritz.X)

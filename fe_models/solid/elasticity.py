@@ -125,7 +125,7 @@ class SolidModel:
         return result
 
 
-class Mass:
+class MassMatrix:
     """M, with what is attached to interfaces: M u + Σ Bᵀ diag(w) B u.
 
     `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.

@@ -27,7 +27,7 @@ SIMPSON = np.array([1.0, 3.0, 3.0, 1.0]) / 8
 
 
 @struct
-class SectionMotion:
+class SectionShapes:
     """Mean motion of the cross sections at the k stations, weighted such that sums of squares are energies."""
 
     families: tuple[Array, ...]  # by the order of `FAMILIES`, (rows, n) each
@@ -36,9 +36,9 @@ class SectionMotion:
         """(4, n) share of each family in the modal mass."""
         return np.array([np.sum(rows**2, axis=0) for rows in self.families])
 
-    def turned(self, Q: Array) -> SectionMotion:
+    def turned(self, Q: Array) -> SectionShapes:
         """Of the modes Φ Q."""
-        return SectionMotion(tuple(rows @ Q for rows in self.families))
+        return SectionShapes(tuple(rows @ Q for rows in self.families))
 
 
 def section_motion(
@@ -48,7 +48,7 @@ def section_motion(
     translation: Array,
     rotation: Array,
     attached: Sequence[tuple[Array, Array]] = (),
-) -> SectionMotion:
+) -> SectionShapes:
     """Motion of the sections at x (k,), stations of `element` (e, 4); translation and rotation (k, 3, n).
 
     `attached`: of each mass on an interface, the motion there (6, n) and its weights (6,).
@@ -65,17 +65,17 @@ def section_motion(
             moved[axis] = np.concatenate([moved[axis], rows[[axis]]])
             turned[axis] = np.concatenate([turned[axis], rows[[3 + axis]]])
     bending = np.concatenate([moved[1], turned[2]]), np.concatenate([moved[2], turned[1]])
-    return SectionMotion((*bending, moved[0], turned[0]))
+    return SectionShapes((*bending, moved[0], turned[0]))
 
 
-def names(motion: SectionMotion) -> list[str]:
+def names(motion: SectionShapes) -> list[str]:
     """Family of each mode."""
     share = motion.energy()
     total, first = share.sum(axis=0), share.argmax(axis=0)
     return [FAMILIES[i] if whole >= 0.5 else LOCAL for whole, i in zip(total, first, strict=True)]
 
 
-def aligned(omega2: Array, motion: SectionMotion, wanted: Sequence[str] | str) -> Array:
+def aligned(omega2: Array, motion: SectionShapes, wanted: Sequence[str] | str) -> Array:
     """(n, n) Q that turns modes of equal frequency into the families, so that the basis is reproducible; orthogonal.
 
     `omega2` (n,) is ascending, `motion` that of the modes. For `wanted` families (not "all") modes of nearly equal

@@ -25,7 +25,7 @@ from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness
 from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
-from .elasticity import Mass, MaterialMap, SolidModel, material_map, solid_model
+from .elasticity import MassMatrix, MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
 from .functionals import Averages, face_averages, section_averages
 from .invariants import prestressed, shape_integrals, static_shapes, unit_loads
@@ -47,7 +47,7 @@ _CLAMPED: dict[str, tuple[int, ...]] = {"root": (0, 1, 2, 3, 4, 5), "tip": ()}
 SUPPORTS = {**dict.fromkeys(HOLDING_ROOT, _CLAMPED), "simply-supported": {"root": (0, 1, 2, 3), "tip": (1, 2)}}
 
 
-class Places(NamedTuple):
+class Interfaces(NamedTuple):
     """The interfaces by name: their mean motion, of modes and as rows B (6, 3 owned), and their couplings."""
 
     averages: dict[str, Averages]
@@ -81,7 +81,7 @@ def solid_modal_body(
     progress(f"{link.name}: factorizing {3 * model.V.dofmap.index_map.size_global} unknowns")
     flexibility = _supported(link, model, solid, places, path)
     weights = {record.name: lump_weights(record.mass, record.inertia) for record in link.interface}
-    mass = Mass(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])
+    mass = MassMatrix(model, [(places.rows[name], w) for name, w in weights.items() if np.any(w)])
     progress(f"{link.name}: solving for the static shapes")
     loads = unit_loads(model, places.rows)
     shapes = static_shapes(flexibility, loads)
@@ -179,16 +179,16 @@ def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
     return material_map(solid.mesh, link.material, regions)
 
 
-def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Places:
+def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Interfaces:
     """Root, tip and the interfaces of the link file: faces, or cross sections where the position is one number."""
     sections = {record.name: record.position for record in link.interface if isinstance(record.position, float)}
     faces = [name for name in ("root", "tip", *(record.name for record in link.interface)) if name not in sections]
     averages = {name: face_averages(model, solid.facet_tags, [solid.faces[name]]) for name in dict.fromkeys(faces)}
     averages |= {name: section_averages(model, np.array([x])) for name, x in sections.items()}
-    return Places(averages, {name: one.rows(model)[0] for name, one in averages.items()}, link.couplings)
+    return Interfaces(averages, {name: one.rows(model)[0] for name, one in averages.items()}, link.couplings)
 
 
-def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, path: Path) -> Flexibility:
+def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Interfaces, path: Path) -> Flexibility:
     """The body held by its reference condition, faces with rigid coupling made plates."""
     held = SUPPORTS[link.reference.condition]
     plates = sorted(name for name, coupling in link.couplings.items() if coupling == "rigid")

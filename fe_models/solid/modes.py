@@ -12,10 +12,10 @@ from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL
 from ..link_records.link import SolidLink
-from ..modal_body.attachment_modes import Modes, ascending
+from ..modal_body.attachment_modes import ModeSet, ascending
 from ..modal_body.krylov_schur import KrylovSchur
-from .elasticity import Mass
-from .families import NEARLY, SectionMotion, aligned, names
+from .elasticity import MassMatrix
+from .families import NEARLY, SectionShapes, aligned, names
 from .strain_energy import strain_energy
 
 if TYPE_CHECKING:
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 # Mean motion of the sections, of modes (3 owned, n).
-Reader = Callable[[Array], SectionMotion]
+Reader = Callable[[Array], SectionShapes]
 
 
-def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader, where: str) -> Modes:
+def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: Reader, where: str) -> ModeSet:
     """The modes that `link.modes` asks for; collective.
 
     The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
@@ -102,7 +102,7 @@ def _settled(omega2: Array) -> int:
     return int(gaps[-1]) + 1 if gaps.size else 0
 
 
-def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> Modes:
+def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> ModeSet:
     """Modes X Q, uncoupled among each other."""
     K = (Q.T * omega2) @ Q
     order = ascending(np.diag(K), np.array([[*FAMILIES, LOCAL].index(kind) for kind in kinds]))
@@ -111,4 +111,4 @@ def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> Modes:
     if not np.allclose(K, np.diag(squares), rtol=0, atol=1e-12 * squares.min()):
         squares, turn = np.linalg.eigh(K)
         Q = Q @ turn
-    return Modes(squares, tuple(kinds[k] for k in order), X @ Q)
+    return ModeSet(squares, tuple(kinds[k] for k in order), X @ Q)
