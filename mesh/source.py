@@ -104,7 +104,7 @@ def source_from(raw: RawMesh, where: str) -> Source:
     """
     kind = _only_kind(raw, where)
     cell, degree = _SUPPORTED[kind]
-    cells = np.concatenate([block for _, block in raw.blocks])
+    cells: Integers = np.concatenate([block for _, block in raw.blocks])
     _check_nodes(raw, cells, where)
     _, first, like = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)  # each cell once, in the file's order

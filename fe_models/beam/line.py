@@ -54,7 +54,7 @@ class Functions:
 
     def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
         """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements."""
-        points, weights = leggauss(GAUSS)
+        points, weights = leggauss(GAUSS)  # type: ignore[no-untyped-call, unused-ignore]
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
         scale = np.sqrt((weight * self.lengths)[:, None] * (0.5 * weights))

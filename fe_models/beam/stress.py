@@ -89,7 +89,8 @@ def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array
     element = np.concatenate([np.arange(len(nodes)), cut])
     start, end = np.append(starts, np.full(len(cut), x)), np.append(ends, ends[cut])
     end[cut] = x
-    gauss, weights = leggauss(3)  # exact: arm × cubic
+    # Exact: arm × cubic.
+    gauss, weights = leggauss(3)  # type: ignore[no-untyped-call, unused-ignore]
     half = 0.5 * (end - start)[:, None]
     s = (0.5 * (start + end)[:, None] + half * gauss).ravel()
     moved = through(stations, np.repeat(stations.element[element], gauss.size, axis=0), s)
