@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -57,8 +58,8 @@ def movie_outputs(time: NDArray[np.float64], seconds: float) -> Indices:
     return np.asarray(np.searchsorted(time, wanted + reach, side="right") - 1, dtype=np.intp)
 
 
-Draw = Callable[[Results, str, Indices, Indices, float | None, list[str]], Iterator[Frame]]
-"""Of an analysis, the outputs that are seen, which of these each frame shows, a scale of deflections, and notes."""
+Draw = Callable[[Results, str, Indices, float | None, list[str]], Iterator[Frame]]
+"""A frame for each of some outputs of an analysis, by a scale of deflections, with notes."""
 
 
 def make_movie(results_path: Path, path: Path, options: MovieOptions | None, draw: Draw) -> list[str]:
@@ -75,9 +76,10 @@ def make_movie(results_path: Path, path: Path, options: MovieOptions | None, dra
         ffmpeg()  # before frames are drawn
     with Results(results_path) as results:
         analysis = _moving_analysis(results, options.analysis)
-        outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
+        outputs, counts = np.unique(movie_outputs(results.time(analysis), options.seconds), return_counts=True)
         image = _gif_image if is_gif else mp4_image
-        frames = draw(results, analysis, outputs, shown, options.scale, notes)
+        drawn = draw(results, analysis, outputs, options.scale, notes)
+        frames = chain.from_iterable(map(repeat, drawn, counts.tolist()))
         write_atomically(path, image(frames), "movie", make_folder=True)
     return list(dict.fromkeys(notes))
 

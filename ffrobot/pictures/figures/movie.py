@@ -47,11 +47,10 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
 
 
 def _frames(
-    results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
+    results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
 ) -> Iterator[Frame]:
     picture = _Picture(results, analysis, outputs, scale, notes)
-    for k in shown:
-        yield picture.at(int(k))
+    yield from map(picture.at, range(len(outputs)))
 
 
 def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], outputs: int) -> Array:

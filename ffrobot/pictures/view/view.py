@@ -391,7 +391,7 @@ def view_movie(results_path: Path, path: Path, options: MovieOptions | None = No
 
 
 def _rendered(
-    results: Results, analysis: str, outputs: Indices, shown: Indices, scale: float | None, notes: list[str]
+    results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
 ) -> Iterator[Frame]:
     from PIL import Image
 
@@ -402,6 +402,6 @@ def _rendered(
         file = Path(place) / "grid.vtkhdf"
         write_atomically(file, vtkhdf_image(grid), "grid", ours=True)
         draw_pictures([replace(picture, grid=str(file), path=place, movie=True)])
-        for k in shown:
+        for k in steps:
             with Image.open(Path(place) / f"{k:05d}.png") as image:
                 yield np.asarray(image.convert("RGB"))
