@@ -62,8 +62,8 @@ def import_(
     BODY.SID_FEM (standard input data, Wallrapp) and BODY.fem (MBDyn) become modal body files, which scenes take as
     `modal = "BODY.h5"`.
 
-    MOTION.json (a JointTrajectory) and bags of ROS (the first JointTrajectory, else JointStates) become waypoints,
-    which trajectories of joints take as `waypoints = "PATH.csv"`.
+    MOTION.json or .yaml (a JointTrajectory) and bags of ROS (the first JointTrajectory, else JointStates) become
+    waypoints, which trajectories of joints take as `waypoints = "PATH.csv"`.
     """
     from ..exchange.export import MOTIONS, READERS, import_body, import_motion, print_export, print_import
     from ..exchange.urdf.import_urdf import import_urdf
@@ -122,7 +122,6 @@ ELSEWHERE = {
     ".mjcf": f"MJCF of MuJoCo: {CONVERTED}",
     ".mnf": "a flexible body of Adams: export its finite element mesh, for ffrobot link --inspect, or SID",
     ".mat": "a file of MATLAB: write its table as CSV",
-    **dict.fromkeys((".yaml", ".yml"), "YAML, as of ros2 topic echo: write the message as JSON, or a bag"),
     ".xacro": "xacro: run `xacro FILE.xacro > ROBOT.urdf` first",
 }
 """What takes files that are not imported, or what has to be done first, by their suffix."""

@@ -23,7 +23,7 @@ from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
-from .motion.read_motion import path_text, read_motion
+from .motion.read_motion import TEXTS, path_text, read_motion
 from .motion.robot_motion import (
     JointMotions,
     Side,
@@ -156,7 +156,7 @@ READERS: Mapping[str, Callable[[str, str], tuple[ModalBody, tuple[str, ...]]]] =
 """What reads bodies of other programs, by the end of the file's name."""
 
 
-MOTIONS = (".json", ".bag", ".db3", ".mcap")
+MOTIONS = (*TEXTS, ".bag", ".db3", ".mcap")
 """Ends of files with motions of joints; a folder is a bag of ROS 2."""
 
 

@@ -58,16 +58,8 @@ class Waypoints:
 
         Raises `ValueError` where two topics have the joint.
         """
-        for pattern in OF_A_JOINT:
-            name = pattern.format(joint)
-            ends = (f"/{name}",) if name != pattern else ()
-            numbers = [k for k, column in enumerate(self.columns) if column == name or column.endswith(ends)]
-            if len(numbers) > 1:
-                names = quoted(self.columns[k] for k in numbers)
-                raise ValueError(f'expected one column of joint "{joint}", found {names}')
-            if numbers:
-                return replace(self, columns=("value",), values=self.values[:, numbers])
-        return self
+        k = column_of(self.columns, joint)
+        return self if k is None else replace(self, columns=("value",), values=self.values[:, [k]])
 
     def spline(self) -> Piecewise:
         """The quintic spline (four continuous derivatives) through the rows, from rest to rest.
@@ -116,11 +108,56 @@ class Waypoints:
         )
 
 
-def load_waypoints(path: Path) -> Waypoints:
-    """Read the CSV table at `path`: header `t,x,y` or `t,value` …; at least two rows; t increasing.
+@dataclass(frozen=True)
+class Record:
+    """A table as a program wrote it: times (T,), s, in any order, and values (T, columns).
 
-    Times are in s, or in the unit that the header says. Those of a computer's clock begin at zero; rows that stand
-    there twice count once: both with a remark.
+    `rates` (T, columns) where the program wrote them, too. `place` of a row is where messages say that it is.
+    """
+
+    columns: Sequence[str]
+    times: Array
+    values: Array
+    place: Callable[[int], str]
+    remarks: tuple[str, ...] = ()
+    rates: Array | None = None
+
+    def waypoints(self) -> Waypoints:
+        """Its rows as waypoints. Raises `InputError` as `waypoints_of`."""
+        found = waypoints_of(self.columns, self.times, self.values, self.place)
+        return replace(found, remarks=(*self.remarks, *found.remarks))
+
+
+def column_of(columns: Sequence[str], joint: str) -> int | None:
+    """Which of the columns is that of a joint: see `OF_A_JOINT`. Raises `ValueError` where two topics have it."""
+    for pattern in OF_A_JOINT:
+        name = pattern.format(joint)
+        ends = (f"/{name}",) if name != pattern else ()
+        found = [k for k, column in enumerate(columns) if column == name or column.endswith(ends)]
+        if len(found) > 1:
+            raise ValueError(f'expected one column of joint "{joint}", found {quoted(columns[k] for k in found)}')
+        if found:
+            return found[0]
+    return None
+
+
+def load_waypoints(path: Path) -> Waypoints:
+    """Read the CSV table at `path` (see `load_record`): at least two rows; t increasing; rows repeated count once.
+
+    Raises `InputError` naming file and line.
+    """
+    record = load_record(path)
+    try:
+        found = record.waypoints()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return replace(found, remarks=tuple(f"{path.name}: {remark}" for remark in found.remarks))
+
+
+def load_record(path: Path) -> Record:
+    """Read the CSV table at `path`: header `t,x,y` or `t,value` …; at least two rows.
+
+    Times are in s, or in the unit that the header says. Those of a computer's clock begin at zero, with a remark.
 
     Raises `InputError` naming file and line.
     """
@@ -136,11 +173,7 @@ def load_waypoints(path: Path) -> Waypoints:
             names[k], values[:, k] = unit[1], factor * values[:, k]
             if factor != 1.0:
                 remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in (unit[2] or unit[3]) else "rad"}')
-    try:
-        waypoints = waypoints_of(names, times, values, lambda k: f"line {lines[k]}")
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return replace(waypoints, remarks=tuple(f"{path.name}: {remark}" for remark in (*remarks, *waypoints.remarks)))
+    return Record(names, times, values, lambda k: f"line {lines[k]}", tuple(remarks))
 
 
 def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Callable[[int], str]) -> Waypoints:

@@ -250,7 +250,7 @@ def test_wrong_files(text, expected, tmp_path):
 
 
 OTHERS = {
-    "a.usda": "another program has to convert it", "a.mnf": "Adams", "a.mat": "MATLAB", "a.yaml": "JSON, or a bag",
+    "a.usda": "another program has to convert it", "a.mnf": "Adams", "a.mat": "MATLAB",
     "a.xml": "found <mujoco> of another program", "a.urdf": "found a file that is no XML", "a.mcap": "damaged",
 }  # fmt: skip
 

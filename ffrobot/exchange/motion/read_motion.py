@@ -6,9 +6,8 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,17 +16,24 @@ from ...common.errors import InputError, blaming_file, quoted
 from ...common.extras import extras
 from ...common.tables import LARGEST, as_csv, shown
 from ...common.toml_files import read_text
-from ...mbs.fields.waypoints import Waypoints, waypoints_of
+from ...mbs.fields.waypoints import Record, Waypoints
 from .robot_motion import NANO, TRAJECTORY
 
 STATES = "sensor_msgs/msg/JointState"
+TEXTS = (".json", ".yaml", ".yml")
+T = TypeVar("T")
 MOVING = 0.01  # of the largest rate: less is rest
 NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 """Keys under which messages of planners have a JointTrajectory."""
 
 
 def read_motion(path: Path) -> Waypoints:
-    """The motion in a JSON file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
+    """The motion in a file with a JointTrajectory, or in a bag of ROS: see `read_record`."""
+    return _named(path, lambda path: read_record(path).waypoints())
+
+
+def read_record(path: Path) -> Record:
+    """The rows in a JSON or YAML file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
 
     Columns are joints, rad or m; `remarks` say what was left out.
 
@@ -35,9 +41,13 @@ def read_motion(path: Path) -> Waypoints:
         InputError: it has none, or numbers that are no motion; names the file.
         SolveError: `rosbags` is not installed.
     """
-    reader: Callable[[Path], Waypoints] = _from_json if path.suffix.lower() == ".json" else _from_bag
+    return _named(path, _from_text if path.suffix.lower() in TEXTS else _from_bag)
+
+
+def _named(path: Path, read: Callable[[Path], T]) -> T:
+    """What `read` makes of the file, which messages name."""
     try:
-        return reader(path)
+        return read(path)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
@@ -49,11 +59,9 @@ def path_text(motion: Waypoints) -> str:
     return as_csv([["t", *motion.columns], *rows])
 
 
-def _from_json(path: Path) -> Waypoints:
-    try:
-        message = json.loads(read_text(path, "file of a motion"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"expected JSON, found {error}") from None
+def _from_text(path: Path) -> Record:
+    text = read_text(path, "file of a motion")
+    message = _from_json(text) if path.suffix.lower() == ".json" else _from_yaml(text)
     segments = list(_segments(message))
     if not segments:
         raise InputError('expected a JointTrajectory with "joint_names" and "points", found none')
@@ -68,7 +76,26 @@ def _from_json(path: Path) -> Waypoints:
         rates += [point.get("velocities") for point in points]
         begin = rows[-1][0] if rows else 0.0
     joined = [f"{len(segments)} segments follow each other"] if len(segments) > 1 else []
-    return _motion(joints, rows, *joined, *_moving_at_ends(joints, rates))
+    return _record(joints, rows, rates, *joined)
+
+
+def _from_json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"expected JSON, found {error}") from None
+
+
+def _from_yaml(text: str) -> Any:
+    """All documents of it, as `ros2 topic echo` writes one for each message."""
+    with extras():
+        from ruamel.yaml import YAML
+        from ruamel.yaml.error import YAMLError
+    try:
+        return list(YAML(typ="safe", pure=True).load_all(text))
+    except (YAMLError, ValueError, RecursionError) as error:
+        reason = shown(" ".join(str(error).split()))
+        raise InputError(f"expected YAML, found {reason}") from None
 
 
 def _segments(message: Any) -> Iterator[Mapping[str, Any]]:
@@ -130,12 +157,9 @@ def _seconds(duration: Any, k: int) -> float:
     return _number(duration.removesuffix("s") if isinstance(duration, str) else duration, where)
 
 
-def _moving_at_ends(joints: Sequence[str], velocities: Sequence[Any]) -> Iterator[str]:
-    """Of motions that begin or end elsewhere than at rest, where all points have velocities."""
-    try:
-        rates = np.abs(np.array(velocities, dtype=float).reshape(-1, len(joints)))
-    except (TypeError, ValueError, OverflowError):
-        return
+def _moving_at_ends(joints: Sequence[str], velocities: Array) -> Iterator[str]:
+    """Of motions that begin or end elsewhere than at rest, by the velocities (T, joints) of all points."""
+    rates = np.abs(velocities)
     for k, end in ((0, "first"), (-1, "last")) if len(rates) else ():
         moving = [name for name, rate in zip(joints, rates[k], strict=True) if rate > MOVING * rates.max()]
         if moving:
@@ -145,15 +169,23 @@ def _moving_at_ends(joints: Sequence[str], velocities: Sequence[Any]) -> Iterato
             )
 
 
-def _motion(joints: Sequence[str], rows: Sequence[Row], *remarks: str) -> Waypoints:
+def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any], *remarks: str) -> Record:
+    """`velocities`: of all points, or of none."""
     if not joints or len(set(joints)) < len(joints):
         raise InputError(f"expected joints of different names, found {len(joints)}: {shown(', '.join(joints))}")
+    times = np.array([time for time, _ in rows])
     values = np.array([positions for _, positions in rows], dtype=float).reshape(len(rows), len(joints))
-    motion = waypoints_of(joints, np.array([time for time, _ in rows]), values, "point {}".format)
-    return replace(motion, remarks=(*remarks, *motion.remarks))
+    try:
+        rates = np.array(velocities, dtype=float).reshape(values.shape)
+    except (TypeError, ValueError, OverflowError):
+        rates = None
+    if rates is None or not np.isfinite(rates).all():
+        return Record(joints, times, values, "point {}".format, remarks)
+    remarks = (*remarks, *_moving_at_ends(joints, rates))
+    return Record(joints, times, values, "point {}".format, remarks, rates)
 
 
-def _from_bag(path: Path) -> Waypoints:
+def _from_bag(path: Path) -> Record:
     if not path.exists():
         raise InputError("file of a motion not found")
     with extras():
@@ -168,7 +200,7 @@ def _from_bag(path: Path) -> Waypoints:
         return _of_bag(bag)
 
 
-def _of_bag(bag: Any) -> Waypoints:
+def _of_bag(bag: Any) -> Record:
     """The first JointTrajectory of the topic that has most; without one, the JointStates of all topics."""
     topics = {
         kind: sorted((one for one in bag.connections if one.msgtype == kind), key=lambda one: -int(one.msgcount))
@@ -190,12 +222,10 @@ def _of_bag(bag: Any) -> Waypoints:
     for k, point in enumerate(plan.points):
         keys = {"positions": point.positions.tolist(), "time_from_start": vars(point.time_from_start)}
         rows.append(_row(plan.joint_names, keys, k, 0.0))
-    return _motion(
-        plan.joint_names, rows, *left, *_moving_at_ends(plan.joint_names, [p.velocities for p in plan.points])
-    )
+    return _record(plan.joint_names, rows, [point.velocities for point in plan.points], *left)
 
 
-def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Waypoints:
+def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Record:
     """Positions by the time of their stamps, the first being zero, of all joints: see `_together`.
 
     Of a joint on several topics that with most messages counts. Stamps that nobody has set are times of the record.
@@ -223,7 +253,7 @@ Sample = tuple[int, int, float]
 """Stamp of a message (ns), 0 where nobody has set it, its time in the record (ns), and a position."""
 
 
-def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Waypoints:
+def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record:
     """One table of joints whose samples have times of their own (ns).
 
     Times are those of the joints with most samples, where all joints have some before and after; others go between
@@ -239,7 +269,7 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Waypoi
         remarks.append(f"{quoted(map(shown, short))} left out: fewer than two samples")
     series = {name: rows for name, rows in series.items() if name not in short}
     if not series:
-        return _motion(list(samples), [])
+        return _record(list(samples), [], [])
     alike = Counter(at.tobytes() for at, _ in series.values())
     stamps = max((at for at, _ in series.values()), key=lambda at: (len(at), alike[at.tobytes()]))
     apart = [name for name, (at, _) in series.items() if not np.array_equal(at, stamps)]
@@ -264,4 +294,4 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Waypoi
         own = (at[once] - times[0]) / NANO
         columns.append(CubicSpline(own, values[once])((times - times[0]) / NANO))
     table = np.stack([(times - times[0]) / NANO, *columns], axis=1)
-    return _motion(list(series), [(row[0], row[1:]) for row in as_rows(table)], *remarks)
+    return _record(list(series), [(row[0], row[1:]) for row in as_rows(table)], [None], *remarks)
