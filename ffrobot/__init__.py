@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .run.watcher import Watcher
     from .scene.load import load_scene, make_scene
     from .scene.scene import Scene
+    from .smooth.smoothing import smooth_motion
 
     __version__: str
 
@@ -44,6 +45,7 @@ _NAMES = {
     ".run.watcher": ("Watcher",),
     ".scene.load": ("load_scene", "make_scene"),
     ".scene.scene": ("Scene",),
+    ".smooth.smoothing": ("smooth_motion",),
     ".design.studies": ("optimise", "sensitivity", "trade_off", "uncertainty"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
@@ -51,7 +53,8 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = [
     "FfrobotError", "FfrobotWarning", "InputError", "ModalBody", "Results", "Scene", "SolveError", "Watcher",
     "fit_measured", "load_scene", "make_link", "make_scene", "optimise", "plot_results", "read_modal_body",
-    "sensitivity", "solve", "trade_off", "uncertainty", "view_file", "write_movie", "write_report", "write_study",
+    "sensitivity", "smooth_motion", "solve", "trade_off", "uncertainty", "view_file", "write_movie", "write_report",
+    "write_study",
 ]  # fmt: skip
 
 

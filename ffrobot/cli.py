@@ -20,6 +20,7 @@ from .commands.link import link
 from .commands.map import map_
 from .commands.pictures import plot, report, view
 from .commands.read import feasibility, info, linear, pose
+from .commands.smooth import smooth
 from .commands.solve import solve
 from .commands.sweep import sweep
 from .common.errors import FfrobotError
@@ -59,7 +60,7 @@ def schema(kind: str) -> None:
 
 
 for command in (
-    link, solve, info, feasibility, plot, view, report, linear, pose, sweep, map_, fit, sensitivity, optimise,
+    link, solve, info, feasibility, plot, view, report, linear, pose, sweep, map_, fit, smooth, sensitivity, optimise,
     uncertainty, import_, export, bench,
 ):  # fmt: skip
     cli.add_command(command)

@@ -150,10 +150,10 @@ def plan_map(
     if orientation == "auto":
         keeps = axes[0].is_place and any(path.orientation is not None for path in loaded.trajectory)
     omega = np.zeros(0) if frequencies is None else frequencies
-    return MapPlan(scene, axes, point or _default_point(loaded), keeps, count, omega, folder)
+    return MapPlan(scene, axes, point or default_point(loaded), keeps, count, omega, folder)
 
 
-def _default_point(scene: Scene) -> str:
+def default_point(scene: Scene) -> str:
     """The tool of the scene, or a point of the last body: payload, tip, last."""
     body = scene.body[-1]
     carried = [one.point for one in scene.payload if one.point.partition(".")[0] == body.name]
@@ -174,12 +174,7 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
             f"{plan.scene}: joint: expected motors that keep the poses of a map, found none: joints of kinematic loops"
             " have them with motor = true alone"
         )
-    known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
-    if plan.point not in known:
-        raise InputError(
-            f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{plan.point}"'
-            f"{did_you_mean(plan.point, known)}"
-        )
+    check_point(solution, plan.point)
     watcher.stage("postures")
     request = _request(plan)
     kept = _kept_postures(plan, request)
@@ -197,6 +192,16 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
     found = _judged(plan, evaluator, postures, named, processes, watcher)
     return _assembled(plan, solution, evaluator, postures, [(part, found[name]) for name, part in named.items()])
+
+
+def check_point(solution: Solution, point: str) -> None:
+    """Raise `InputError` where the robot has no such point."""
+    known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
+    if point not in known:
+        raise InputError(
+            f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{point}"'
+            f"{did_you_mean(point, known)}"
+        )
 
 
 def _judged(

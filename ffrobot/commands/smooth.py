@@ -1,0 +1,84 @@
+"""The command `smooth`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..common.errors import InputError
+from ..present.logs import FILE, logging_options
+from .options import POSITIVE, protect
+
+
+@click.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option("--path", "motion", metavar="MOTION", type=FILE, help="Recorded motion [trajectories of the scene].")
+@click.option(
+    "--bandwidth",
+    metavar="HZ|JOINT=HZ",
+    multiple=True,
+    help="Natural frequency of position controllers; repeatable by joint.  [default: 20]",
+)
+@click.option(
+    "--damping-ratio", type=POSITIVE, default=0.8, show_default=True, help="Damping ratio of position controllers."
+)
+@click.option(
+    "--point", metavar="BODY.POINT", help="Point whose vibration counts.  [default: a tool, or of the last body]"
+)
+@click.option(
+    "--settled", metavar="M", type=POSITIVE, default=1e-4, show_default=True, help="Allowed vibration at the end."
+)
+@click.option("--acceleration", metavar="LIMIT", type=POSITIVE, help="Limit of all joints (rad/s², m/s²).")
+@click.option("--jerk", metavar="LIMIT", type=POSITIVE, help="Limit of all joints (rad/s³, m/s³).")
+@click.option("--degrees", is_flag=True, help="Angles of the file are in degrees.")
+@click.option("-o", "--output", metavar="OUT.png", type=FILE, help="Picture [SCENE.smooth.png next to the input].")
+@logging_options
+def smooth(
+    scene_file: Path,
+    motion: Path | None,
+    bandwidth: tuple[str, ...],
+    damping_ratio: float,
+    point: str | None,
+    settled: float,
+    acceleration: float | None,
+    jerk: float | None,
+    output: Path | None,
+    *,
+    degrees: bool,
+) -> None:
+    """Find out why a robot vibrates that follows a recorded motion: the stream, or the robot.
+
+    MOTION is a CSV table of joint positions with times, a JointTrajectory (JSON, YAML), or a bag of ROS. Compliant
+    gears (`stiffness` of joints) and flexible links vibrate; motors follow set points through position controllers.
+    """
+    from ..pictures.studies.smooth import draw_smooth
+    from ..present.console import Display, summary_console
+    from ..present.smooth import print_smooth
+    from ..run.inputs import files_of
+    from ..smooth.smoothing import smooth_motion
+
+    protect([*files_of(scene_file), *([motion] if motion else [])])
+    with Display() as display:
+        found = smooth_motion(
+            scene_file, motion, bandwidth=_bandwidth(bandwidth), damping_ratio=damping_ratio, point=point,
+            settled=settled, acceleration=acceleration or float("inf"), jerk=jerk or float("inf"),
+            degrees=degrees, watcher=display,
+        )  # fmt: skip
+    console = summary_console()
+    print_smooth(found, console)
+    picture = output or scene_file.with_suffix(".smooth.png")
+    draw_smooth(found, picture)
+    console.print(f"figure     {picture}", soft_wrap=True)
+
+
+def _bandwidth(texts: tuple[str, ...]) -> float | dict[str, float]:
+    """Of all joints, or by joint."""
+    pairs = [text.rpartition("=") for text in texts] or [("", "", "20")]
+    try:
+        values = {name: float(value) for name, _, value in pairs}
+    except ValueError:
+        values = {}
+    if len(values) < len(pairs) or ("" in values and len(values) > 1):
+        raise InputError(f"--bandwidth: expected HZ, or JOINT=HZ for each joint, found {', '.join(texts)}")
+    return values.get("", values) if "" in values else values

@@ -1,0 +1,71 @@
+"""A picture of a diagnosis: the commanded acceleration, its spectrum at the robot's frequencies, and the vibration."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...common.files import write_atomically
+from ...smooth.diagnosis import Diagnosis
+from ...smooth.smoothing import Smoothed
+from ..figures.style import SIZE, style
+
+BAND = "#e8c9a0"
+WIDE = (2 * SIZE[0], 2.2 * SIZE[1])  # inches
+LEAST = 1e-3  # of the tolerance: what is drawn of distances
+
+
+def draw_smooth(found: Smoothed, path: Path) -> None:
+    """Write the picture as PNG."""
+    content = io.BytesIO()
+    with style():
+        _draw(found).savefig(content, format="png")
+    write_atomically(path, content.getvalue(), "picture", ours=True)
+
+
+def _draw(found: Smoothed) -> Figure:
+    figure = Figure(figsize=WIDE, layout="constrained")
+    grid = figure.add_gridspec(2, 5)
+    _accelerations(figure.add_subplot(grid[0, :3]), found.before)
+    _spectrum(figure.add_subplot(grid[0, 3:]), found.before)
+    _distance(figure.add_subplot(grid[1, :]), found)
+    return figure
+
+
+def _accelerations(axes: Axes, of: Diagnosis) -> None:
+    """Second differences of set points."""
+    times, values = of.recording.dense(of.recording.step)
+    rates = np.diff(values, axis=0) / np.diff(times)[:, None]
+    middles = (times[1:] + times[:-1]) / 2
+    bends = np.diff(rates, axis=0) / np.diff(middles)[:, None]
+    for joint, column in zip(of.recording.joints, bends.T, strict=True):
+        axes.plot(times[1:-1], column, label=joint)
+    axes.set_title("acceleration of set points (rad/s²)")
+    axes.set_xlabel("t (s)")
+    axes.legend(fontsize=7)
+
+
+def _spectrum(axes: Axes, of: Diagnosis) -> None:
+    grid, *each = of.spectrum
+    for band in of.frequencies.T:
+        axes.axvspan(min(band.min(), grid[-1]), min(band.max(), grid[-1]), color=BAND)
+    for values in each:
+        axes.plot(grid, values)
+    axes.set_yscale("log")
+    axes.set_title("spectrum of it (rad/s), natural frequencies")
+    axes.set_xlabel("frequency (Hz)")
+
+
+def _distance(axes: Axes, found: Smoothed) -> None:
+    before, tolerance = found.before, found.robot.tolerance
+    axes.plot(before.ride.times, 1e3 * np.maximum(before.ride.off, LEAST * tolerance), label="as it is")
+    axes.axvline(before.recording.times[-1], color="0.6", linewidth=0.8)
+    axes.axhline(1e3 * tolerance, color="0.6", linewidth=0.8, linestyle="--", label="tolerance")
+    axes.set_yscale("log")
+    axes.set_title(f"distance of {found.robot.point} from its final place (mm)")
+    axes.set_xlabel("t (s)")
+    axes.legend()

@@ -1,0 +1,53 @@
+"""What `ffrobot smooth` prints: the stream, its faults, a table of joints, and what it is in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.console import Console
+
+from ..smooth.diagnosis import Diagnosis
+from ..smooth.smoothing import Smoothed
+from .lines import print_table
+
+COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by it alone (mm)")
+
+
+def print_smooth(found: Smoothed, console: Console) -> None:
+    """Lines on the motion as it is, faults, a table of joints, the verdict."""
+    before, servo = found.before, found.robot.servo
+    bandwidth = " ".join(dict.fromkeys(f"{omega / (2 * np.pi):.3g}" for omega in servo.omega))
+    lines = [
+        ("motion", f"{len(before.recording.times)} set points of {len(before.recording.joints)} joints over"
+         f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
+        ("servo", f"{bandwidth} Hz, damping ratio {servo.ratio:.3g}"),
+        *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),
+        *(("note", remark) for remark in before.recording.remarks),
+        *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
+        ("settling", settling_in_words(before)),
+    ]  # fmt: skip
+    for name, text in lines:
+        console.print(f"{name:<10} {text}", soft_wrap=True, markup=False)
+    print_table(console, COLUMNS, _rows(before))
+    console.print(f"verdict    {found.verdict}", soft_wrap=True, markup=False)
+
+
+def settling_in_words(of: Diagnosis) -> str:
+    """How far the point swings, and when it stays within the tolerance."""
+    settling = of.ride.settling
+    if settling is None:
+        return "no place of rest"
+    limit, whole = 1e3 * settling.tolerance, of.ride.times[-1] - settling.path_end
+    until = f"never within {whole:.2g} s" if np.isnan(settling.time_to) else f"{settling.time_to:.3g} s"
+    return (
+        f"within {limit:.3g} mm: {until} after the last set point; residual vibration {1e3 * of.residual:.3g} mm peak"
+        " to peak"
+    )
+
+
+def _rows(of: Diagnosis) -> Iterator[tuple[str, ...]]:
+    values = of.recording.values
+    for k, joint in enumerate(of.recording.joints):
+        numbers = (values[0, k], values[-1, k], *of.peaks[:, k], 1e3 * of.alone[k])
+        yield joint, *(f"{number:.3g}" for number in numbers)

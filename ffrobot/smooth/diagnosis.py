@@ -1,0 +1,136 @@
+"""What makes a robot vibrate under a stream of set points: faults of the stream, or what it excites, joint by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.structs import struct
+from ..mbs.fields.paths import Piecewise
+from .recording import Fault, Limits, Recording, evened, faults_of_motion, faults_of_stamps, peaks
+from .robot import Ride, Robot
+
+INSTANTS = 9  # postures along the motion whose frequencies are found
+KEPT = 3  # frequencies
+POINTS = 10  # set points in a period of the lowest frequency: fewer are coarse
+NEAR, PEAK = 0.1, 3.0  # of a frequency, and times the usual of the spectrum about it: the command oscillates there
+ABOUT, GRID = (0.3, 3.0), 400  # times the lowest frequency: the spectrum that is usual, and in how many points
+FINE = 4000  # instants of motors' accelerations
+CAUSES = ("jitter", "jump", "noise", "gap", "coarse", "resonance")
+"""Kinds of faults by which a stream excites vibrations, by their beginnings."""
+
+
+@struct
+class Diagnosis:
+    """Of one stream of set points on one robot.
+
+    Attributes:
+        recording, ride: the stream, and the robot under it.
+        faults: of the stream.
+        frequencies: (instants, k) Hz, the lowest along the motion, with motors locked.
+        alone: (n,) m, residual vibration at the point by each joint alone, peak to peak, linear model at the end.
+        by_mode: (k,) m, likewise by frequency.
+        spectrum: (1 + n, F) Hz, and of motors' accelerations, |∫ θ̈ e^(−iωt) dt|, rad/s.
+        peaks: (3, n) speed, acceleration and jerk.
+    """
+
+    recording: Recording
+    ride: Ride
+    faults: tuple[Fault, ...]
+    frequencies: Array
+    alone: Array
+    by_mode: Array
+    spectrum: Array
+    peaks: Array
+
+    @property
+    def residual(self) -> float:
+        """Residual vibration at the point, m, peak to peak; 0 where nothing vibrates."""
+        settling = self.ride.settling
+        return 0.0 if settling is None or not self.frequencies.size else settling.residual
+
+    def is_vibration(self, tolerance: float) -> bool:
+        """Whether it exceeds the tolerance, m."""
+        return self.residual > tolerance
+
+    def verdict(self, robot: Robot) -> str:
+        """In words what it is, and what causes it."""
+        causes = list(dict.fromkeys(fault.kind for fault in self.faults if fault.kind.startswith(CAUSES)))
+        others = list(dict.fromkeys(fault.kind for fault in self.faults))
+        settling = self.ride.settling
+        if not self.frequencies.size:
+            return "nothing vibrates in the model: its links and gears are rigid. Gears with stiffness do"
+        if settling is None:
+            return "the robot has no place of rest at the end of the motion: joints without motors are free"
+        if not self.is_vibration(robot.tolerance):
+            what = f"{robot.point} vibrates by {1e3 * self.residual:.2g} mm at most"
+            if others:
+                return f"not vibration of the robot: {what}. Faults of the stream: {', '.join(others)}"
+            return f"not vibration of the robot: {what}, and the stream has no fault"
+        worst = int(self.alone.argmax())
+        share = self.alone[worst] / self.alone.sum()
+        frequency = self.frequencies[-1, int(self.by_mode.argmax())]
+        why = f"faults of the stream ({', '.join(causes)})" if causes else "the motion, without a fault of the stream"
+        return (
+            f"vibration of the robot: {robot.point} swings by {1e3 * self.residual:.3g} mm peak to peak after the last"
+            f" set point, at {frequency:.3g} Hz, excited by {why}; {robot.joints[worst]} causes {100 * share:.0f} %"
+        )
+
+
+def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
+    """Simulate the stream as it is, and look for faults of it. Raises `SolveError` as `Robot.ride`."""
+    times, command = recording.dense(min(recording.step / 4, 1e-3))
+    ride = robot.ride(times, command)
+    along = [ride.q[k] for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
+    path, modes = robot.servo.motors(times, command), [robot.modes(q) for q in along]
+    kept = min(KEPT, *(len(one.omega) for one in modes))
+    frequencies = np.array([one.omega[:kept] for one in modes]) / (2 * np.pi)
+    fine = np.linspace(0.0, path.end, FINE)
+    left = modes[-1].left(fine, path.sample(fine, 2), path.end)
+    grid = np.linspace(0.0, ABOUT[1] * (frequencies[:, 0].max() if kept else 10.0), GRID)
+    spectrum = _spectrum(path, grid)
+    faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits)]
+    if kept:
+        even = evened(recording)
+        of_even = spectrum if even is recording else _spectrum(robot.servo.motors(even.times, even.values), grid)
+        faults += [*_coarse(recording, frequencies), *_resonance(robot, frequencies, grid, of_even)]
+    return Diagnosis(
+        recording, ride, tuple(faults), as_floats(frequencies), as_floats(2 * np.abs(left).sum(axis=0)),
+        as_floats(2 * np.abs(left.sum(axis=1))[:kept]), np.vstack([grid, spectrum.T]),
+        peaks(*recording.dense(recording.step / 4)),
+    )  # fmt: skip
+
+
+def _spectrum(path: Piecewise, frequencies: Array) -> Array:
+    """(F, n) |∫ θ̈ e^(−iωt) dt| of motors, rad/s."""
+    fine = np.linspace(0.0, path.end, FINE)
+    kernel = np.exp(-2j * np.pi * np.outer(frequencies, fine))
+    return as_floats(np.abs(kernel @ path.sample(fine, 2)) * (fine[1] - fine[0]))
+
+
+def _coarse(recording: Recording, frequencies: Array) -> Iterator[Fault]:
+    step, lowest = recording.step, frequencies[:, 0].min()
+    if recording.rates is None and step * lowest > 1 / POINTS:
+        yield Fault(
+            "coarse sampling", f"a set point every {1e3 * step:.3g} ms, {1 / (step * lowest):.2g} in a period of the"
+            f" lowest frequency, {lowest:.3g} Hz: the lines between them are felt. Expected {POINTS} at least",
+        )  # fmt: skip
+
+
+def _resonance(robot: Robot, frequencies: Array, grid: Array, spectrum: Array) -> Iterator[Fault]:
+    """Where the command of a joint oscillates at a natural frequency: a peak of its spectrum there."""
+    for of in frequencies.T:
+        near = (grid >= (1 - NEAR) * of.min()) & (grid <= (1 + NEAR) * of.max())
+        about = (grid >= ABOUT[0] * of.min()) & (grid <= ABOUT[1] * of.max()) & ~near
+        if not near.any() or not about.any():
+            continue
+        for joint, values in zip(robot.joints, spectrum.T, strict=True):
+            k = int(np.where(near, values, 0.0).argmax())
+            inside = 0 < k < len(grid) - 1 and values[k] >= max(values[k - 1], values[k + 1])
+            if inside and values[k] > PEAK * np.median(values[about]) and values[k] > values[about].max() / 2:
+                yield Fault(
+                    "resonance", f"{joint}: the command oscillates at {grid[k]:.3g} Hz, where the robot has a natural"
+                    f" frequency of {of.min():.3g} to {of.max():.3g} Hz",
+                )  # fmt: skip

@@ -1,0 +1,295 @@
+"""Motions of all joints with motors of a robot, as a program streams or recorded them, and faults of such a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..common.arrays import Array, Booleans, as_floats
+from ..common.errors import InputError, did_you_mean, quoted
+from ..common.structs import struct
+from ..exchange.motion.read_motion import read_record
+from ..mbs.analysis.pcid import Pcid
+from ..mbs.fields.waypoints import Record, column_of, load_record
+from ..mbs.joints.joint import JointRecord
+from ..mbs.scene.analysis import TimedAnalysis
+from ..run.solve import solve_scene
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
+
+TURN = 180 / np.pi
+LATE, UNEVEN = 2.5, 0.02  # of the usual step: a gap, and deviations that are jitter
+EVEN = 0.5  # of the roughness by stamps: by even times rows are smoother, so that stamps are off, not rows
+ABRUPT, BESIDE = 4.0, 6  # times the differences of so many rows on both sides: a jump
+NOTABLE = 0.1  # of the largest speed of a joint: a smaller jump of it is none
+STILL = 1e-9  # rad or m: joints that move less stand still
+TURNS, MANY = 0.4, 20  # of pairs of second differences change their sign, of so many at least; of white noise 0.73 do
+BACK = 0.5  # of a jump of the speed: what is left of it a row later, where the position jumps
+ABOVE = 0.3  # of the largest acceleration: a smaller jump of it is none
+KEPT = 1e-6  # of a limit, beyond it: round-off
+
+
+@struct
+class Recording:
+    """Set points (T, n) of n joints at `times` (T,), s, from 0 and increasing.
+
+    `stamps` (S,) are the times of all rows as they were written; `rates` (T, n) where they were written, too.
+    """
+
+    joints: tuple[str, ...]
+    times: Array
+    values: Array
+    stamps: Array
+    rates: Array | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> float:
+        """The usual time (s) between rows."""
+        return float(np.median(np.diff(self.times)))
+
+    def dense(self, step: float) -> tuple[Array, Array]:
+        """Times (s) and set points between which lines are close: with rates, of cubics every `step` s at most."""
+        if self.rates is None:
+            return self.times, self.values
+        from scipy.interpolate import CubicHermiteSpline
+
+        parts = [np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)[1:]
+                 for a, b in zip(self.times[:-1], self.times[1:], strict=True)]  # fmt: skip
+        times = np.concatenate([self.times[:1], *parts])
+        return times, as_floats(CubicHermiteSpline(self.times, self.values, self.rates)(times))
+
+
+def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> Recording:
+    """Of all joints of `scene` with motors, by their names, from a CSV table, a JointTrajectory, or a bag of ROS.
+
+    Raises:
+        InputError: a joint is missing, or has several coordinates; rows do not move; angles seem to be degrees.
+        SolveError: a library that reads the file is not installed.
+    """
+    record = load_record(path) if path.suffix.lower() == ".csv" else read_record(path)
+    joints = scene.motor_joints
+    names = [joint.name for joint in joints]
+    if several := [joint.name for joint in joints if len(joint.units) != 1]:
+        raise InputError(f"{scene.path}: expected joints of one coordinate each, found {quoted(several)}")
+    columns = _columns(path, record, names)
+    values = record.values[:, columns]
+    turning = np.array([joint.units[0] == "rad" for joint in joints])
+    if is_in_degrees:
+        values = np.where(turning, values / TURN, values)
+    else:
+        _check_unit(path, joints, values)
+    others = [name for k, name in enumerate(record.columns) if k not in columns]
+    left = (f"columns left out: {quoted(others)}",) if others else ()
+    ahead = np.append(-np.inf, np.maximum.accumulate(record.times)[:-1])
+    good = record.times > ahead
+    times, values = record.times[good], values[good]
+    if len(times) < 4:
+        raise InputError(f"{path}: expected at least 4 rows with times that increase, found {len(times)}")
+    if np.ptp(values, axis=0).max() <= STILL:
+        raise InputError(f"{path}: expected joints that move, found none")
+    rates = None if record.rates is None else record.rates[good][:, columns] / (TURN if is_in_degrees else 1.0)
+    found = Recording(tuple(names), times - times[0], values, record.times - times[0], rates, (*record.remarks, *left))
+    return without_rest(found)
+
+
+def without_rest(recording: Recording) -> Recording:
+    """The same until it comes to its last place."""
+    moving = np.flatnonzero(np.abs(recording.values - recording.values[-1]).max(axis=1) > STILL)
+    last = min(int(moving[-1]) + 2, len(recording.times))
+    rates = None if recording.rates is None else recording.rates[:last]
+    return replace(recording, times=recording.times[:last], values=recording.values[:last], rates=rates)
+
+
+def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
+    """The motion along the trajectories of the scene, with rigid gears, every `step` s.
+
+    Raises `InputError` where the scene has none, or no analysis through time says for how long.
+    """
+    timed = [analysis for analysis in scene.analysis if isinstance(analysis, TimedAnalysis)]
+    if not scene.trajectory or not timed:
+        raise InputError(f"{scene.path}: expected --path, or trajectories and an analysis with an end, found neither")
+    paths = tuple(path.changed(joint=path.motor, motor=None) if path.motor else path for path in scene.trajectory)
+    outputs = int(np.ceil(timed[0].end / step - STILL))
+    analysis = Pcid(name="plan", kind="pcid", end=outputs * step, output_step=step)
+    found = solve_scene(scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)}), watcher)
+    motion, joints = found.analyses["plan"].motion, tuple(joint.name for joint in scene.motor_joints)
+    values = np.column_stack([np.reshape((motion.joint(joint) or ())[0], len(motion.time)) for joint in joints])
+    return without_rest(Recording(joints, motion.time, values, motion.time))
+
+
+def _columns(path: Path, record: Record, names: Sequence[str]) -> list[int]:
+    """Which column each joint has."""
+    try:
+        found = {name: column_of(record.columns, name) for name in names}
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
+    columns = [k for k in found.values() if k is not None]
+    missing = [name for name, k in found.items() if k is None]
+    if missing or len(set(columns)) < len(columns):
+        missing = missing or names
+        raise InputError(
+            f"{path}: expected a column of every joint with a motor (constant where it rests), found none of"
+            f" {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}"
+        )
+    return columns
+
+
+def _check_unit(path: Path, joints: Sequence[JointRecord], values: Array) -> None:
+    """Refuse angles beyond their limits, or several turns, that would lie within them if they were degrees."""
+    for joint, column in zip(joints, values.T, strict=True):
+        low, high = joint.position_limits[0]
+        low, high = max(low, -2 * np.pi), min(high, 2 * np.pi)
+        beyond = max(float(column.max()) - high, low - float(column.min()))
+        if joint.units[0] == "rad" and beyond > np.pi and low <= column.min() / TURN and column.max() / TURN <= high:
+            raise InputError(
+                f'{path}: expected angles in rad, found "{joint.name}" from {column.min():.4g} to {column.max():.4g}:'
+                " --degrees takes angles in degrees"
+            )
+
+
+@struct
+class Fault:
+    """What is wrong with a stream of set points: its `kind`, and in a line."""
+
+    kind: str
+    text: str
+
+
+def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
+    """Doubled stamps, steps back, gaps and jitter."""
+    steps, usual = np.diff(recording.stamps), recording.step
+    if doubled := int(np.count_nonzero(steps == 0.0)):
+        yield Fault("doubled stamps", f"{doubled} rows have the time of the row before: only the first counts")
+    if back := int(np.count_nonzero(steps < 0.0)):
+        yield Fault("steps back", f"times step back at {back} rows: rows before the latest time are left out")
+    steps = np.diff(recording.times)
+    moves = np.ptp(np.stack([recording.values[:-1], recording.values[1:]]), axis=0).max(axis=1) > STILL
+    late = (steps > LATE * usual) & moves
+    if recording.rates is None and late.any() and late.mean() < 0.2:
+        k = int(np.where(late, steps, 0.0).argmax())
+        yield Fault(
+            "gap", f"{late.sum()} gaps of up to {1e3 * steps[k]:.3g} ms in the motion, the longest at"
+            f" t = {recording.times[k]:.4g} s: lines bridge them",
+        )  # fmt: skip
+    own = steps[~late] - usual * np.maximum(np.round(steps[~late] / usual), 1.0)  # rows may be left out
+    if recording.rates is None and np.sqrt(np.mean(own**2)) > UNEVEN * usual:
+        evenly = " Rows are smoother at even times: stamps are late, not the motion" if is_even(recording) else ""
+        yield Fault(
+            "jitter", f"steps of {1e3 * usual:.4g} ms jitter by {1e3 * np.sqrt(np.mean(own**2)):.3g} ms (RMS), from"
+            f" {1e3 * steps.min():.3g} to {1e3 * steps[~late].max():.3g} ms.{evenly}",
+        )  # fmt: skip
+
+
+def is_even(recording: Recording) -> bool:
+    """Whether rows make a smoother motion at even times than at those of their stamps."""
+    even = np.arange(len(recording.times)) * recording.step
+    by_even, by_stamps = (
+        np.mean(np.diff(np.diff(recording.values, axis=0) / np.diff(times)[:, None], axis=0) ** 2)
+        for times in (even, recording.times)
+    )
+    return bool(by_even < EVEN**2 * by_stamps)
+
+
+def evened(recording: Recording) -> Recording:
+    """With rows at even times, where these make a smoother motion."""
+    if recording.rates is not None or not is_even(recording):
+        return recording
+    return replace(recording, times=np.arange(len(recording.times)) * recording.step)
+
+
+def faults_of_motion(recording: Recording, limits: Limits) -> Iterator[Fault]:
+    """Jumps, noise, and limits that are exceeded; of rows at even times where these are the smoother ones."""
+    motion = evened(recording)
+    times, values = motion.dense(motion.step / 4)
+    for k, name in enumerate(motion.joints):
+        yield from _jumps(name, times, values[:, k])
+        for bound, beyond in zip(limits.positions[k], (values[:, k].min(), values[:, k].max()), strict=True):
+            if not limits.positions[k, 0] <= beyond <= limits.positions[k, 1]:
+                yield Fault("limit", f"{name}: position {beyond:.4g} beyond its limit of {bound:.4g}")
+    for word, found, of in zip(("speed", "acceleration", "jerk"), peaks(times, values), limits.by_order, strict=True):
+        for name, peak, limit in zip(motion.joints, found, of, strict=True):
+            if peak > limit * (1 + KEPT):
+                yield Fault("limit", f"{name}: {word} of up to {peak:.4g}, beyond its limit of {limit:.4g}")
+
+
+@struct
+class Limits:
+    """Ranges of positions (n, 2); by_order (3, n) of speed, acceleration and jerk; infinite where there is none."""
+
+    positions: Array
+    by_order: Array
+
+
+def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
+    """Those of joints with motors, and the given ones, rad/s² and rad/s³."""
+    joints = scene.motor_joints
+    speed = [joint.motor_limits[0].speed for joint in joints]
+    more = np.tile([[acceleration], [jerk]], len(joints))
+    return Limits(np.array([joint.position_limits[0] for joint in joints]), np.vstack([speed, more]))
+
+
+def peaks(times: Array, values: Array) -> Array:
+    """(3, n) largest speed, acceleration and jerk of a motion (T, n) that rests before and after, by differences."""
+    found, usual = [], float(np.median(np.diff(times)))
+    at, values = np.concatenate([[times[0] - usual], times, [times[-1] + usual]]), _at_rest(values)
+    for _ in range(3):
+        values = np.diff(values, axis=0) / np.diff(at)[:, None]
+        at = (at[1:] + at[:-1]) / 2
+        found.append(np.abs(values).max(axis=0))
+    return np.array(found)
+
+
+def _at_rest(values: Array) -> Array:
+    return np.vstack([values[:1], values, values[-1:]])
+
+
+def _jumps(name: str, times: Array, values: Array) -> Iterator[Fault]:
+    """Of the position or the speed, else of the acceleration; or noise, of which each row is a jump."""
+    if np.ptp(values) <= STILL:
+        return
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    rates = np.concatenate([[0.0], np.diff(values) / steps, [0.0]])
+    bends = np.diff(rates)
+    if _is_noise(bends):
+        yield Fault("noise", f"{name}: second differences of rows change their sign: noise, or too few digits")
+        return
+    late = np.concatenate([[False], steps > LATE * usual, [False]])
+    bridged = late[1:] | late[:-1]
+    abrupt = _stands_out(bends, NOTABLE * np.abs(rates).max(), bridged)
+    if abrupt.any():
+        k = int(np.where(abrupt, np.abs(bends), 0.0).argmax())
+        beside = bends[max(k - 1, 0) : k + 2].sum() - bends[k]
+        kind, size = ("speed", f"{abs(bends[k]):.3g} per s")
+        if abs(bends[k] + beside) < BACK * abs(bends[k]):  # there and back again
+            kind, size = "position", f"{usual * abs(bends[k]):.3g}"
+        yield Fault(f"jump of {kind}", f"{name}: {kind} jumps by {size} at t = {times[k]:.4g} s")
+        return
+    thirds = np.diff(bends)
+    abrupt = _stands_out(thirds, ABOVE * np.abs(bends).max(), bridged[1:] | bridged[:-1])
+    if abrupt.any():
+        k = int(np.where(abrupt, np.abs(thirds), 0.0).argmax())
+        others = int(np.count_nonzero(abrupt & ~np.append(False, abrupt[:-1]))) - 1
+        more = f", and {others} times more" if others else ""
+        size = f"{abs(thirds[max(k - 1, 0) : k + 2].sum()) / usual:.3g} per s²"  # between two rows it is in two of them
+        yield Fault("jump of acceleration", f"{name}: acceleration jumps by {size} at t = {times[k]:.4g} s{more}")
+
+
+def _is_noise(bends: Array) -> bool:
+    """Whether most second differences count, and change their sign from row to row."""
+    counts = np.abs(bends) > NOTABLE * np.sqrt(np.mean(bends**2))
+    pairs = counts[1:] & counts[:-1]
+    turns = bends[1:] * bends[:-1] < 0.0
+    return bool(pairs.sum() > max(len(bends) / 4, MANY) and (turns & pairs).sum() > TURNS * pairs.sum())
+
+
+def _stands_out(sizes: Array, least: float, bridged: Booleans) -> Booleans:
+    """Which are larger than `ABRUPT` times all near them, but for those next to them, and no lines over gaps."""
+    sizes = np.where(bridged, 0.0, np.abs(sizes))
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(sizes, BESIDE), 2 * BESIDE + 1).copy()
+    near[:, BESIDE - 1 : BESIDE + 2] = 0.0
+    return np.asarray(sizes > np.maximum(ABRUPT * near.max(axis=1), least))

@@ -1,0 +1,185 @@
+"""A robot whose motors follow set points: its vibrations in the postures of a motion, and what is left at its tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from ..common.arrays import Array, ComplexArray
+from ..common.structs import struct
+from ..map.pose_map import check_point, default_point
+from ..mbs.analysis.pcid import Pcid
+from ..mbs.fields.paths import Piecewise
+from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, free_coordinates
+from ..mbs.linear.linearisation import LinearEquations
+from ..mbs.model.gears import with_compliance
+from ..mbs.model.known_motion import State
+from ..mbs.model.model import without_paths
+from ..mbs.posture.start import relaxed_gears, undeformed_posture
+from ..mbs.quantities.settling import Settling, commanded_rest, settling
+from ..mbs.run.outcome import GearMotion
+from ..mbs.scene.space import SPACES
+from ..mbs.scene.trajectories import Trajectory
+from ..run.prepare import with_scene
+from ..run.solution import AnalysisResult
+from ..run.solve import prepare_scene, run_analyses
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
+from .servo import Servo
+
+RUN = "motion"
+TOLERANCE = 1e-7  # of the integration
+PER_PERIOD = 40  # outputs, of the lowest vibration
+LAST, LONGEST = 20.0, 2.0  # periods of the lowest vibration after the motion, and s at most
+ROUNDING = 1e-9  # of the number of outputs
+SLACK = 1e-9  # of the largest stiffness: less is none
+UNKNOWN = 5.0  # Hz, where nothing vibrates
+
+
+@struct
+class Modes:
+    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: m of them.
+
+    Attributes:
+        omega, ratio: (m,) rad/s, and damping ratios.
+        at_point: (m,) m, that the point moves by a unit of each.
+        driven: (m, n) what a unit of acceleration of each motor drives.
+    """
+
+    omega: Array
+    ratio: Array
+    at_point: Array
+    driven: Array
+
+    def left(self, times: Array, accelerations: Array, until: float) -> ComplexArray:
+        """(m, n) amplitudes (m) at the point when `until` (s), by `accelerations` (T, n) of each motor."""
+        poles = self.omega * (-self.ratio + 1j * np.sqrt(1.0 - self.ratio**2))
+        widths = (np.append(0.0, np.diff(times)) + np.append(np.diff(times), 0.0)) / 2
+        integral = (np.exp(np.outer(poles, until - times)) * widths) @ accelerations
+        return np.asarray((self.at_point / poles.imag)[:, None] * self.driven * integral)
+
+
+@struct
+class Ride:
+    """The robot under one stream of set points.
+
+    Attributes:
+        settling: of the point, by its distance from its final place since the last set point; its residual is that of
+            the first period of the lowest vibration once the controllers have settled. None without a place of rest.
+        times, off: (T,) s, and m between the point and its final place.
+        place: (T, d) m, of the point.
+        moments: the largest torque of each motor by joint, N·m.
+        q: (T, n_q) states.
+    """
+
+    settling: Settling | None
+    times: Array
+    off: Array
+    place: Array
+    moments: Mapping[str, float]
+    q: Array
+
+
+class Robot:
+    """A scene's robot; all of its joints with motors follow set points by `servo`, in the order of the scene."""
+
+    def __init__(self, scene: Scene, servo: Servo, point: str | None, tolerance: float, watcher: Watcher) -> None:
+        self.servo, self.tolerance, self._watcher = servo, tolerance, watcher
+        self.joints = tuple(joint.name for joint in scene.motor_joints)
+        update = {"trajectory": (), "analysis": (), "initial": scene.initial.model_copy(update={"state": "static"})}
+        self._scene = scene.model_copy(update=update)
+        self._prepared = prepare_scene(self._scene, watcher)
+        self.point = point or default_point(scene)
+        check_point(self._prepared, self.point)
+        self._gears = with_compliance(without_paths(self._prepared.model))
+        self._still, self._axes = np.zeros(self._gears.tree.n_v), SPACES[scene.space].translations
+        self._frequency: float | None = None
+
+    @property
+    def has_gears(self) -> bool:
+        """Whether a gear is compliant."""
+        return bool(self._gears.tree.gears)
+
+    def modes(self, q: Array) -> Modes:
+        """At the posture q (n_q,) of a run; of motions in which nothing vibrates none."""
+        mechanism = self._linear.at(0.0, q, self._still, self._still)
+        free = free_coordinates(mechanism, COMPLIANT if self.has_gears else LOCKED)
+        squares, vectors = np.linalg.eigh((free.K + free.K.T) / 2)
+        stiff = squares > SLACK * squares.max(initial=0.0)
+        omega, shape = np.sqrt(squares[stiff]), vectors[:, stiff]
+        held = [mechanism.outputs.get(f"motor/{joint}", mechanism.outputs[f"joint/{joint}"]) for joint in self.joints]
+        follow = np.linalg.pinv(np.array(held))
+        slack = shape @ ((shape.T @ free.N.T @ mechanism.K @ follow) / squares[stiff, None])
+        driven = -shape.T @ free.N.T @ mechanism.M @ (follow - free.N @ slack)
+        J = mechanism.points[self.point][: len(self._axes)] @ free.N @ shape
+        ratio = np.einsum("in,ij,jn->n", shape, free.D, shape) / (2 * omega)
+        return Modes(omega, ratio, np.linalg.norm(J, axis=0), driven)
+
+    def ride(self, times: Array, command: Array) -> Ride:
+        """Under set points (T, n) at `times` (T,), s, from rest; joints without a motor move as they can.
+
+        Raises `SolveError` where the motion cannot be followed.
+        """
+        path, last = self.servo.motors(times, command), float(times[-1])
+        period = 1 / self._lowest(path)
+        until = path.end + period
+        found = self._solved(path, "motor", until + min(LAST * period, LONGEST), period / PER_PERIOD)
+        motion, rest = found.motion, commanded_rest(found.run)
+        place = motion.point(self.point).position
+        moments = {joint: float(np.abs(of).max()) for joint, of in motion.motor_moments.items()}
+        if rest is None:
+            return Ride(None, motion.time, np.full(len(place), np.nan), place, moments, found.run.q)
+        rest = rest._replace(since=last)
+        (whole,) = settling(motion, rest, [self.point], self.tolerance, rest.frequency).values()
+        first = motion.time <= until
+        soon = replace(motion, **{name: getattr(motion, name)[first] for name in ("time", "q", "v", "a")})
+        (after,) = settling(soon, rest, [self.point], self.tolerance, rest.frequency).values()
+        final = replace(motion, model=rest.model, q=rest.q[None], v=0 * motion.v[:1]).point(self.point).position[0]
+        off = np.linalg.norm(place - final, axis=1)
+        return Ride(replace(whole, residual=after.residual), motion.time, off, place, moments, found.run.q)
+
+    def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
+        """Set points (T, n) at even `times` from 0 that make links follow `motion`, and the torques (T, n) of motors.
+
+        Gears are strained by what the motion needs: motors are ahead by K⁻¹τ, and the controllers are inverted.
+        """
+        found = self._solved(motion, "joint", float(times[-1]), float(times[1]))
+        own = np.array([motion.sample(times, order) for order in range(3)])
+        moments = np.zeros(own.shape[1:])
+        for k, joint in enumerate(self.joints):
+            gear: GearMotion | None = found.motion.gears.get(joint)
+            if gear is not None:
+                own[:, :, k] = gear.angle, gear.rate, gear.acceleration
+            moments[:, k] = found.motion.motor_moments[joint].reshape(len(times))
+        command = self.servo.command(own)
+        command[[0, -1]] = own[0, [0, -1]]  # at rest, whatever derivatives jump there
+        return command, moments
+
+    def _lowest(self, path: Piecewise) -> float:
+        """Hz, of the posture in which the robot starts."""
+        if self._frequency is None:
+            start = undeformed_posture(with_scene(self._prepared, self._following(path, "motor")).model)
+            more = np.zeros(self._gears.tree.n_q - len(start.q))
+            q = relaxed_gears(self._gears, State(np.append(start.q, more), self._still)).q
+            self._linear = LinearEquations(self._gears, q, {self.point: self.point})
+            omega = self.modes(q).omega
+            self._frequency = float(omega[0]) / (2 * np.pi) if len(omega) else UNKNOWN
+        return self._frequency
+
+    def _following(self, path: Piecewise, subject: Literal["motor", "joint"]) -> Scene:
+        functions = zip(self.joints, path.functions(), strict=True)
+        paths = tuple(Trajectory(name=joint, value=function, **{subject: joint}) for joint, function in functions)
+        return self._scene.model_copy(update={"trajectory": paths})
+
+    def _solved(
+        self, path: Piecewise, subject: Literal["motor", "joint"], end: float, output_step: float
+    ) -> AnalysisResult:
+        end = np.ceil(end / output_step * (1 - ROUNDING)) * output_step
+        analysis = Pcid(name=RUN, kind="pcid", end=end, output_step=output_step, tolerance=TOLERANCE)
+        scene = self._following(path, subject).model_copy(update={"analysis": (analysis,)})
+        found = run_analyses(with_scene(self._prepared, scene), self._watcher).analyses[RUN]
+        found.run.check_completed("")
+        return found

@@ -1,0 +1,203 @@
+"""What makes a robot vibrate: residual vibration by closed forms, synthetic faults of a stream, wrong input."""
+
+import json
+
+import numpy as np
+import pytest
+import tomli_w
+from scipy.integrate import trapezoid
+from tables_3d import DOWN, ORIGIN, Y, revolute, rigid, scene
+
+from ffrobot import InputError, smooth_motion
+from ffrobot.mbs.fields.paths import averaged_step, law_in
+from ffrobot.smooth.servo import Servo
+
+J, OMEGA, WAY, T, SERVO, RATIO = 5.0, 2 * np.pi * 7.3, 0.6, 0.5, 20.0, 0.8
+
+
+def written(tmp_path, tables):
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps({key: value for key, value in tables.items() if key != "analysis"}))
+    return path
+
+
+def table(path, times, **columns):
+    text = np.column_stack([times, *columns.values()])
+    np.savetxt(path, text, delimiter=",", header=",".join(["t", *columns]), comments="", fmt="%.12g")
+    return path
+
+
+def axis(tmp_path, stiffer=0.0):
+    """A body of J behind a gear whose vibration has OMEGA with the right stiffness."""
+    gear = {"stiffness": (1 + stiffer) * J * OMEGA**2, "gear_ratio": 100.0, "rotor_inertia": 1e-5}
+    body = rigid("b", 1.0, [J] * 3, ORIGIN, tip=[1.0, 0.0, 0.0])
+    return written(tmp_path, scene([body], [revolute("hub", "ground", "b.root", **gear)], gravity=ORIGIN))
+
+
+LAWS = {
+    "trapezoid": averaged_step(np.array([0.75, 0.25]) * T),
+    "s-curve": averaged_step(np.array([0.7, 0.2, 0.1]) * T),
+    "nonic": law_in(T, "rest-to-rest", 4),
+}
+
+
+@pytest.mark.parametrize(
+    ("law", "stiffer", "expected"),
+    [("trapezoid", 0.0, 4.85094), ("trapezoid", 0.1, 1.17276), ("trapezoid", -0.1, 10.56507),
+     ("s-curve", 0.0, 19.14325), ("s-curve", 0.1, 13.04147), ("nonic", -0.1, 2.683050)],
+)  # fmt: skip
+def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected):
+    """|∫ θ̈ e^(−iωt) dt|/ω, mrad, by an ideal controller, times |G(iω)|; by simulation and by the linear model."""
+    times = np.arange(501) * 0.001
+    path = table(tmp_path / "path.csv", times, hub=WAY * LAWS[law].sample(times)[:, 0])
+    found = smooth_motion(axis(tmp_path, stiffer), path, bandwidth=SERVO, damping_ratio=RATIO)
+    s, servo = 1j * OMEGA * np.sqrt(1 + stiffer), 2 * np.pi * SERVO
+    angle = 1e-3 * expected * abs(servo**2 / (s**2 + 2 * RATIO * servo * s + servo**2))
+    assert found.before.residual == pytest.approx(2 * np.sin(angle), rel=5e-4)
+    assert found.before.alone[0] == pytest.approx(2 * angle, rel=5e-4)
+    assert found.before.frequencies[-1, 0] == pytest.approx(abs(s) / (2 * np.pi), rel=1e-6)
+    assert found.verdict.startswith("vibration of the robot: b.tip swings")
+    assert "hub causes 100 %" in found.verdict
+
+
+def test_a_servo_follows_lines_exactly():
+    """Step by step the same as the convolution of the command with the controller's own response."""
+    servo, rng = Servo(2 * np.pi * np.array([20.0, 5.0]), RATIO), np.random.default_rng(0)
+    times = np.append(0.0, np.cumsum(rng.uniform(0.005, 0.05, 30)))
+    command = np.cumsum(rng.normal(0.0, 0.1, (31, 2)), axis=0)
+    fine = np.linspace(0.0, times[-1], 400_001)
+    for k, omega in enumerate(servo.omega):
+        damped = omega * np.sqrt(1 - RATIO**2)
+        response = omega**2 / damped * np.exp(-RATIO * omega * fine) * np.sin(damped * fine)
+        slope = np.interp(fine, times, command[:, k]) - command[0, k]
+        at = np.array([100_000, 250_000, 400_000])
+        expected = [trapezoid(slope[: m + 1] * response[m::-1], dx=fine[1]) for m in at]
+        found = servo.motors(times, command).sample(fine[at])[:, k] - command[0, k]
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+LENGTH, STEP = 0.5, 0.008
+TIMES = np.arange(126) * STEP
+
+
+def arm(tmp_path, **of_hip):
+    """Two links with compliant gears, about 8 and 25 Hz, and limits."""
+    bodies = [rigid(name, 2.0, [0.06] * 3, [LENGTH / 2, 0.0, 0.0], tip=[LENGTH, 0.0, 0.0]) for name in ("a", "b")]
+    gear = {"gear_ratio": 100.0, "rotor_inertia": 1e-5, "speed_limit": 3.0, "position_limit": [-3.0, 3.0]}
+    joints = [
+        revolute("hip", "ground", "a.root", Y, stiffness=6000.0, damping=3.0, **gear, **of_hip),
+        revolute("knee", "a.tip", "b.root", Y, stiffness=2000.0, damping=1.0, **gear),
+    ]
+    return written(tmp_path, scene(bodies, joints, gravity=DOWN))
+
+
+def motion(law, times=TIMES):
+    """Hip and knee on their way, s from 0 to 1."""
+    s = law.sample(times)[:, 0]
+    return {"hip": 0.6 * s, "knee": 0.4 - 0.9 * s}
+
+
+SMOOTH = law_in(0.9, "rest-to-rest", 4)
+
+
+def _stamps(change):
+    times, rows = TIMES.copy(), motion(SMOOTH)
+    change(times)
+    return times, rows
+
+
+def _rows(change):
+    rows = motion(SMOOTH)
+    rows["hip"] = rows["hip"] + change
+    return TIMES, rows
+
+
+def _jitter(times):
+    times[1:] += np.random.default_rng(2).normal(0.0, 0.0012, len(times) - 1)
+
+
+def _doubled(times):
+    times[[40, 60]] = times[[39, 59]]
+
+
+def _back(times):
+    times[50] = times[47] - 0.001
+
+
+def _gap():
+    kept = np.r_[0:55, 60:126]
+    return TIMES[kept], {name: rows[kept] for name, rows in motion(SMOOTH).items()}
+
+
+def _coarse():
+    return TIMES[::5], {name: rows[::5] for name, rows in motion(SMOOTH).items()}
+
+
+FAULTS = {
+    "none": (lambda: (TIMES, motion(SMOOTH)), set()),
+    "jitter": (lambda: _stamps(_jitter), {"jitter"}),
+    "doubled stamps": (lambda: _stamps(_doubled), {"doubled stamps"}),
+    "steps back": (lambda: _stamps(_back), {"steps back"}),
+    "gap": (_gap, {"gap"}),
+    "position": (lambda: _rows(np.where(TIMES > 0.3, 0.006, 0.0)), {"jump of position"}),
+    "speed": (lambda: (TIMES, motion(averaged_step(np.array([0.9])))), {"jump of speed"}),
+    "acceleration": (lambda: (TIMES, motion(averaged_step(np.array([0.6, 0.3])))), {"jump of acceleration"}),
+    "coarse": (_coarse, {"coarse sampling"}),
+    "limit": (lambda: (TIMES / 2, motion(SMOOTH)), {"limit"}),
+    "resonance": (lambda: _rows(4e-4 * np.sin(2 * np.pi * 8.0 * TIMES) * SMOOTH.sample(TIMES, 1)[:, 0]), {"resonance"}),
+    "noise": (lambda: _rows(np.random.default_rng(3).normal(0.0, 2e-4, len(TIMES))), {"noise"}),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_each_fault_has_its_diagnosis(tmp_path, name):
+    make, expected = FAULTS[name]
+    times, rows = make()
+    found = smooth_motion(arm(tmp_path), table(tmp_path / "path.csv", times, **rows))
+    assert {fault.kind for fault in found.before.faults} == expected
+    if name == "none":
+        assert found.verdict.startswith("not vibration of the robot")
+        assert found.verdict.endswith("the stream has no fault")
+
+
+def test_joints_go_by_name_in_any_order_and_file(tmp_path, ffrobot):
+    """A JointTrajectory in YAML with joints the other way round, in degrees, by the command: what the CSV is."""
+    rows = motion(averaged_step(np.array([0.6, 0.3])))
+    scene_file, expected = arm(tmp_path), None
+    points = [
+        {"positions": [float(np.degrees(rows[name][k])) for name in ("knee", "hip")],
+         "time_from_start": {"sec": 0, "nanosec": round(1e9 * TIMES[k])}}
+        for k in range(len(TIMES))
+    ]  # fmt: skip
+    message = {"joint_names": ["knee", "hip"], "points": points}
+    (tmp_path / "path.yaml").write_text(json.dumps(message))
+    expected = smooth_motion(scene_file, table(tmp_path / "path.csv", TIMES, **rows))
+    found = smooth_motion(scene_file, tmp_path / "path.yaml", degrees=True)
+    assert found.before.residual == pytest.approx(expected.before.residual, rel=1e-6)
+    printed = ffrobot.ok("smooth", scene_file, "--path", tmp_path / "path.yaml", "--degrees").stdout
+    assert "jump of acceleration: knee: acceleration jumps by" in printed
+    assert "vibration of the robot: b.tip swings by" in printed
+    assert (tmp_path / "scene.smooth.png").exists()
+
+
+TWO = "0,0,0\n0.1,0.1,0.1\n0.2,0.2,0.2\n0.3,0.3,0.3\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "expected"),
+    [
+        ("t,hip,ankle\n" + TWO, {}, 'found none of "knee" among "hip", "ankle"'),
+        ("t,value\n0,0\n0.1,1\n0.2,2\n0.3,3\n", {}, 'found none of "hip", "knee"'),
+        ("t,hip,knee\n0,0,0\n0.1,10,20\n0.2,20,40\n0.3,30,80\n", {}, "found \"hip\" from 0 to 30: --degrees"),
+        ("t,hip,knee\n0,1,1\n0.1,1,1\n0.2,1,1\n0.3,1,1\n", {}, "expected joints that move, found none"),
+        ("t,hip,knee\n0,0,0\n0,1,1\n0,2,1\n0.3,3,1\n", {}, "4 rows with times that increase, found 2"),
+        ("t,hip,knee\n" + TWO, {"bandwidth": {"hip": 20.0}}, 'expected one of all of "hip", "knee", found "knee"'),
+        ("t,hip,knee\n" + TWO, {"damping_ratio": 1.5}, "damping ratio between 0 and 1, found 20 Hz and 1.5"),
+        ("t,hip,knee\n" + TWO, {"point": "b.tool"}, 'expected one of'),
+    ],
+)  # fmt: skip
+def test_wrong_input(tmp_path, text, keys, expected):
+    (tmp_path / "path.csv").write_text(text)
+    with pytest.raises(InputError) as error:
+        smooth_motion(arm(tmp_path), tmp_path / "path.csv", **keys)
+    assert expected in str(error.value)
