@@ -32,7 +32,15 @@ from .options import POSITIVE, protect
 @click.option("--acceleration", metavar="LIMIT", type=POSITIVE, help="Limit of all joints (rad/s², m/s²).")
 @click.option("--jerk", metavar="LIMIT", type=POSITIVE, help="Limit of all joints (rad/s³, m/s³).")
 @click.option("--degrees", is_flag=True, help="Angles of the file are in degrees.")
-@click.option("-o", "--output", metavar="OUT.png", type=FILE, help="Picture [SCENE.smooth.png next to the input].")
+@click.option("--rate", metavar="HZ", type=POSITIVE, default=125.0, show_default=True, help="Rate of new set points.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.json|.csv|.rosbag2",
+    type=FILE,
+    help="New motion, and its picture OUT.png [SCENE.smooth.json next to the input].",
+)
+@click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
 def smooth(
     scene_file: Path,
@@ -43,14 +51,18 @@ def smooth(
     settled: float,
     acceleration: float | None,
     jerk: float | None,
+    rate: float,
     output: Path | None,
     *,
     degrees: bool,
+    force: bool,
 ) -> None:
-    """Find out why a robot vibrates that follows a recorded motion: the stream, or the robot.
+    """Find out why a robot vibrates on a recorded motion, and a motion on the same path that leaves less vibration.
 
     MOTION is a CSV table of joint positions with times, a JointTrajectory (JSON, YAML), or a bag of ROS. Compliant
     gears (`stiffness` of joints) and flexible links vibrate; motors follow set points through position controllers.
+    New motions are averaged, slower, shaped for natural frequencies, or inverted: motors lead by the strain of their
+    gears. Each is simulated; OUT is the one that settles first.
     """
     from ..pictures.studies.smooth import draw_smooth
     from ..present.console import Display, summary_console
@@ -63,11 +75,15 @@ def smooth(
         found = smooth_motion(
             scene_file, motion, bandwidth=_bandwidth(bandwidth), damping_ratio=damping_ratio, point=point,
             settled=settled, acceleration=acceleration or float("inf"), jerk=jerk or float("inf"),
-            degrees=degrees, watcher=display,
+            degrees=degrees, rate=rate, watcher=display,
         )  # fmt: skip
     console = summary_console()
     print_smooth(found, console)
-    picture = output or scene_file.with_suffix(".smooth.png")
+    target = output or scene_file.with_suffix(".smooth.json")
+    if found.candidates:
+        found.write(target, force=force)
+        console.print(f"written    {target}", soft_wrap=True)
+    picture = target.with_suffix(".png")
     draw_smooth(found, picture)
     console.print(f"figure     {picture}", soft_wrap=True)
 

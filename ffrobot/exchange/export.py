@@ -131,11 +131,11 @@ def export_file(
         check_not_an_input(output)
     made = make(path, analysis, side or "motor")
     target = output or path.with_suffix(f".{made.analysis}{suffix}" if made.analysis else suffix)
-    _write(target, made.content, force=force)
+    write_content(target, made.content, force=force)
     return Exported(target, made.what, made.remarks)
 
 
-def _write(target: Path, content: Content, *, force: bool) -> None:
+def write_content(target: Path, content: Content, *, force: bool) -> None:
     """Refuse what would cost another file; what is there already, as a command that was ended leaves it, may stay."""
     if isinstance(content, str | bytes):
         data = content.encode() if isinstance(content, str) else content
@@ -168,7 +168,7 @@ def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
         SolveError: the file cannot be written, or `rosbags` is not installed.
     """
     motion = read_motion(path)
-    _write(output, path_text(motion), force=force)
+    write_content(output, path_text(motion), force=force)
     whole = motion.times[-1] - motion.times[0]
     what = f"{len(motion.times)} points of {len(motion.columns)} joints over {whole:.6g} s"
     use = f'a [[trajectory]] with joint = "{shown(motion.columns[0])}" takes waypoints = "{output.name}"'

@@ -11,6 +11,7 @@ from ..smooth.diagnosis import Diagnosis
 from ..smooth.smoothing import Smoothed
 from .lines import print_table
 
+MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit")
 COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by it alone (mm)")
 
 
@@ -31,6 +32,9 @@ def print_smooth(found: Smoothed, console: Console) -> None:
         console.print(f"{name:<10} {text}", soft_wrap=True, markup=False)
     print_table(console, COLUMNS, _rows(before))
     console.print(f"verdict    {found.verdict}", soft_wrap=True, markup=False)
+    if found.candidates:
+        console.print()
+        print_table(console, MOTIONS, _motions(found))
 
 
 def settling_in_words(of: Diagnosis) -> str:
@@ -44,6 +48,22 @@ def settling_in_words(of: Diagnosis) -> str:
         f"within {limit:.3g} mm: {until} after the last set point; residual vibration {1e3 * of.residual:.3g} mm peak"
         " to peak"
     )
+
+
+def _motions(found: Smoothed) -> Iterator[tuple[str, ...]]:
+    """The record, and candidates from the best to the worst."""
+    before = found.before
+    last, settling = float(before.recording.times[-1]), before.ride.settling
+    assert settling is not None
+    yield "as it is", f"{last:.4g}", _time(last + settling.time_to), f"{1e3 * before.residual:.3g}", "0", ""
+    for one in found.candidates:
+        limit = f"{100 * one.excess:.3g} %" if one.excess else ""
+        numbers = (f"{1e3 * one.residual:.3g}", f"{one.off_path:.2g}", limit)
+        yield one.name, f"{one.times[-1]:.4g}", _time(one.settled), *numbers
+
+
+def _time(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else "no"
 
 
 def _rows(of: Diagnosis) -> Iterator[tuple[str, ...]]:

@@ -10,7 +10,7 @@ from ..common.arrays import Array, as_floats
 from ..common.structs import struct
 from ..mbs.fields.paths import Piecewise
 from .recording import Fault, Limits, Recording, evened, faults_of_motion, faults_of_stamps, peaks
-from .robot import Ride, Robot
+from .robot import Modes, Ride, Robot
 
 INSTANTS = 9  # postures along the motion whose frequencies are found
 KEPT = 3  # frequencies
@@ -83,8 +83,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     """Simulate the stream as it is, and look for faults of it. Raises `SolveError` as `Robot.ride`."""
     times, command = recording.dense(min(recording.step / 4, 1e-3))
     ride = robot.ride(times, command)
-    along = [ride.q[k] for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
-    path, modes = robot.servo.motors(times, command), [robot.modes(q) for q in along]
+    path, modes = robot.servo.motors(times, command), modes_along(robot, ride)
     kept = min(KEPT, *(len(one.omega) for one in modes))
     frequencies = np.array([one.omega[:kept] for one in modes]) / (2 * np.pi)
     fine = np.linspace(0.0, path.end, FINE)
@@ -101,6 +100,11 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
         as_floats(2 * np.abs(left.sum(axis=1))[:kept]), np.vstack([grid, spectrum.T]),
         peaks(*recording.dense(recording.step / 4)),
     )  # fmt: skip
+
+
+def modes_along(robot: Robot, ride: Ride) -> list[Modes]:
+    """Of postures along the motion, the last of them its end."""
+    return [robot.modes(ride.q[k]) for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
 
 
 def _spectrum(path: Piecewise, frequencies: Array) -> Array:

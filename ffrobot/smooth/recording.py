@@ -88,7 +88,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     good = record.times > ahead
     times, values = record.times[good], values[good]
     if len(times) < 4:
-        raise InputError(f"{path}: expected at least 4 rows with times that increase, found {len(times)}")
+        raise InputError(f"{path}: expected at least 4 set points with times that increase, found {len(times)}")
     if np.ptp(values, axis=0).max() <= STILL:
         raise InputError(f"{path}: expected joints that move, found none")
     rates = None if record.rates is None else record.rates[good][:, columns] / (TURN if is_in_degrees else 1.0)
@@ -115,9 +115,10 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     paths = tuple(path.changed(joint=path.motor, motor=None) if path.motor else path for path in scene.trajectory)
     outputs = int(np.ceil(timed[0].end / step - STILL))
     analysis = Pcid(name="plan", kind="pcid", end=outputs * step, output_step=step)
-    found = solve_scene(scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)}), watcher)
-    motion, joints = found.analyses["plan"].motion, tuple(joint.name for joint in scene.motor_joints)
-    values = np.column_stack([np.reshape((motion.joint(joint) or ())[0], len(motion.time)) for joint in joints])
+    solution = solve_scene(scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)}), watcher)
+    motion, joints = solution.analyses["plan"].motion, tuple(joint.name for joint in scene.motor_joints)
+    found = [motion.joint(joint) for joint in joints]
+    values = np.column_stack([coordinate for coordinate, _ in filter(None, found)])
     return without_rest(Recording(joints, motion.time, values, motion.time))
 
 
@@ -129,8 +130,9 @@ def _columns(path: Path, record: Record, names: Sequence[str]) -> list[int]:
         raise InputError(f"{path}: {error}") from None
     columns = [k for k in found.values() if k is not None]
     missing = [name for name, k in found.items() if k is None]
-    if missing or len(set(columns)) < len(columns):
-        missing = missing or names
+    if not missing and len(set(columns)) < len(columns):  # one column is no joint's
+        missing = list(names)
+    if missing:
         raise InputError(
             f"{path}: expected a column of every joint with a motor (constant where it rests), found none of"
             f" {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}"

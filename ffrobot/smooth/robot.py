@@ -87,7 +87,7 @@ class Robot:
     """A scene's robot; all of its joints with motors follow set points by `servo`, in the order of the scene."""
 
     def __init__(self, scene: Scene, servo: Servo, point: str | None, tolerance: float, watcher: Watcher) -> None:
-        self.servo, self.tolerance, self._watcher = servo, tolerance, watcher
+        self.file, self.servo, self.tolerance, self._watcher = scene.path, servo, tolerance, watcher
         self.joints = tuple(joint.name for joint in scene.motor_joints)
         update = {"trajectory": (), "analysis": (), "initial": scene.initial.model_copy(update={"state": "static"})}
         self._scene = scene.model_copy(update=update)
@@ -170,8 +170,11 @@ class Robot:
         return self._frequency
 
     def _following(self, path: Piecewise, subject: Literal["motor", "joint"]) -> Scene:
-        functions = zip(self.joints, path.functions(), strict=True)
-        paths = tuple(Trajectory(name=joint, value=function, **{subject: joint}) for joint, function in functions)
+        paths = tuple(
+            Trajectory(name=name, value=function, motor=name) if subject == "motor" else
+            Trajectory(name=name, value=function, joint=name)
+            for name, function in zip(self.joints, path.functions(), strict=True)
+        )  # fmt: skip
         return self._scene.model_copy(update={"trajectory": paths})
 
     def _solved(

@@ -2,36 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError, did_you_mean, quoted
+from ..common.errors import InputError, SolveError, did_you_mean, either, quoted
 from ..common.files import AnyPath
 from ..common.structs import struct
+from ..exchange.export import Content, write_content
+from ..exchange.motion.robot_motion import (
+    JointMotion,
+    JointMotions,
+    csv_text,
+    joint_trajectory_bag,
+    joint_trajectory_text,
+)
 from ..run.watcher import Watcher
 from ..scene.load import load_robot
 from ..scene.scene import Scene
+from .candidates import Candidate, candidates
 from .diagnosis import Diagnosis, diagnose
 from .recording import limits_of, planned, read_recording
 from .robot import Robot
 from .servo import Servo
 
-STEP = 0.008  # s, of set points of a trajectory of the scene
-
 
 @struct
 class Smoothed:
-    """What `smooth_motion` found: the `robot` that was simulated, and the motion as it is, `before`."""
+    """What `smooth_motion` found.
+
+    Attributes:
+        robot: what was simulated.
+        before: the motion as it is.
+        candidates: motions along the same path, simulated, the best first; none of robots in which nothing vibrates.
+    """
 
     robot: Robot
     before: Diagnosis
+    candidates: tuple[Candidate, ...]
 
     @property
     def verdict(self) -> str:
         """In words what makes the robot vibrate."""
         return self.before.verdict(self.robot)
+
+    @property
+    def best(self) -> Candidate:
+        """The motion that settles first. Raises `SolveError` where there is none."""
+        if not self.candidates:
+            raise SolveError(f"expected a robot that vibrates, found that {self.verdict}")
+        return self.candidates[0]
+
+    def write(self, output: AnyPath, *, force: bool = False) -> None:
+        """Write the best motion as a JointTrajectory (`.json`), a table (`.csv`) or a bag of ROS 2 (`.rosbag2`).
+
+        Raises:
+            InputError: another ending, or a file would be replaced without `force`.
+            SolveError: nothing vibrates, or `rosbags` is not installed.
+        """
+        path, best = Path(output), self.best
+        motion = JointMotions("smooth", best.times, tuple(self._joints(best)), ())
+        makers: dict[str, Callable[[JointMotions], Content]] = {
+            ".json": lambda motion: joint_trajectory_text(motion)[0],
+            ".csv": csv_text,
+            ".rosbag2": lambda motion: joint_trajectory_bag(motion)[0],
+        }
+        if path.suffix not in makers:
+            raise InputError(f'{path}: expected a name that ends in {either(makers)}, found "{path.name}"')
+        write_content(path, makers[path.suffix](motion), force=force)
+
+    def _joints(self, best: Candidate) -> Iterator[JointMotion]:
+        rates = np.gradient(best.command, best.times, axis=0)
+        for k, name in enumerate(self.robot.joints):
+            moment = None if best.moments is None else best.moments[:, k]
+            yield JointMotion(name, best.command[:, k], rates[:, k], moment)
 
 
 def smooth_motion(
@@ -45,9 +90,10 @@ def smooth_motion(
     acceleration: float = np.inf,
     jerk: float = np.inf,
     degrees: bool = False,
+    rate: float = 125.0,
     watcher: Watcher | None = None,
 ) -> Smoothed:
-    """Find out why a robot vibrates that follows a recorded or planned motion: `ffrobot smooth`.
+    """Find out why a robot vibrates on a recorded or planned motion, and one that leaves less: `ffrobot smooth`.
 
     Args:
         scene: a scene file; its analyses are not needed.
@@ -59,10 +105,12 @@ def smooth_motion(
         acceleration: limit of all joints, rad/s² or m/s².
         jerk: limit of all joints, rad/s³ or m/s³.
         degrees: whether angles in the file are in degrees.
+        rate: of set points of the new motion, Hz.
         watcher: an object that observes progress and can stop the run.
 
     Returns:
-        The diagnosis: `verdict` in words, `before.faults`, `before.residual` (m, peak to peak), ….
+        The diagnosis: `verdict` in words, `before.faults`, `before.residual` (m, peak to peak), …; and motions along
+        the same path: `best.times` (T,) s, `best.command` (T, n) in the order of `robot.joints`, `best.residual`, ….
 
     Raises:
         InputError: the file has other joints, or is no motion.
@@ -71,17 +119,23 @@ def smooth_motion(
     Example:
         found = ffrobot.smooth_motion("scene.toml", "recorded.csv", bandwidth=15.0)
         print(found.verdict)
+        found.write("smooth.json")
     """
     loaded, watcher = load_robot(Path(scene)), watcher or Watcher()
     if not loaded.motor_joints:
         raise InputError(f"{loaded.path}: expected joints with motors, found none")
+    if not 10.0 <= rate <= 10_000.0:
+        raise InputError(f"rate: expected 10 to 10000 Hz, found {rate:g}")
     servo = _servo(loaded, bandwidth, damping_ratio)
     watcher.stage("motion")
-    read = planned(loaded, STEP, watcher) if path is None else read_recording(
+    read = planned(loaded, 1 / rate, watcher) if path is None else read_recording(
         Path(path), loaded, is_in_degrees=degrees
     )  # fmt: skip
     robot = Robot(loaded, servo, point, settled, watcher)
-    return Smoothed(robot, diagnose(robot, read, limits_of(loaded, acceleration, jerk)))
+    limits = limits_of(loaded, acceleration, jerk)
+    before = diagnose(robot, read, limits)
+    has_rest = before.frequencies.size and before.ride.settling is not None
+    return Smoothed(robot, before, tuple(candidates(robot, before, limits, 1 / rate)) if has_rest else ())
 
 
 def _servo(scene: Scene, bandwidth: float | Mapping[str, float], ratio: float) -> Servo:

@@ -190,7 +190,7 @@ TWO = "0,0,0\n0.1,0.1,0.1\n0.2,0.2,0.2\n0.3,0.3,0.3\n"
         ("t,value\n0,0\n0.1,1\n0.2,2\n0.3,3\n", {}, 'found none of "hip", "knee"'),
         ("t,hip,knee\n0,0,0\n0.1,10,20\n0.2,20,40\n0.3,30,80\n", {}, "found \"hip\" from 0 to 30: --degrees"),
         ("t,hip,knee\n0,1,1\n0.1,1,1\n0.2,1,1\n0.3,1,1\n", {}, "expected joints that move, found none"),
-        ("t,hip,knee\n0,0,0\n0,1,1\n0,2,1\n0.3,3,1\n", {}, "4 rows with times that increase, found 2"),
+        ("t,hip,knee\n0,0,0\n0,1,1\n0,2,1\n0.3,3,1\n", {}, "4 set points with times that increase, found 2"),
         ("t,hip,knee\n" + TWO, {"bandwidth": {"hip": 20.0}}, 'expected one of all of "hip", "knee", found "knee"'),
         ("t,hip,knee\n" + TWO, {"damping_ratio": 1.5}, "damping ratio between 0 and 1, found 20 Hz and 1.5"),
         ("t,hip,knee\n" + TWO, {"point": "b.tool"}, 'expected one of'),

@@ -1,4 +1,4 @@
-"""A picture of a diagnosis: the commanded acceleration, its spectrum at the robot's frequencies, and the vibration."""
+"""A picture: acceleration of set points, its spectrum at the robot's frequencies, the vibration before and after."""
 
 from __future__ import annotations
 
@@ -62,8 +62,11 @@ def _spectrum(axes: Axes, of: Diagnosis) -> None:
 
 def _distance(axes: Axes, found: Smoothed) -> None:
     before, tolerance = found.before, found.robot.tolerance
-    axes.plot(before.ride.times, 1e3 * np.maximum(before.ride.off, LEAST * tolerance), label="as it is")
-    axes.axvline(before.recording.times[-1], color="0.6", linewidth=0.8)
+    rides = [("as it is", before.recording.times[-1], before.ride)]
+    rides += [(one.name, one.times[-1], one.ride) for one in found.candidates[:1]]
+    for name, last, ride in rides:
+        (line,) = axes.plot(ride.times, 1e3 * np.maximum(ride.off, LEAST * tolerance), label=name)
+        axes.axvline(last, color=line.get_color(), linewidth=0.8, linestyle=":")
     axes.axhline(1e3 * tolerance, color="0.6", linewidth=0.8, linestyle="--", label="tolerance")
     axes.set_yscale("log")
     axes.set_title(f"distance of {found.robot.point} from its final place (mm)")

@@ -1,0 +1,198 @@
+"""Motions along a recorded path that leave less vibration: averaged, slower, shaped, or inverted; the best is kept.
+
+Averaging over a time with the weights of a smooth bell (a law from rest to rest, differentiated) makes any stream as
+smooth as the law, and takes this time longer; all joints are averaged alike. Shapers are those of trajectories.
+Inversion leads motors by what strains their gears, K⁻¹τ, through the inverse of their controllers. Durations are found
+with the linear models of postures along the path; what they find is simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import TypeVar
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.structs import struct
+from ..mbs.fields.paths import Kind, impulses, polynomial_law
+from ..mbs.fields.waypoints import interpolated
+from .diagnosis import Diagnosis, modes_along
+from .recording import Limits, evened, peaks
+from .robot import Modes, Ride, Robot
+
+SMOOTHNESS = 5  # of the law that averages: inversion differentiates four times
+LEAST = 8  # set points over which are averaged at least
+LONGER = 1.2  # of one duration to the next one that is tried
+MOST = 24  # durations
+TRIALS = 5  # durations of inverted motions
+SHARE = 0.5  # of the tolerance that the linear models may leave
+WRONG = 0.1  # of the stiffness of gears, by which it may be off: so much of the vibration without inversion is left
+SHAPERS: tuple[Kind, ...] = ("zv", "zvd", "ei")
+FINE = 2000  # instants of motors' accelerations
+
+T = TypeVar("T")
+
+
+@struct
+class Candidate:
+    """A stream of set points (T, n) every so many s, and the robot under it.
+
+    Attributes:
+        name: how it was made.
+        times, command: (T,) s, (T, n).
+        moments: (T, n) torques of motors for feed-forward, of inverted motions; None of others.
+        ride: the robot under it.
+        off_path: rad or m, of the joints together from the path of the record.
+        excess: largest of speed, acceleration and jerk by their limits; 0 without limits.
+    """
+
+    name: str
+    times: Array
+    command: Array
+    moments: Array | None
+    ride: Ride
+    off_path: float
+    excess: float
+
+    @property
+    def settled(self) -> float:
+        """When (s) the point stays within the tolerance of its final place; infinite where it does not."""
+        of = self.ride.settling
+        return np.inf if of is None or np.isnan(of.time_to) else float(self.times[-1]) + of.time_to
+
+    @property
+    def residual(self) -> float:
+        """Residual vibration of the point, m, peak to peak."""
+        return np.inf if self.ride.settling is None else self.ride.settling.residual
+
+
+def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float) -> list[Candidate]:
+    """One of each kind, set points every `step` s, simulated; the best first.
+
+    That is the one which settles first of those that keep the limits; where none settles, that which vibrates least.
+    """
+    search = _Search(robot, before, limits, step)
+    found = [search.simulated(name, values, smooth, moments) for name, values, smooth, moments in search.motions()]
+    return sorted(found, key=lambda one: (one.excess > 1.0, one.settled, one.residual))
+
+
+Motion = tuple[str, Array, Array, Array | None]
+"""Name, set points (T, n), the smooth motion (T, n) behind them, and torques of motors (T, n) where they are known."""
+
+
+class _Search:
+    def __init__(self, robot: Robot, before: Diagnosis, limits: Limits, step: float) -> None:
+        self.robot, self.limits, self.step, self.tolerance = robot, limits, step, robot.tolerance
+        self.path, self.modes = evened(before.recording), modes_along(robot, before.ride)
+        self.periods = [1 / f for f in before.frequencies.mean(axis=0)]
+
+    def motions(self) -> Iterator[Motion]:
+        """The shortest of each kind that the linear models find good enough."""
+        fast = self._along(max(1.0, self._excess(self._along(1.0), only_speed=True)))
+        durations = self.step * LEAST * LONGER ** np.arange(MOST)
+        averaged = [(float(span), self._averaged(fast, span)) for span in durations]
+        kept = [(span, values) for span, values in averaged if self._excess(values) <= 1.0] or averaged[-1:]
+        shortest = kept[0][1]
+        span, values = self._first(kept)
+        yield f"averaged over {1e3 * span:.3g} ms", values, values, None
+        factors = LONGER ** (np.arange(MOST) / 2)
+        factor, values = self._first([(float(c), self._averaged(self._along(c), kept[0][0])) for c in factors])
+        yield f"slower by {100 * (factor - 1):.3g} %", values, values, None
+        if self.periods:
+            name, values = self._first(sorted(self._shaped(shortest), key=lambda one: len(one[1])))
+            yield f"shaped by {name}", values, values, None
+        if self.robot.has_gears:
+            yield self._inverted(kept)
+
+    def _inverted(self, averaged: Sequence[tuple[float, Array]]) -> Motion:
+        """Of the shortest that would leave little with a wrong stiffness; of a longer one while limits are exceeded."""
+        least, _ = self._first(averaged, 1 / WRONG)
+        longer = [motion for motion in averaged if motion[0] >= least]
+        tried = [self._inverse(*longer[0])]
+        while self._excess(tried[-1][1]) > 1.0 and len(tried) < min(TRIALS, len(longer)):
+            tried.append(self._inverse(*longer[len(tried)]))
+        return tried[-1]
+
+    def _inverse(self, span: float, values: Array) -> Motion:
+        """Links sag at its ends as they do under its own set points, with which it begins and ends."""
+        smooth = np.vstack([values, values[-1:]])
+        times = as_floats(self.step * np.arange(len(smooth)))
+        blend = polynomial_law(SMOOTHNESS).sample(times / times[-1])
+        command, _ = self.robot.inverted(times, interpolated(times, smooth))
+        sag = smooth - command
+        command, moments = self.robot.inverted(times, interpolated(times, smooth + sag[0] + blend * (sag[-1] - sag[0])))
+        off = smooth - command  # of second order
+        command = command + off[0] + blend * (off[-1] - off[0])
+        return f"inverted, averaged over {1e3 * span:.3g} ms", command, smooth, moments
+
+    def simulated(self, name: str, values: Array, smooth: Array, moments: Array | None) -> Candidate:
+        """The robot under the set points."""
+        from scipy.spatial import cKDTree
+
+        times = self.step * np.arange(len(values))
+        fine = np.linspace(0.0, self.path.times[-1], 4 * len(self.path.times))
+        path = np.column_stack([np.interp(fine, *self._known(k)) for k in range(smooth.shape[1])])
+        off = float(cKDTree(path).query(smooth)[0].max())
+        return Candidate(name, times, values, moments, self.robot.ride(times, values), off, self._excess(values))
+
+    def _known(self, k: int) -> tuple[Array, Array]:
+        times, values = self.path.dense(self.step / 2)
+        return times, values[:, k]
+
+    def _along(self, factor: float) -> Array:
+        """Set points of the record, in `factor` times the time."""
+        count = int(np.ceil(factor * self.path.times[-1] / self.step - 1e-9)) + 1
+        at = np.minimum(self.step * np.arange(count) / factor, self.path.times[-1])
+        return np.column_stack([np.interp(at, *self._known(k)) for k in range(self.path.values.shape[1])])
+
+    def _averaged(self, values: Array, duration: float) -> Array:
+        n = int(np.ceil(duration / self.step - 1e-9))
+        weights = np.diff(polynomial_law(SMOOTHNESS).sample(np.arange(n + 1) / n)[:, 0])
+        padded = np.vstack([np.repeat(values[:1], n, axis=0), values, np.repeat(values[-1:], n, axis=0)])
+        return np.column_stack([np.convolve(column, weights, mode="valid") for column in padded.T])
+
+    def _shaped(self, values: Array) -> Iterator[tuple[str, Array]]:
+        """By each kind of shaper, of the lowest frequency, and of the two lowest."""
+        ratio = float(np.mean([one.ratio[0] for one in self.modes]))
+        for kind, count in product(SHAPERS, range(1, min(2, len(self.periods)) + 1)):
+            shaped = values
+            for period in self.periods[:count]:
+                sequence = impulses(kind, 1 / period, min(ratio, 0.9))
+                last = int(np.ceil(sequence[-1].delay / self.step))
+                at = np.arange(len(shaped) + last, dtype=float)
+                shaped = sum(
+                    (one.share * self._delayed(shaped, at - one.delay / self.step) for one in sequence),
+                    np.zeros((len(at), values.shape[1])),
+                )
+            yield f"{kind} for {', '.join(f'{1 / period:.3g} Hz' for period in self.periods[:count])}", shaped
+
+    @staticmethod
+    def _delayed(values: Array, at: Array) -> Array:
+        rows = np.arange(len(values))
+        return np.column_stack([np.interp(at, rows, column) for column in values.T])
+
+    def _first(self, motions: Sequence[tuple[T, Array]], times: float = 1.0) -> tuple[T, Array]:
+        """The first that the linear models find good enough, `times` the tolerance; else the best of all."""
+        found = list[float]()
+        for motion in motions:
+            found.append(self._left(motion[1]))
+            if found[-1] <= times * SHARE * self.tolerance:
+                return motion
+        return motions[int(np.argmin(found))]
+
+    def _left(self, values: Array) -> float:
+        """Residual vibration (m, peak to peak) by the linear models of all postures, the worst of them."""
+        path = self.robot.servo.motors(self.step * np.arange(len(values)), values)
+        fine = np.linspace(0.0, path.end, FINE)
+        accelerations = path.sample(fine, 2)
+        return max((_residual(one, fine, accelerations, path.end) for one in self.modes), default=0.0)
+
+    def _excess(self, values: Array, *, only_speed: bool = False) -> float:
+        found = peaks(self.step * np.arange(len(values)), values) / self.limits.by_order
+        return float(found[:1].max() if only_speed else found.max())
+
+
+def _residual(modes: Modes, times: Array, accelerations: Array, until: float) -> float:
+    return float(2 * np.abs(modes.left(times, accelerations, until).sum(axis=1)).sum())
