@@ -117,14 +117,18 @@ class Fcid(TimedAnalysis):
         return replace(run, statistics=statistics).with_look(at)
 
 
-def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMotion, q: Array) -> Shape:
-    """P(t) of all bodies; expressions are those of whole links."""
+def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMotion, posture: Array) -> Shape:
+    """p(t) of all bodies with its derivatives, from `posture` (n_q,) at the start; expressions are of whole links."""
     path, whole = context.model.scene.path, context.whole
     bodies = [node.body for node in context.model.tree.nodes]
     if analysis.shape == "given" and whole is not None:
         links = [node.body for node in whole.model.tree.nodes]
         return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
-    return prescribed_shape(model, bodies, analysis, motion, q)
+    if analysis.shape == "given":
+        return given_shape(path, bodies, analysis)
+    if analysis.shape == "static":
+        return _static(model, bodies, analysis, motion, posture)
+    return [[ZERO] * body.n_modes for body in bodies]
 
 
 def shape_nodes(analysis: Fcid) -> Array:
@@ -173,18 +177,6 @@ def given_shape_of_pieces(
         of_pieces = iter(spline(nodes, p @ link.spread.T))
         shape |= {piece: [next(of_pieces) for _ in range(counts[piece])] for piece in link.bodies}
     return [shape[body.name] for body in bodies]
-
-
-def prescribed_shape(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
-    """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start.
-
-    Raises `SolveError` where no posture, or no static shape, is found.
-    """
-    if analysis.shape == "given":
-        return given_shape(model.scene.path, bodies, analysis)
-    if analysis.shape == "static":
-        return _static(model, bodies, analysis, motion, posture)
-    return [[ZERO] * body.n_modes for body in bodies]
 
 
 def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:

@@ -154,7 +154,7 @@ class Servo:
     @cached_property
     def of_modes(self) -> Indices:
         """Places (n,) of all modes along v."""
-        return np.concatenate([np.arange(node.p_v.start, node.p_v.stop) for node in self.model.tree.nodes])
+        return np.flatnonzero(~self.model.tree.joint_columns)
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""

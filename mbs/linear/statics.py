@@ -230,11 +230,7 @@ class Statics:
         """What is left at a posture that is none in equilibrium, `worst` along v."""
         if at.missed.size and np.abs(at.missed).max() > MISSED:
             return f'"{self.model.rows[int(np.abs(at.missed).argmax())].owner}" cannot be met with links that bend so'
-        node = next(
-            node
-            for node in self.model.tree.nodes
-            if worst in (*range(node.v.start, node.v.stop), *range(node.p_v.start, node.p_v.stop))
-        )
+        node = next(node for node in self.model.tree.nodes if node.v.start <= worst < node.p_v.stop)
         what = f'joint "{node.joint.name}"' if worst < node.p_v.start else f'"{node.body.name}"'
         return f"after {MOST_ITERATIONS} steps of Newton's method {abs(at.left[worst]):.3g} N·m are left at {what}"
 

@@ -121,16 +121,11 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
     """Generalized forces (T, n_v) by which friction in all joints resists."""
-    return tree_resistance(model.tree, v) + model.along_cut.resistance(q, v)
-
-
-def tree_resistance(tree: KinematicTree, v: Array) -> Array:
-    """The same of the joints that have coordinates, along these."""
-    return _of_frictions(tree, v, Friction.resistance)
+    return _of_frictions(model.tree, v, Friction.resistance) + model.along_cut.resistance(q, v)
 
 
 def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
-    """Its derivative (T, n_v) by v, coordinate by coordinate."""
+    """Its derivative (T, n_v) by v, coordinate by coordinate, of joints in the tree."""
     return _of_frictions(tree, v, Friction.slope)
 
 

@@ -96,7 +96,10 @@ class Markers:
     def standing(self) -> list[_core.SpatialMarker]:
         """The ground's markers."""
         turning = [number for number, _ in self.turning]
-        return [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
+        markers = [_marker(section, np.zeros((6, 0)), section.position, []) for section in self._ground]
+        for number, marker in enumerate(markers):
+            marker.turns = number in turning
+        return markers
 
     def _turning_marker(self, law: OrientationLaw) -> int:
         """Number of the ground's marker that turns as `law` says; made where it is new."""
@@ -120,13 +123,6 @@ def carried_body(node: Node, inner: Placed, outer: Placed, markers: list[Section
     body.rotor_inertia, body.gear_ratio = _rotor(node)
     body.data = _data(node.body, markers)
     return body
-
-
-def standing_marker(section: Section, turns: bool) -> _core.SpatialMarker:
-    """A marker of the ground; `turns`: its orientation follows a law."""
-    marker = _marker(section, np.zeros((6, 0)), section.position, [])
-    marker.turns = turns
-    return marker
 
 
 def moves(node: Node) -> bool:

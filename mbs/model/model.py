@@ -289,7 +289,12 @@ ALONG = 1e-12  # of the largest rotation of modes: what is left of them across a
 def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
     """The tree with such coordinates of all joints that have them."""
     changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
-    changed.on_frames = frozenset(joint.name for joint in joints if _has_angle_of_frames(tree, joint))
+    changed.on_frames = frozenset(
+        joint.name
+        for joint in joints
+        if joint.type == "revolute"
+        and all(_turns_about_z(tree, tree.section(*side)) for side in zip(joint.between, joint.triads(), strict=True))
+    )
     changed.nodes = tuple(
         replace(node, inner=node.inner._replace(still=True), outer=node.outer._replace(still=True))
         if node.joint.name in changed.on_frames
@@ -297,11 +302,6 @@ def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
         for node in tree.nodes
     )
     return changed
-
-
-def _has_angle_of_frames(tree: KinematicTree, joint: JointRecord) -> bool:
-    sides = zip(joint.between, joint.triads(), strict=True)
-    return joint.type == "revolute" and all(_turns_about_z(tree, tree.section(side, triad)) for side, triad in sides)
 
 
 def _turns_about_z(tree: KinematicTree, section: Section) -> bool:

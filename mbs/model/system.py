@@ -16,7 +16,7 @@ from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .kinematics import ZERO, CutPlace, Markers, ModelParts, Placed, rows_of
 from .model import Model
-from .nodes import ConstraintRow, Section
+from .nodes import Section
 from .plane import Plane, in_plane
 from .projection import EXACT
 
@@ -66,7 +66,8 @@ class MultibodySystem:
         replayed = drives.replayed.at_points if drives.replayed else {}
         self._numbers_at = [(self._wrench(tree.section(at)), of) for at, of in replayed.items()]
         self._cut = [one for one in model.cut if one.is_loaded]
-        cut = tuple(self._cut_place(one.row) for one in self._cut)
+        measures = (one.row for one in self._cut)
+        cut = tuple(CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f) for row in measures)
         self._check()
         moments = [drive for load in model.scene.load if load.joint in tree.carried for drive in self._drives(load)]
         self._along = [*moments, *model.modal_loads, *drives.along]
@@ -233,9 +234,6 @@ class MultibodySystem:
         assert load.joint is not None
         for direction, moment in zip(self.model.along(load.joint), load.moments, strict=True):
             yield Drive(direction, moment)
-
-    def _cut_place(self, row: ConstraintRow) -> CutPlace:
-        return CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f)
 
     def _wrench(self, section: Section) -> int:
         """Number of a wrench on a section, made for it."""

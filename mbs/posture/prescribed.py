@@ -74,7 +74,7 @@ def left_slopes(
     M, D, K = (x.reshape(len(times), -1, n) for x in motion.derivatives(at, *modes, near))
     turning = turning_motors(model)
     if turning and M.shape[1] > n:
-        of_modes = np.concatenate([np.arange(node.p_v.start, node.p_v.stop) for node in model.tree.nodes])
+        of_modes = ~model.tree.joint_columns
         rows = n + np.cumsum([0, *(len(columns) for columns in model.motors.values())])
         row_of = dict(zip(model.motors, rows.tolist(), strict=False))
         states = motion.motion(at, *modes, near)
