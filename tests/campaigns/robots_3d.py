@@ -13,11 +13,16 @@ UP = np.array([0.0, 0.0, 1.0])
 ALONG = np.array([1.0, 0.0, 0.0])  # links, in their axes
 
 
-def random_scene_in_3d(seed, number, runs, most_steps):
-    """Kind and scene of that number, analysed once for each of `runs` (name, tolerance, integrator)."""
+def random_keys(seed, number):
+    """Kind of that number, what is drawn of the robot, and its keys without analyses."""
     kind = list(KINDS)[number % len(KINDS)]
     robot = Robot(np.random.default_rng([seed, number]))
-    keys = KINDS[kind](robot)
+    return kind, robot, KINDS[kind](robot)
+
+
+def random_scene_in_3d(seed, number, runs, most_steps):
+    """Kind and scene of that number, analysed once for each of `runs` (name, tolerance, integrator)."""
+    kind, robot, keys = random_keys(seed, number)
     one = {"kind": "pcid" if "trajectory" in keys else "forward", "end": robot.end, "output_step": robot.end / 300}
     one["max_steps"] = most_steps
     analyses = [one | {"name": name, "tolerance": tolerance, "integrator": by} for name, tolerance, by in runs]

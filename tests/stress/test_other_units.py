@@ -3,7 +3,6 @@
 import math
 import random
 import re
-from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -12,27 +11,10 @@ import tomli_w
 from beam_links import beam_link
 from links import quintic
 from mechanisms import relative
+from rewritten_scenes import SI, SYSTEMS
 
 import ffrobot
 
-
-class Units(NamedTuple):
-    """What one SI unit is in these: 1 m = `length` of them, and so on."""
-
-    length: float = 1.0
-    mass: float = 1.0
-    time: float = 1.0
-
-
-SI = Units()
-SYSTEMS = {
-    "SI": SI,
-    "mm, t, s": Units(1e3, 1e-3),
-    "µm, mg, ms": Units(1e6, 1e6, 1e3),
-    "km, kt, h": Units(1e-3, 1e-6, 1 / 3600),
-    "cm, g, µs": Units(1e2, 1e3, 1e6),
-    "a robot of a size of 1e-5": Units(1e-5, 1e-15),  # scenes have inertias above 1e-30
-}
 OTHERS = ["mm, t, s", "km, kt, h", "a robot of a size of 1e-5"]
 
 

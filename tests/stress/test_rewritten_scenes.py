@@ -1,0 +1,16 @@
+"""Random robots in 3D have the same results however they are written: some of the campaign `rewritten`."""
+
+import numpy as np
+import pytest
+from rewritten_scenes import TOLERANCE, differences, random_robot, solved, written_otherwise
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+@pytest.mark.parametrize(("seed", "number"), [(57, 2), (1, 3), pytest.param(1, 0, marks=pytest.mark.nightly)])
+def test_results_do_not_depend_on_how_a_robot_is_written(seed, number, tmp_path):
+    kind, tables = random_robot(seed, number)
+    original = solved(tables, tmp_path)
+    assert len(original) > 100
+    for way, other in written_otherwise(tables, np.random.default_rng([seed, number])).items():
+        off = differences(tables, original, other, solved(other.tables, tmp_path))
+        assert {name: size for name, size in off.items() if size > TOLERANCE} == {}, (kind, way)
