@@ -27,6 +27,8 @@ from ..posture.posture import joint_scales, robot_size, row_sizes, with_rates
 from ..posture.start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
+FEW_ITERATIONS = 12  # from a posture next to it
+LEAST_PART = 1 / 64  # of the loads, by which they grow
 TOLERANCE = 1e-12  # residual forces relative to the largest that meet, positions to the size of the robot
 ROUNDING = 4 * np.finfo(float).eps  # of coordinates, which stiff springs turn into forces
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
@@ -86,14 +88,17 @@ class Correction(NamedTuple):
 
 
 def newton(
-    correct: Callable[[Array, Indices], Correction], move: Callable[[Array, Array], Array], states: Array
+    correct: Callable[[Array, Indices], Correction],
+    move: Callable[[Array, Array], Array],
+    states: Array,
+    most: int = MOST_ITERATIONS,
 ) -> tuple[Array, Booleans]:
     """The states (T, …) that `correct` leads to, and which of them are met (T,).
 
     `correct`(states, their numbers) is called for those that are not met yet, and `move`(states, steps) takes them on.
     """
     states, met, going = states.copy(), np.zeros(len(states), dtype=bool), np.arange(len(states))
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(most):
         step, is_met = correct(states[going], going)
         known = np.isfinite(step).all(axis=1)
         longest = np.abs(step).max(axis=1, initial=0.0)
@@ -108,12 +113,23 @@ def newton(
 class Balance(NamedTuple):
     """What meets at a posture, in natural sizes: N·m, rad, sizes of the robot and of modes."""
 
+    load: Array  # (n_v,) Q
     left: Array  # (n_v,) Q − C_vᵀ λ
     missed: Array  # (rows,) C
     gradient: Array  # (rows, n_v) C_v, 0 of equations that depend on others
     multipliers: Array  # (rows,) λ in N·m, with 0 of these
     independent: list[int]  # numbers of the other equations
     size: float  # N·m, of the largest force that meets others there
+
+
+class Relief(NamedTuple):
+    """What is taken off loads and off equations, in natural sizes."""
+
+    load: Array | float = 0.0  # (n_v,)
+    way: Array | float = 0.0  # (rows,)
+
+
+FULL_LOADS = Relief()
 
 
 class Statics:
@@ -130,11 +146,27 @@ class Statics:
         """
         tree = self.model.tree
         free = np.delete(np.arange(tree.n_v), [] if held is None else held)
+        rest, is_met, cause = self._newton(q, free, FULL_LOADS, MOST_ITERATIONS)
+        if not is_met:
+            rest, is_met = self._loaded(q, free)
+        for node in tree.nodes if is_met else ():
+            if np.sum(rest[node.p_q] ** 2) > node.body.largest_moment:
+                is_met, cause = False, f'"{node.body.name}" bends by more than its length there'
+        if not is_met:
+            raise SolveError(
+                f"{self.model.scene.path}: no static equilibrium was found near the initial posture: {cause}. Without"
+                " motors or trajectories, or with links too soft for their loads, there may be none; else give joint"
+                " coordinates closer to it"
+            )
+        return rest
+
+    def _newton(self, q: Array, free: Indices, relief: Relief, most: int) -> tuple[Array, bool, str]:
+        """Where Newton's method gets from q (n_q,) in at most so many steps, whether that is met, what else is left."""
         cause = ""
 
         def correct(states: Array, _: Indices) -> Correction:
             nonlocal cause
-            at, step = self.balance(states[0], free), np.zeros((1, tree.n_v))
+            at, step = self.balance(states[0], free, relief), np.zeros((1, self.model.tree.n_v))
             if not np.isfinite(at.size):
                 step[:] = np.nan
                 return Correction(step, np.zeros(1, dtype=bool))
@@ -147,24 +179,33 @@ class Statics:
                 cause = self._cause(at, int(free[excess.argmax()]))
             return Correction(step, np.array([is_met]))
 
-        rest, is_met = newton(correct, lambda at, step: tree.integrate(at, step * self.sizes), q[None])
-        for node in tree.nodes if is_met[0] else ():
-            if np.sum(rest[0, node.p_q] ** 2) > node.body.largest_moment:
-                is_met, cause = np.array([False]), f'"{node.body.name}" bends by more than its length there'
-        if not is_met[0]:
-            raise SolveError(
-                f"{self.model.scene.path}: no static equilibrium was found near the initial posture: {cause}. Without"
-                " motors or trajectories, or with links too soft for their loads, there may be none; else give joint"
-                " coordinates closer to it"
-            )
-        return as_floats(rest[0])
+        rest, is_met = newton(correct, lambda at, step: self.model.tree.integrate(at, step * self.sizes), q[None], most)
+        return as_floats(rest[0]), bool(is_met[0]), cause
 
-    def balance(self, q: Array, free: Indices) -> Balance:
-        """Forces at q (n_q,), with multipliers that leave least along v[`free`]."""
+    def _loaded(self, q: Array, free: Indices) -> tuple[Array, bool]:
+        """The equilibrium that q (n_q,) comes to as the loads on it grow from nothing, and whether it does.
+
+        A homotopy as in E. L. Allgower and K. Georg, Numerical Continuation Methods, 1990, ch. 1.
+        """
+        at = self.balance(q, free)
+        taken, part = 0.0, 0.5
+        while taken < 1.0 and part >= LEAST_PART and np.isfinite(at.size):
+            left = 1.0 - min(taken + part, 1.0)
+            rest, is_met, _ = self._newton(q, free, Relief(left * at.load, left * at.missed), FEW_ITERATIONS)
+            if is_met:
+                q, taken = rest, 1.0 - left
+                part = min(2.0 * part, left)
+            else:
+                part /= 2.0
+        return q, taken == 1.0
+
+    def balance(self, q: Array, free: Indices, relief: Relief = FULL_LOADS) -> Balance:
+        """Forces at q (n_q,), with multipliers that leave least along v[`free`], with a `relief`."""
         at, J = self._at_rest(q)
         independent = _independent(J[:, free])
         J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
-        Q, missed = at.Q * self.sizes, self.system.row_signs * at.value / self.row_sizes
+        Q = at.Q * self.sizes - relief.load
+        missed = self.system.row_signs * at.value / self.row_sizes - relief.way
         multipliers = np.linalg.lstsq(J[:, free].T, Q[free], rcond=DEPENDENT)[0]
         elastic = np.zeros_like(Q)
         for node in self.model.tree.nodes:
@@ -177,7 +218,7 @@ class Statics:
             np.array([at.force * self.length, at.moment]),
         )
         size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
-        return Balance(Q - multipliers @ J, missed, J, multipliers, independent, size)
+        return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent, size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
         """∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), exact."""

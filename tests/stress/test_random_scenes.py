@@ -4,7 +4,7 @@ import numpy as np
 import tree_oracle
 import zoo
 from body_equations import accelerated, given_forces, required_forces
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
 from mechanisms import forward, pcid, relative
@@ -66,6 +66,7 @@ def test_power_is_the_rate_of_energy(system):
 
 @settings(random_scenes, max_examples=6)
 @given(st.integers(0, 2**32 - 1))
+@example(42986)  # an equilibrium that is found as loads grow alone: links sag by a quarter of their length
 def test_forward_follows_inverse(seed):
     """PCID → forward with all of the actuation: round trip, on arms of random links and ways."""
     rng = np.random.default_rng(seed)
