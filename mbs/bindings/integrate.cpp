@@ -66,6 +66,7 @@ void bind_integrate(nb::module_ &m) {
           [](Samples *s, double longest, std::size_t most, int parts) { new (s) Samples{longest, most, parts}; },
           "longest"_a, "most"_a, "parts"_a = 1,
           "longest: s between two of them, where steps are longer; most: of them; parts: of each step, at least.")
+      .def_ro("every", &Samples::every, "Of so many steps one is among them.")
       .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
       .def_prop_ro(
           "states", [](const Samples &s) { return as_vector(s.states); }, "(q, v) of each, one after the other.");

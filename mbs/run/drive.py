@@ -34,11 +34,23 @@ from .diagnosis import find_cause
 from .integrator_choice import choose_integrator
 from .integrators import beyond_rounding, integration_controls, with_steps_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .samples import LOOKED_AT, about_highest, in_order, new_samples, reached_samples, some_of, stops
+from .samples import (
+    ALL_LOOKED_AT,
+    LOOKED_AT,
+    PARTS_OF_STEP,
+    about_highest,
+    in_order,
+    new_samples,
+    reached_samples,
+    some_of,
+    stops,
+    telling,
+)
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
 
+BLOCK = 65_536  # states that are looked at at once
 POSTURES = 2001  # outputs whose postures are looked at where the core does not watch them
 INSTANT = 1e-9  # s, before and after which commands are read where they change: see `Control.held`
 
@@ -109,7 +121,9 @@ def drive_robot(
         system.integrated.scene.watch_posture([model.rows[k].is_trajectory for k in rows], robot_size(model))
     watch_limits(system.integrated.scene, model.tree)
     recording = _core.Recording() if is_recorded else None
-    continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
+    continuation = Continuation(
+        _core.TreeCheckpoint(), recording, new_samples(times, analysis, len(start.q) + len(start.v))
+    )
     continuation = continuation if earlier is None else earlier.continuation
     run = _integrated(system, times, start, controls, control, progress, continuation)
     motion = _motion(system, run, times)
@@ -130,7 +144,8 @@ def drive_robot(
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
     texts = (*warnings, *(text for text in (posture, scatter) if text))
     texts = (*texts, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))
-
+    if (samples := continuation.samples) is not None and samples.every > 1:
+        texts = (*texts, f"peaks and means are of one in {samples.every} steps: memory holds no more; shorten the run")
     statistics = Statistics(
         "diverged" if in_posture else STATUS[run.status], integrator.changed_in(run), run.steps, run.rejected,
         run.evaluations, time.perf_counter() - began, continuation.checkpoint.time if control is None else None, cause,
@@ -202,7 +217,13 @@ def _between(
     # what rings between samples of a controller has peaks and means of its own there
     joints = system.model.tree.joint_columns
     rates = states[:, -len(joints) :][:, joints]
-    some = some_of(times, rates, ends, LOOKED_AT if control is None else len(times))
+    most = LOOKED_AT
+    if control is not None:
+        if len(times) > ALL_LOOKED_AT and not found.analysis.is_repeated:
+            motion = _telling_motion(system, at, times)
+            return replace(found, motion=motion), np.zeros((len(motion.time), 0))
+        most = PARTS_OF_STEP * ALL_LOOKED_AT
+    some = some_of(times, rates, ends, most)
     run = at(some)
     motion, replayed = _motion(system, run, times[some]), run.replayed
     if (more := np.setdiff1d(about_highest(some, np.hstack([motion.multipliers, motion.a[:, joints]])), some)).size:
@@ -210,6 +231,26 @@ def _between(
         motion = motion.with_rows_of(_motion(system, others, times[more]), order)
         replayed = np.concatenate([replayed, others.replayed])[order]
     return replace(found, motion=motion), replayed
+
+
+def _telling_motion(system: MultibodySystem, at: Callable[[Indices], _core.TreeRun], times: Array) -> Motion:
+    """The motion at those of `times` (k,), s, from which it follows at the others; `at` has it at rows."""
+    sizes = np.zeros(1)  # of each column, so far
+
+    def thinned(motion: Motion) -> Motion:
+        nonlocal sizes
+        values = np.hstack([motion.q, motion.v, motion.a, motion.multipliers])
+        sizes = np.maximum(sizes, np.abs(values).max(axis=0))
+        some = telling(motion.time, values, sizes)
+        if len(some) > BLOCK:  # of what rings all the time: the mean of some is that of all
+            tops = about_highest(np.arange(len(values)), values, 2)
+            some = np.union1d(some[:: -(-len(some) // BLOCK)], tops)
+        return motion.at(some)
+
+    blocks = (np.arange(first, min(first + BLOCK, len(times))) for first in range(0, len(times), BLOCK))
+    parts = [thinned(_motion(system, at(rows), times[rows])) for rows in blocks]
+    fields = ([of.time, of.q, of.v, of.a, of.multipliers] for of in parts)
+    return thinned(Motion(*(np.concatenate(of) for of in zip(*fields, strict=True))))
 
 
 def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array, Array, Array]:

@@ -18,8 +18,11 @@ from ..scene.analysis import IntegratedAnalysis
 from ..scene.trajectories import Trajectory
 
 FEWEST = 2000  # intervals of a run
-KEPT = 16_384  # states of an integration at most
+KEPT = 16_777_216  # numbers of the states of an integration at most, 128 MiB
 PARTS_OF_STEP = 4  # of integrations that others repeat
+ALL_LOOKED_AT = 16_384  # states of a loop; of more, those from which others follow; of repeated runs as many a part
+FOLLOWS = 1e-4  # of the largest value, by which linear interpolation may miss one
+THINNED = 0.98  # of the samples, from one pass over them to the next
 LOOKED_AT = 2000  # of these, those at which steps have to end, and all others next to the largest values
 HIGHEST = 4  # local maxima of each quantity
 MOST = 20_000  # times of a prescribed motion
@@ -34,13 +37,15 @@ PARTS = 16  # of such a piece
 DENSE, HUMP, FEW = 8, 0.02, 0.1  # times within an interval, of the range, of the intervals: see `_humps`
 
 
-def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | None:
+def new_samples(times: Array, analysis: IntegratedAnalysis, size: int) -> _core.Samples | None:
     """Samples for an integration over the output `times` (T,), s; None where there is nothing to integrate.
+
+    `size`: numbers of a state.
 
     Runs whose differences count have more: peaks of theirs are to be known as well as their derivatives.
     """
     duration, parts = float(times[-1] - times[0]), PARTS_OF_STEP if analysis.keep_steps or analysis.is_repeated else 1
-    return _core.Samples(duration / FEWEST, parts * KEPT, parts) if duration > 0.0 else None
+    return _core.Samples(duration / FEWEST, max(KEPT // size, FEWEST), parts) if duration > 0.0 else None
 
 
 def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:
@@ -61,6 +66,24 @@ def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
     at_ends = np.flatnonzero(np.isin(times, ends))
     some = np.unique(np.concatenate([np.arange(0, count, -(-count // most)), at_ends, [count - 1]]))
     return some if len(some) == count else np.union1d(some, about_highest(np.arange(count), rates, 2))
+
+
+def telling(times: Array, values: Array, sizes: Array) -> Indices:
+    """Numbers of the samples at `times` (k,), s, between which `values` (k, columns) are linear.
+
+    But for `FOLLOWS` of their `sizes` (columns,). Some of `LOOKED_AT` intervals are among them.
+    """
+    chain, misses = np.arange(len(times)), FOLLOWS * sizes
+    while len(chain) > 2:
+        middle = np.arange(1, len(chain) - 1, 2)
+        before, at, after = (chain[middle + shift] for shift in (-1, 0, 1))
+        share = ((times[at] - times[before]) / (times[after] - times[before]))[:, None]
+        off = np.abs(values[at] - (1.0 - share) * values[before] - share * values[after])
+        left = np.delete(chain, middle[(off <= misses).all(axis=1)])
+        if len(left) > THINNED * len(chain):
+            break
+        chain = left
+    return np.union1d(chain, np.arange(0, len(times), -(-len(times) // LOOKED_AT)))
 
 
 def about_highest(some: Indices, quantities: Array, beside: int = 1) -> Indices:
