@@ -15,7 +15,7 @@ from ..common.errors import InputError
 from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
-from ..mbs.analysis.operating_points import locked_motors
+from ..mbs.analysis.operating_points import locked_motors, open_loop_growth
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.drives import Drives, Replayed
 from ..mbs.model.known_motion import State
@@ -119,7 +119,7 @@ def _check(solution: Solution, source: Outcome, finer: Solution, watcher: Watche
     modes = {name: link.eigenmode_count for name, link in finer.links.items()}
     asked = source.analysis
     least = least_voltage(finer.model, finer.patches, asked)[0] if isinstance(asked, Tracking) else None
-    return FinerCheck(modes, worst, errors[worst], run.status, least)
+    return FinerCheck(modes, worst, errors[worst], run.status, open_loop_growth(source), least)
 
 
 def _drives(solution: Solution, source: Outcome, finer: Solution) -> Drives:

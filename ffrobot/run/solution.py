@@ -58,6 +58,7 @@ class FinerCheck:
         point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
         error: by how much, m, at worst.
         status: how the replay ended.
+        growth: mean rate, 1/s, at which the open loop multiplies deviations of the inverse analysis; nan if unknown.
         least_voltage: V, that tracking needs with these modes; None of other kinds.
     """
 
@@ -65,6 +66,7 @@ class FinerCheck:
     point: str
     error: float
     status: str
+    growth: float
     least_voltage: float | None = None
 
     @property
@@ -75,7 +77,9 @@ class FinerCheck:
         least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
         if self.least_voltage is not None and np.isnan(self.least_voltage):
             least = "; no motion within the limits was found with these modes, so their least voltage is not known"
-        return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm{least}"
+        grown = f", in an open loop in which deviations grow by {self.growth:.2g} 1/s" if self.growth > 0.0 else ""
+        off = f"{self.point} is off by {1e3 * self.error:.2g} mm{grown}"
+        return f"forward simulation on {modes} modes{ended}: {off}{least}"
 
 
 @struct

@@ -74,6 +74,19 @@ def test_error_is_that_of_the_modes_left_out(gravity):
     assert 1e-7 < errors[1] < 1e-3
 
 
+def test_the_growth_of_deviations_is_that_of_an_upright_rod():
+    """By 3 g / 2 L: torques that stand still hold it, but do not bring it back."""
+    scene = library.make_scene(
+        name="upright", gravity=[0.0, -9.81], body=[{"name": "rod", "link": link("rod", 0.2, "cantilever", 2)}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]}],
+        trajectory=[{"name": "stand", "joint": "O", "value": "pi/2"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01, "check": "finer"}],
+    )  # fmt: skip
+    check = solve_scene(scene).analyses["inverse"].check
+    assert check.growth == pytest.approx(np.sqrt(1.5 * 9.81 / 0.2), rel=0.02)  # the rod bends, too
+    assert f"in an open loop in which deviations grow by {check.growth:.2g} 1/s" in check.in_words
+
+
 def test_it_is_told_and_kept(tmp_path, ffrobot):
     path = tmp_path / "scene.toml"
     path.write_text(arm(2).text, encoding="utf-8")
