@@ -37,6 +37,7 @@ from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statisti
 from .samples import (
     ALL_LOOKED_AT,
     LOOKED_AT,
+    MANY,
     PARTS_OF_STEP,
     about_highest,
     in_order,
@@ -50,7 +51,6 @@ from .samples import (
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
 
-BLOCK = 65_536  # states that are looked at at once
 POSTURES = 2001  # outputs whose postures are looked at where the core does not watch them
 INSTANT = 1e-9  # s, before and after which commands are read where they change: see `Control.held`
 
@@ -217,13 +217,13 @@ def _between(
     # what rings between samples of a controller has peaks and means of its own there
     joints = system.model.tree.joint_columns
     rates = states[:, -len(joints) :][:, joints]
-    most = LOOKED_AT
-    if control is not None:
-        if len(times) > ALL_LOOKED_AT and not found.analysis.is_repeated:
-            motion = _telling_motion(system, at, times)
-            return replace(found, motion=motion), np.zeros((len(motion.time), 0))
-        most = PARTS_OF_STEP * ALL_LOOKED_AT
-    some = some_of(times, rates, ends, most)
+    is_long = len(times) > ALL_LOOKED_AT and not found.analysis.is_repeated
+    if control is not None and is_long:
+        motion = _telling_motion(system, at, times)
+        return replace(found, motion=motion), np.zeros((len(motion.time), 0))
+    some = some_of(times, rates, ends, LOOKED_AT if control is None else PARTS_OF_STEP * ALL_LOOKED_AT)
+    if is_long:
+        some = np.union1d(some, telling(times, states, np.abs(states).max(axis=0)))
     run = at(some)
     motion, replayed = _motion(system, run, times[some]), run.replayed
     if (more := np.setdiff1d(about_highest(some, np.hstack([motion.multipliers, motion.a[:, joints]])), some)).size:
@@ -241,16 +241,14 @@ def _telling_motion(system: MultibodySystem, at: Callable[[Indices], _core.TreeR
         nonlocal sizes
         values = np.hstack([motion.q, motion.v, motion.a, motion.multipliers])
         sizes = np.maximum(sizes, np.abs(values).max(axis=0))
-        some = telling(motion.time, values, sizes)
-        if len(some) > BLOCK:  # of what rings all the time: the mean of some is that of all
-            tops = about_highest(np.arange(len(values)), values, 2)
-            some = np.union1d(some[:: -(-len(some) // BLOCK)], tops)
-        return motion.at(some)
+        return motion.at(telling(motion.time, values, sizes))
 
-    blocks = (np.arange(first, min(first + BLOCK, len(times))) for first in range(0, len(times), BLOCK))
+    blocks = (np.arange(first, min(first + MANY, len(times))) for first in range(0, len(times), MANY))
     parts = [thinned(_motion(system, at(rows), times[rows])) for rows in blocks]
-    fields = ([of.time, of.q, of.v, of.a, of.multipliers] for of in parts)
-    return thinned(Motion(*(np.concatenate(of) for of in zip(*fields, strict=True))))
+    q, v, a, multipliers = (
+        np.concatenate([getattr(of, name) for of in parts]) for name in ("q", "v", "a", "multipliers")
+    )
+    return thinned(Motion(np.concatenate([of.time for of in parts]), q, v, a, multipliers))
 
 
 def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array, Array, Array]:

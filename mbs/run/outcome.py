@@ -42,7 +42,7 @@ ADVICE = {
 class _Rows:
     """Base of records of arrays with one row per output time, also by name; anything else is of all times."""
 
-    def at(self, rows: slice | Sequence[int]) -> Self:
+    def at(self, rows: slice | Sequence[int] | Indices) -> Self:
         """These rows alone."""
         return self._each(lambda x: x[rows])
 

@@ -22,6 +22,7 @@ KEPT = 16_777_216  # numbers of the states of an integration at most, 128 MiB
 PARTS_OF_STEP = 4  # of integrations that others repeat
 ALL_LOOKED_AT = 16_384  # states of a loop; of more, those from which others follow; of repeated runs as many a part
 FOLLOWS = 1e-4  # of the largest value, by which linear interpolation may miss one
+MANY = 65_536  # of these samples, and those that are looked at at once
 THINNED = 0.98  # of the samples, from one pass over them to the next
 LOOKED_AT = 2000  # of these, those at which steps have to end, and all others next to the largest values
 HIGHEST = 4  # local maxima of each quantity
@@ -71,7 +72,8 @@ def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
 def telling(times: Array, values: Array, sizes: Array) -> Indices:
     """Numbers of the samples at `times` (k,), s, between which `values` (k, columns) are linear.
 
-    But for `FOLLOWS` of their `sizes` (columns,). Some of `LOOKED_AT` intervals are among them.
+    But for `FOLLOWS` of their `sizes` (columns,). The ends of `LOOKED_AT` intervals are among them. Of what rings all
+    the time there are too many: then those about the highest values, and some at even distances for the means.
     """
     chain, misses = np.arange(len(times)), FOLLOWS * sizes
     while len(chain) > 2:
@@ -83,6 +85,8 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
         if len(left) > THINNED * len(chain):
             break
         chain = left
+    if len(chain) > MANY:
+        chain = np.union1d(chain[:: -(-len(chain) // MANY)], about_highest(np.arange(len(times)), values, 2))
     return np.union1d(chain, np.arange(0, len(times), -(-len(times) // LOOKED_AT)))
 
 
