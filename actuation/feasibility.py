@@ -16,7 +16,9 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.motors import split_forces
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import modal_coordinates, node_of, reported_points
+from ..mbs.quantities.supply import actuator_forces, motors_fit
+from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis
 from .motors import MotorFeasibility, first_time, judge_motors
 
@@ -75,42 +77,40 @@ class Unsupplied:
         return f"no actuator provides all modal forces required on {of_links}.{of_point if self.point else ''}"
 
 
-def quasi_static_shift(motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
+def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
     """Shift (T, 3), m, global axes, of points by modal forces r (T, n) of modal body files, where motors stand still.
 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
     twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
     """
-    shift, _ = _held(motion, modal)
-    places = motion.model.tree.places(motion.q, shift)
-    return {point: places.at(motion.model.tree.section(point)).velocity for point in points}
+    shift, _ = _held(run, modal)
+    places = run.model.tree.places(run.q, shift)
+    return {point: places.at(run.model.tree.section(point)).velocity for point in points}
 
 
-def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
+def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
     """The same of one point at these rows, where motors keep their moments: the robot recoils by γ.
 
     δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still, and no momentum
     comes from within.
     """
-    shift, R = _held(motion, modal, rows)
-    MR = mass_matrices(motion.model, motion.q[rows]) @ R
+    shift, R = _held(run, modal, rows)
+    MR = mass_matrices(run.model, run.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])
-    tree, freed = motion.model.tree, shift - (R @ gamma)[:, :, 0]
-    return tree.places(motion.q[rows], freed).at(tree.section(point)).velocity
+    tree, freed = run.model.tree, shift - (R @ gamma)[:, :, 0]
+    return tree.places(run.q[rows], freed).at(tree.section(point)).velocity
 
 
-def seen_at_points(
-    about: Unsupplied, motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]
-) -> Unsupplied:
+def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> Unsupplied:
     """With what modal forces r (T, n) that are left do to these points: `point` is the one that is farthest off."""
-    shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(motion, modal, points).items()}
+    shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(run, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
-    kept, step = shift[point], max(1, len(motion.time) // ROWS)
+    kept, step = shift[point], max(1, len(run.time) // ROWS)
     parts = np.array_split(np.arange(len(kept)), min(ROWS, len(kept)))
     coarse = np.array([rows[kept[rows].argmax()] for rows in parts])  # what rings peaks between evenly spaced rows
-    top = coarse[np.linalg.norm(freed_shift(motion, modal, point, coarse), axis=1).argmax()]
-    near_top = np.unique(np.linspace(max(0, top - step), min(len(motion.time) - 1, top + step), 2 * ROWS).astype(int))
-    freed = np.linalg.norm(freed_shift(motion, modal, point, near_top), axis=1)
+    top = coarse[np.linalg.norm(freed_shift(run, modal, point, coarse), axis=1).argmax()]
+    near_top = np.unique(np.linspace(max(0, top - step), min(len(run.time) - 1, top + step), 2 * ROWS).astype(int))
+    freed = np.linalg.norm(freed_shift(run, modal, point, near_top), axis=1)
     return replace(
         about,
         point=point,
@@ -120,19 +120,19 @@ def seen_at_points(
     )
 
 
-def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> tuple[Array, Array]:
+def _held(run: Run, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> tuple[Array, Array]:
     """δq (T, n_v) by −K⁻¹ r of modes where motors stand still, and R = ∂q/∂γ (T, n_v, motors) where they turn by γ.
 
     By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own.
     """
-    tree, q = motion.model.tree, motion.q[rows]
+    tree, q = run.model.tree, run.q[rows]
     joints = np.flatnonzero(tree.joint_columns)
     T, count = len(q), len(joints)
-    split = split_forces(motion.model, np.repeat(q, count, axis=0), np.tile(np.eye(tree.n_v)[joints], (T, 1)))
+    split = split_forces(run.model, np.repeat(q, count, axis=0), np.tile(np.eye(tree.n_v)[joints], (T, 1)))
     moments = np.concatenate([np.zeros((T * count, 0)), *split.moments.values()], axis=1)
     shift, R = np.zeros((T, tree.n_v)), np.zeros((T, tree.n_v, moments.shape[1]))
     for name, r in modal.items():
-        node = motion.node(name)
+        node = node_of(run, name)
         shift[:, node.p_v] = -(r[rows] @ node.body.modal_transform) / node.body.stiffness
     shift[:, joints] = np.einsum("tjn,tn->tj", split.left.reshape(T, count, tree.n_v), shift)
     R[:, joints] = moments.reshape(T, count, moments.shape[1])
@@ -328,18 +328,18 @@ class LinkInMotion:
     F_p: Array  # (T, n) modal forces on these that patches would have to supply
 
 
-def links_in_motion(motion: RobotMotion, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
+def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
     """The links of a motion by name; `bodies` are their modal bodies and equations."""
-    forces, found = motion.motor_forces, {}
+    forces, found = actuator_forces(run), {}
     assert forces is not None
     for name, (modal, spatial) in bodies.items():
-        found[name] = LinkInMotion(modal, spatial, motion.modal(name), forces.modal[name])
+        found[name] = LinkInMotion(modal, spatial, modal_coordinates(run, name), forces.modal[name])
     return found
 
 
 def judge_actuators(
     path: Path,
-    motion: RobotMotion,
+    run: Run,
     links: Mapping[str, LinkInMotion],
     patches: Mapping[str, LinkPatches],
     voltages: Mapping[str, Voltages],
@@ -355,16 +355,14 @@ def judge_actuators(
         link = links[body]
         for name, array in of_link.arrays.items():
             modes = of_link.modes[name]
-            trial = None if analysis.is_repeated else partial(_largest_voltage, path, motion, link, array.layout)
+            trial = None if analysis.is_repeated else partial(_largest_voltage, path, run, link, array.layout)
             p, F_p = modes.coordinates(link.p), modes.forces(link.F_p)
-            judged[name] = judge_patches(array, voltages[name], motion.time, p, F_p, trial)
-    missing = find_unsupplied(motion, links, patches, voltages, others)
-    return Feasibility(judge_motors(motion, analysis), judged, missing)
+            judged[name] = judge_patches(array, voltages[name], run.time, p, F_p, trial)
+    missing = find_unsupplied(run, links, patches, voltages, others)
+    return Feasibility(judge_motors(run, analysis), judged, missing)
 
 
-def _largest_voltage(
-    path: Path, motion: RobotMotion, link: LinkInMotion, layout: PztLayout, count: int
-) -> float | None:
+def _largest_voltage(path: Path, run: Run, link: LinkInMotion, layout: PztLayout, count: int) -> float | None:
     """V, that so many patches of a layout would need alone, evenly spread; None where they have no room."""
     from .patches.link_patches import on_kept_modes, with_count
     from .patches.patches import voltage_gain
@@ -372,8 +370,8 @@ def _largest_voltage(
     found = with_count(path, layout, link.modal, link.spatial, count)
     if found is None:
         return None
-    if link.spatial.name in motion.model.tree.index:  # else in pieces, with all modes
-        found = on_kept_modes(found, motion.node(link.spatial.name).body)
+    if link.spatial.name in run.model.tree.index:  # else in pieces, with all modes
+        found = on_kept_modes(found, node_of(run, link.spatial.name).body)
     return float(np.abs(found.reached.forces(link.F_p) @ voltage_gain(found.reach).T).max())
 
 
@@ -396,7 +394,7 @@ def find_unmet(
 
 
 def find_unsupplied(
-    motion: RobotMotion,
+    run: Run,
     links: Mapping[str, LinkInMotion],
     patches: Mapping[str, LinkPatches],
     voltages: Mapping[str, Voltages],
@@ -416,13 +414,13 @@ def find_unsupplied(
     found.sort(reverse=True)
     deflections, rotations, bodies, families = zip(*found, strict=True)
     about = Unsupplied(bodies, bool(patches))
-    if not motion.space.is_plane:
+    if not run.space.is_plane:
         about = replace(about, families=families, deflection=deflections, rotation=rotations)
-    if not (motion.motors_fit and links.keys() <= motion.model.tree.index.keys()):
+    if not (motors_fit(run) and links.keys() <= run.model.tree.index.keys()):
         return about  # motors do not say where points are, or links are in pieces
-    followed = [path.point for path in motion.model.scene.trajectory if path.point is not None]
-    points = followed or [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
-    return seen_at_points(about, motion, find_unmet(links, patches, voltages, limited=True), points)
+    followed = [path.point for path in run.model.scene.trajectory if path.point is not None]
+    points = followed or [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
+    return seen_at_points(about, run, find_unmet(links, patches, voltages, limited=True), points)
 
 
 def _largest_shift(link: LinkInMotion, left: Array) -> tuple[float, float]:

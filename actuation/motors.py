@@ -16,7 +16,9 @@ from ..mbs.joints.joint import MotorLimits
 from ..mbs.linear.statics import Statics
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.nodes import rotor
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import joint_motion
+from ..mbs.quantities.supply import actuator_forces, motor_motion
+from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis
 
 SHORT = 0.01  # of the time: a peak that lasts less is one of its own
@@ -60,7 +62,7 @@ class MotorFeasibility:
 
     @property
     def has_limits(self) -> bool:
-        """Whether the motor has a limit."""
+        """Whether there is anything that it may not exceed."""
         return bool(np.isfinite((self.moment_limit, self.speed_limit, self.power_limit)).any())
 
     @property
@@ -80,62 +82,61 @@ class MotorFeasibility:
         )
 
 
-def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeasibility]:
+def judge_motors(run: Run, analysis: Analysis) -> dict[str, MotorFeasibility]:
     """What every motor has to do up to the end of the path; a number behind the joint tells coordinates apart.
 
     Behind a compliant gear the motor turns otherwise than its joint.
     """
-    forces, found = motion.motor_forces, {}
+    forces, found = actuator_forces(run), {}
     assert forces is not None
-    inertias = _load_inertias(motion)
+    inertias = _load_inertias(run)
     at_rest: Mapping[str, Array] = {}
-    for joint in motion.model.scene.motor_joints:
-        of_joint = motion.joint(joint.name)
+    for joint in run.model.scene.motor_joints:
+        of_joint = joint_motion(run, joint.name)
         assert of_joint is not None
-        motor = motion.motor_motion(joint.name)
+        motor = motor_motion(run, joint.name)
         moments, rates = forces.moments[joint.name], of_joint[1] if motor is None else motor[1][:, None]
         for k, limits in enumerate(joint.motor_limits):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
-            judged = judge_motion(motion.time, moments[:, k], rates[:, k], limits, analysis.last_time)
-            jump = path_jump(motion, analysis, judged.moment_time) if judged.has_spike else ""
+            judged = judge_motion(run.time, moments[:, k], rates[:, k], limits, analysis.last_time)
+            jump = path_jump(run, analysis, judged.moment_time) if judged.has_spike else ""
             found[name] = replace(judged, jump=jump, load_inertia=inertias.get(joint.name, (np.nan,) * (k + 1))[k])
             if judged.moment > judged.moment_limit:
-                at_rest = at_rest or static_moments(motion, analysis.last_time)
+                at_rest = at_rest or static_moments(run, analysis.last_time)
                 if joint.name in at_rest:
                     found[name] = replace(found[name], static_moment=float(np.abs(at_rest[joint.name][:, k]).max()))
     return found
 
 
-def static_moments(motion: RobotMotion, end: float) -> Mapping[str, Array]:
+def static_moments(run: Run, end: float) -> Mapping[str, Array]:
     """Torques (T, k) by joint, N·m or N, in the equilibria at instants of a path from t = 0 to `end` (s).
 
     Empty where no equilibrium is found, or motors do not fit the path.
     """
-    on_path = np.flatnonzero((motion.time >= 0.0) & (motion.time <= end))
+    on_path = np.flatnonzero((run.time >= 0.0) & (run.time <= end))
     if not len(on_path):
         return {}
     rows = on_path[np.unique(np.linspace(0, len(on_path) - 1, AT_REST).astype(int))]
-    time, still = motion.time[rows], np.zeros((len(rows), motion.model.tree.n_v))
-    statics, states, multipliers = Statics(motion.model), [], []
+    time, still = run.time[rows], np.zeros((len(rows), run.model.tree.n_v))
+    statics, states, multipliers = Statics(run.model), [], []
     try:
-        for t, q in zip(time, motion.q[rows], strict=True):
+        for t, q in zip(time, run.q[rows], strict=True):
             statics.t = float(t)
             states.append(statics.equilibrium(q))
             multipliers.append(statics.holding_multipliers(states[-1]))
     except SolveError:
         return {}
-    forces = RobotMotion(
-        motion.model, time, np.array(states), still, still, np.array(multipliers), is_at_rest=True
-    ).motor_forces
+    at_rest = replace(run, time=time, q=np.array(states), v=still, a=still, multipliers=np.array(multipliers))
+    forces = actuator_forces(replace(at_rest, required=None, is_at_rest=True, twists={}, links={}))
     return {} if forces is None else forces.moments
 
 
-def _load_inertias(motion: RobotMotion) -> dict[str, tuple[float, ...]]:
-    model = motion.model
-    if model.loop_rows.any() or not len(motion.time):
+def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
+    model = run.model
+    if model.loop_rows.any() or not len(run.time):
         return {}
-    rows = np.unique(np.linspace(0, len(motion.time) - 1, ROWS).astype(int))
-    inertia = mass_matrices(model, motion.q[rows])
+    rows = np.unique(np.linspace(0, len(run.time) - 1, ROWS).astype(int))
+    inertia = mass_matrices(model, run.q[rows])
     most = inertia.diagonal(axis1=1, axis2=2).max(axis=0)
     found, behind = {}, {gear.joint.joint.name: gear.joint.v for gear in model.tree.gears}
     for joint, columns in model.motors.items():
@@ -169,17 +170,17 @@ def first_time(time: Array, beyond: Booleans) -> Array:
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
-def path_jump(motion: RobotMotion, analysis: Analysis, at: float) -> str:
+def path_jump(run: Run, analysis: Analysis, at: float) -> str:
     """Which derivative of a trajectory jumps near the time `at` (s), if moments follow from it.
 
     "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.
     """
     end = analysis.last_time
-    if end <= 0.0 or len(motion.time) < 2:
+    if end <= 0.0 or len(run.time) < 2:
         return ""
     h = INSTANT * end
     near = NEARBY * end * (round(at / end / NEARBY) + np.arange(-1.0, 2.0))
-    for target in (target for path in motion.model.scene.trajectory for _, target in path.targets):
+    for target in (target for path in run.model.scene.trajectory for _, target in path.targets):
 
         def acceleration(t: Array, target: TimeFunction = target) -> Array:
             return np.where(

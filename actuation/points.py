@@ -23,7 +23,7 @@ from ..mbs.fields.field_types import Name, Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.body import Body, BodyPoint
 from ..mbs.model.motors import path_forces, path_forces_on_bodies
-from ..mbs.run.outcome import Outcome
+from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES, Space
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
@@ -222,7 +222,7 @@ class PointForces:
     condition_number: float  # largest of the scaled L_a
 
 
-def solve_points(chosen: PointSet, run: Outcome) -> PointForces:
+def solve_points(chosen: PointSet, run: Run) -> PointForces:
     """L_a F_a = Q_a at every output time."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = find_driving_forces(run)[chosen.body]
@@ -241,7 +241,7 @@ def solve_points(chosen: PointSet, run: Outcome) -> PointForces:
     return PointForces(force, unmet, residual, rank, condition)
 
 
-def forces_at_points(chosen: Mapping[str, PointSet], run: Outcome) -> dict[str, Array]:
+def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Array]:
     """By "BODY.POINT" the force (T, 3) there, N, global axes, along the motion of a run.
 
     Raises `InputError` where a body without points has driving forces.
@@ -264,12 +264,12 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Outcome) -> dict[str, 
     return found
 
 
-def find_driving_forces(run: Outcome) -> dict[str, Array]:
+def find_driving_forces(run: Run) -> dict[str, Array]:
     """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
     model = run.model
     found = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
-    if run.forces.required is not None:  # a shape is held besides, by forces on the modes alone
-        held = run.forces.required - path_forces(model, run.time, run.q, run.multipliers)
+    if run.required is not None:  # a shape is held besides, by forces on the modes alone
+        held = run.required - path_forces(model, run.time, run.q, run.multipliers)
         for node in model.tree.nodes:
             found[node.body.name][:, 6:] += held[:, node.p_v]
     return found

@@ -1,6 +1,6 @@
 """Datasets of results and modal body files with unit, meaning and columns: the table, by which records are written.
 
-docs/reference/files.md says more of them; a test compares both with files as they are written.
+docs/key_tables.py makes tables of docs/reference/files.md of it; tests compare both with files as they are written.
 """
 
 from __future__ import annotations
@@ -207,13 +207,8 @@ bound/zero | 1/s | real and imaginary part
 []
 zero_dynamics/time | s | of the zeros
 zero_dynamics/zeros | 1/s | along the path, real and imaginary part
-[ joints_locked/]
-frequency | Hz | natural frequencies, joints locked
-damping_ratio | | of these vibrations
-modes/** | | their mode shapes
-compliance/* | m/N, rad/N, 1/(N m) | of the point: motion by forces and moments
-[ joints_compliant/]
-frequency | Hz | natural frequencies, motors locked behind compliant gears
+[ joints_*/]
+frequency | Hz | natural frequencies, joints locked, or motors behind compliant gears
 damping_ratio | | of these vibrations
 modes/** | | their mode shapes
 compliance/* | m/N, rad/N, 1/(N m) | of the point: motion by forces and moments

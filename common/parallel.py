@@ -21,7 +21,7 @@ def processes() -> int:
 
 
 def processors() -> int:
-    """Number of processors available to this process."""
+    """How many this process may use."""
     return len(os.sched_getaffinity(0))
 
 

@@ -1,16 +1,20 @@
-"""Pages with every key of link, scene and figures files, from the schemas that `ffrobot schema` prints.
+"""Pages with every key of link, scene and figures files, and the tables of datasets of the page on files.
 
-They are kept in the repository, so that they can be read there: `python docs/key_tables.py` writes them anew.
+Keys are from the schemas that `ffrobot schema` prints, datasets from `common/meanings.py`. Pages are kept in the
+repository, so that they can be read there: `python docs/key_tables.py` writes them anew.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from ffrobot.common.meanings import LABELS, MODAL_BODY, RESULTS, Meaning
 from ffrobot.schema import scene_in, schema
 
 INTRODUCTION = {
@@ -62,9 +66,65 @@ Schema = dict[str, Any]
 
 
 def write_key_tables(folder: Path) -> None:
-    """Write `link_keys.md`, `scene_keys.md` and `figures_keys.md` into `folder`."""
-    for name, text in key_pages().items():
+    """Write `link_keys.md`, `scene_keys.md`, `figures_keys.md` and `files.md` into `folder`."""
+    for name, text in {**key_pages(), "files.md": files_page()}.items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def files_page() -> str:
+    """The page on files with its tables of datasets made anew."""
+    text = (HERE / "files.md").read_text(encoding="utf-8")
+    for title, table in (("a modal body", MODAL_BODY), ("results", RESULTS)):
+        begin, end = f"<!-- datasets of {title} -->\n", "\n<!-- end of datasets -->"
+        pattern = re.escape(begin) + ".*?" + re.escape(end)
+        lines = "\n".join(_datasets(table))
+        text, count = re.subn(pattern, lambda _, new=f"{begin}\n{lines}\n{end}": new, text, flags=re.DOTALL)
+        assert count == 1, title
+    return text
+
+
+NAMES = {
+    "points": "BODY.POINT",
+    "settling": "BODY.POINT",
+    "compliance": "BODY.POINT",
+    "joints": "JOINT",
+    "torque_price": "JOINT",
+    "trajectories": "TRAJECTORY",
+    "pzt": "LAYOUT",
+    "interfaces": "NAME",
+    "placement": "PATCHES",
+    "robustness": "CONTROL",
+    "controller": "MATRIX",
+    "zeros": "K",
+}
+"""What * stands for behind these parts of a dataset's name; behind others for a body."""
+
+
+def _datasets(table: Mapping[str, Meaning]) -> Iterator[str]:
+    """A row for each group of datasets."""
+    groups: dict[str, list[str]] = {}
+    for pattern, about in table.items():
+        group, _, name = _shown(pattern).rpartition("/")
+        unit = f" ({about.unit})" if about.unit else ""
+        groups.setdefault(group, []).append(f"`{name.lstrip('@')}`{unit} {about.what}{_columns(about.columns)}")
+    yield from ("| group | datasets and attributes, with units |", "|---|---|")
+    for group, texts in groups.items():
+        yield f"| {f'`{group}/`' if group else ''} | {'; '.join(texts)} |"
+
+
+def _shown(pattern: str) -> str:
+    """A name with words in place of *."""
+    names = NAMES | {"points": "NAME"} if pattern.startswith("stress/") else NAMES
+    parts = pattern.replace("/**", "/…").split("/")
+    shown = [names.get(before, "BODY") if part == "*" else part for before, part in pairwise(["", *parts])]
+    return "/".join(shown)
+
+
+def _columns(of: str) -> str:
+    """What columns are, in words."""
+    if of in LABELS and of != "stress":
+        return ", by axis" if of == "axis" else f", by {', '.join(LABELS[of])}"
+    return f", by {of.removesuffix(' of {}')}" if of.endswith(" of {}") else ""
 
 
 def key_pages() -> dict[str, str]:

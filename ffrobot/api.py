@@ -14,7 +14,6 @@ from .common.files import AnyPath
 if TYPE_CHECKING:
     from .design.finding import Finding
     from .results.file import Results
-    from .run.solution import Solution
     from .run.watcher import Watcher
     from .scene.scene import Scene
 
@@ -51,48 +50,31 @@ def solve(
         torque = results["inverse/joints/shoulder/moment"]  # (T,) in N·m
     """
     from .common.errors import FfrobotWarning, InputError
-    from .common.files import check_output
-    from .common.outputs import protected
-    from .results.file import FORMAT, Results
-    from .results.resume import how_to_go_on, resume_scene
-    from .results.write import results_image, write_results
-    from .run.inputs import files_of, files_of_tables
-    from .run.solve import solve_scene
+    from .results.file import Results
+    from .results.solving import check_ended, solve_and_keep
+    from .results.write import results_image
     from .run.watcher import Watcher
     from .scene.load import load_scene
     from .scene.scene import Scene
 
-    if not isinstance(scene, str | PathLike | Scene):
-        found = type(scene).__name__
-        raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {found}")
-    path = None if output is None else Path(output)
-    inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
-    if path is not None:
-        with protected(inputs):
-            check_output(path, FORMAT)
-    elif resume:
-        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
-
-    def keep(solution: Solution) -> None:
-        if path is not None:
-            with protected(inputs):
-                write_results(solution, path)
-
     if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
-    watcher = watcher or Watcher()
-    if path is not None and resume:
-        solution = resume_scene(scene, path, watcher, keep)
-        if solution is None:
-            return Results(path)
-    else:
-        solution = solve_scene(scene, watcher, keep)
-    for name, result in solution.analyses.items():
-        for text in result.warnings:
-            warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
-    for run in solution.outcomes.values():
-        run.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
-    return Results(path) if path is not None else Results.from_image(results_image(solution), scene.path)
+    elif not isinstance(scene, Scene):
+        wrong = type(scene).__name__
+        raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {wrong}")
+    if output is None and resume:
+        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
+    path, again, watcher = None if output is None else Path(output), "solve(…, resume=True)", watcher or Watcher()
+    solution = solve_and_keep(scene, path, watcher, again, resume=resume)
+    if solution is not None:
+        for name, result in solution.analyses.items():
+            for text in result.warnings:
+                warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
+        check_ended(solution, watcher, "" if path is None else again)
+        if path is None:
+            return Results.from_image(results_image(solution), scene.path)
+    assert path is not None  # results that are complete are those of a file
+    return Results(path)
 
 
 def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:

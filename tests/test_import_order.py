@@ -44,7 +44,6 @@ FLOORS = {
         "sweep",
         "fit",
         "design",
-        "smooth",
         "bench",
         "commands",
         ".",

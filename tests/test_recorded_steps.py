@@ -6,6 +6,7 @@ from beam_links import beam_link, tube
 from scipy.interpolate import CubicSpline
 
 from ffrobot import make_scene
+from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.run.replay import supplied
 from ffrobot.run.solve import solve_scene
 
@@ -52,8 +53,8 @@ def arm():
 
 def test_moments_between_outputs_are_those_of_a_spline_through_them(arm):
     """The path is smooth and the links do not ring, so that 1e-6 of the peak is what both leave."""
-    source, motion = arm.outcomes["inverse"], arm.analyses["inverse"].motion
-    moments = np.hstack([motion.motor_moments[joint] for joint in ("shoulder", "elbow", "wrist")])
+    source, motion = arm.outcomes["inverse"], arm.analyses["inverse"].run
+    moments = np.hstack([motor_moments(motion)[joint] for joint in ("shoulder", "elbow", "wrist")])
     times = np.arange(0.0, 1.0, 0.00025)
     tau = supplied(source, np.full(3, np.inf), {}, limited=False).sample(times.tolist())
     off = np.abs(tau - CubicSpline(source.time, moments)(times)).max(axis=0)

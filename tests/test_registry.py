@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ffrobot.mbs.run.outcome import Motion, Outcome
+from ffrobot.mbs.run.record import Run
 from ffrobot.mbs.fields.field_types import Positive, Reference
 from ffrobot.mbs.scene.analysis import TimedAnalysis
 
@@ -35,7 +35,7 @@ class Turntable(TimedAnalysis):
         model = context.model
         q = self.rate * self.times[:, None]
         v, nothing = np.full_like(q, self.rate), np.zeros((len(q), len(model.rows)))
-        return Outcome(analysis=self, model=model, motion=Motion(self.times, q, v, 0 * v, nothing))
+        return Run(analysis=self, model=model, time=self.times, q=q, v=v, a=0 * v, multipliers=nothing)
 '''
 
 EDITED = """

@@ -25,7 +25,7 @@ from ...mbs.quantities.settling import commanded_rest
 from ...mbs.run.context import place_of
 from ...mbs.run.drive import Control, drive_robot
 from ...mbs.run.gears import MotorCoordinates, with_motor_coordinates
-from ...mbs.run.outcome import Outcome
+from ...mbs.run.record import Run
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
@@ -64,7 +64,7 @@ class ClosedLoop(SampledAnalysis):
     1", "joint/NAME 2", with the same gains.
     """
 
-    def run(self, context: ActuatedContext) -> Outcome:
+    def run(self, context: ActuatedContext) -> Run:
         """The closed loop about the motion of an inverse analysis, from its initial state.
 
         The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for
@@ -148,21 +148,21 @@ class ClosedLoop(SampledAnalysis):
             names = [each.name for each in estimated]
             record = replace(record, estimate=observed.record(dict(zip(names, true, strict=True))))
 
-        def completed(of: Outcome) -> Outcome:
+        def completed(of: Run) -> Run:
             commanded = context.model.by_motor(held(of.time))
-            return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
+            return replace(of, commanded=commanded, details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
 
 
-def _resolved(source: Outcome) -> Outcome:
+def _resolved(source: Run) -> Run:
     """The run with times between its outputs, but for those that are so near to others that a spline would swing."""
     run = source.closer
     apart = np.diff(run.time, prepend=-np.inf) > APART * np.ptp(source.time)
     return run.at([int(k) for k in np.flatnonzero(apart)])
 
 
-def _robot(context: ActuatedContext, source: Outcome) -> ControlledRobot:
+def _robot(context: ActuatedContext, source: Run) -> ControlledRobot:
     """What controllers know of: whole links also where the plant has their pieces."""
     if context.whole is None:
         return ControlledRobot(without_paths(context.model), context.patches, source)
@@ -231,7 +231,7 @@ def _values(of: TimeFunction, analysis: ClosedLoop, time: Array) -> Array:
 def _feed_forward(
     context: ActuatedContext,
     analysis: ClosedLoop,
-    source: Outcome,
+    source: Run,
     moved: MotorCoordinates,
     times: Array,
     *,
@@ -276,7 +276,7 @@ def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: 
 
 
 def _followed(
-    run: Outcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str, quiet: float
+    run: Run, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str, quiet: float
 ) -> LoopMotion:
     """Where the tip went against where it should be; `quiet` as there."""
     assert isinstance(run.analysis, ClosedLoop)
@@ -288,7 +288,7 @@ def _followed(
     return LoopMotion(run.time, error, place_at, rates, held(run.time), completed, is_disturbed, quiet)
 
 
-def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str) -> Callable[[Array], Array]:
+def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:
     paths, run = [path.components for path in model.scene.trajectory if path.point == tip], source.closer
     known, rest = (run.time, _position(run.model, run.q, tip)), commanded_rest(source)
     last = None if rest is None else (rest.since, _position(rest.model, rest.q[None], tip)[0])

@@ -14,7 +14,7 @@ from ...mbs.fields.field_types import PointReference
 from ...mbs.linear.joint_conditions import JointCondition, RobotModes, joint_conditions
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism
 from ...mbs.model.model import Model, modal_directions
-from ...mbs.run.outcome import Details, Outcome
+from ...mbs.run.record import Details, Run
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from .linear_model import (
@@ -108,7 +108,7 @@ class Linear(InstantAnalysis):
     needs_actuators = True
     refers_to = (("points", "body"),)
 
-    def run(self, context: ActuatedContext) -> Outcome:
+    def run(self, context: ActuatedContext) -> Run:
         """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""
         run, about = find_operating_points(context, self)
         return replace(run, details=make_linear_models(context, self, about))

@@ -10,7 +10,7 @@ from ...common.arrays import Array, Booleans, ComplexArray
 from ...common.peaks import largest, root_mean_square
 from ...common.structs import struct
 from ...mbs.model.amplifiers import Amplifiers
-from ...mbs.run.outcome import Details
+from ...mbs.run.record import Details
 from ...mbs.run.samples import in_order
 from .controllers import Controller
 from .margins import Feedback, Loops, Margins, advice, loop_eigenvalues, margins

@@ -22,7 +22,7 @@ from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.fields.field_types import Reference
 from ...mbs.linear.linearisation import LinearEquations
-from ...mbs.run.outcome import Details, Outcome
+from ...mbs.run.record import Details, Run
 from ...mbs.run.replay import motor_forces_of
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
@@ -283,7 +283,7 @@ class PatchPlacement(InstantAnalysis):
                 )
         yield from super().problems(among)
 
-    def run(self, context: ActuatedContext) -> Outcome:
+    def run(self, context: ActuatedContext) -> Run:
         """The operating point, or those of the path, with what was `Placed`.
 
         Of several layouts of a link the others stay where they are. Raises `InputError` where it does not say which one

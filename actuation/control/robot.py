@@ -23,7 +23,7 @@ from ...mbs.model.system import MultibodySystem
 from ...mbs.posture.posture import MET, mobility, posture_search
 from ...mbs.posture.start import undeformed_posture
 from ...mbs.run.gears import with_motor_coordinates
-from ...mbs.run.outcome import Outcome
+from ...mbs.run.record import Run
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
@@ -148,7 +148,7 @@ class ControlledRobot:
 
     model: Model  # its constraint equations are those of loops alone, its gears do not give: see `linear`
     of_links: Mapping[str, LinkPatches]  # patches by link
-    source: Outcome  # the inverse analysis
+    source: Run  # the inverse analysis
 
     @property
     def path(self) -> Path:
@@ -292,7 +292,7 @@ class Setup:
     delay: float  # s, after which a command acts
     reference: Array  # (K, outputs) what the sensors would read on the motion of `source`
     feed_forward: Array  # (K, inputs) what is commanded anyhow
-    source: Outcome  # of the inverse analysis
+    source: Run  # of the inverse analysis
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Joints with the names of their coordinates, one after the other."""

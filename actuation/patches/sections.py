@@ -135,7 +135,7 @@ def bending_row(layout: PztLayout) -> int:
 
 
 def own_row(layout: PztLayout) -> int:
-    """Index of the strain e that the layout actuates."""
+    """Which of the strains e the layout is there for."""
     return TWIST if layout.acts_in == "twist" else bending_row(layout)
 
 

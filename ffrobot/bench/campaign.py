@@ -122,7 +122,7 @@ Swept = tuple[ReferenceRun, list[Point]]
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings: names of integrators, tolerances, repetitions, time limit of a run (s)."""
+    """What is run: names of integrators, tolerances, repetitions, seconds that one run may take."""
 
     integrators: Sequence[str]
     tolerances: Sequence[float]

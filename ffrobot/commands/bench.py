@@ -41,13 +41,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
     show_default=True,
     help="Largest duration of a run, s; longer ones stay in the tables without errors.",
 )
-@click.option(
-    "--part",
-    "parts",
-    multiple=True,
-    type=click.Choice(OF_A_SCENE),
-    help="Single part; repeatable [both].",
-)
+@click.option("--part", "parts", multiple=True, type=click.Choice(OF_A_SCENE), help="Single part; repeatable [both].")
 @python_option
 @logging_options
 def bench(

@@ -43,12 +43,12 @@ def _study(
 
     protect(files_of(scene_file))
     with Display() as display:
-        found = find(scene_file, *args, folder, watcher=display, **how)
-    found.print(summary_console())
-    for path in (*found.write_tables(folder), *found.write_study(folder, figures=figures)):
+        study = find(scene_file, *args, folder, watcher=display, **how)
+    study.print(summary_console())
+    for path in (*study.write_tables(folder), *study.write_study(folder, figures=figures)):
         click.echo(f"written    {path}")
-    if found.shortfall:
-        raise SolveError(f"{scene_file}: {found.shortfall}")
+    if study.shortfall:
+        raise SolveError(f"{scene_file}: {study.shortfall}")
 
 
 @click.command()

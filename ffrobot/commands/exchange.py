@@ -100,15 +100,15 @@ def import_(
 
 def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     """`LINK=FILE.toml` by link."""
-    found = dict[str, Path]()
+    files = dict[str, Path]()
     for pair in pairs:
         name, sign, path = pair.partition("=")
         if not (name and sign and path):
             raise InputError(f'--flexible: expected LINK=FILE.toml, found "{pair}"')
-        if name in found:
+        if name in files:
             raise InputError(f'--flexible: expected one file for link "{name}", found two')
-        found[name] = Path(path)
-    return found
+        files[name] = Path(path)
+    return files
 
 
 CONVERTED = "another program has to convert it to URDF"

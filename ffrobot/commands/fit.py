@@ -43,5 +43,5 @@ def fit(
 
     protect([*files_of(file), measured])
     keys = [key for text in vary for key in text.split(",")]
-    found = fit_measured(file, measured, keys, output, motors=motors, force=force)
-    print_fit(found, summary_console())
+    fitted = fit_measured(file, measured, keys, output, motors=motors, force=force)
+    print_fit(fitted, summary_console())

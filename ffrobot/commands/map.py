@@ -64,15 +64,23 @@ def map_(
 
     folder = output or scene_file.with_suffix(".map")
     protect(files_of(scene_file))
-    plan = plan_map(scene_file, over, folder, point, orientation, modes, _frequencies(response))
+    plan = plan_map(
+        scene=scene_file,
+        over=over,
+        folder=folder,
+        point=point,
+        orientation=orientation,
+        count=modes,
+        frequencies=_frequencies(response),
+    )
     with Display() as display:
-        found = make_map(plan, processes, display)
-    path, console = write_map(found), summary_console()
-    print_map(found, console)
+        made = make_map(plan, processes, display)
+    path, console = write_map(made), summary_console()
+    print_map(made, console)
     if figures:
         from ..pictures.studies.pose_map import draw_map
 
-        for picture in draw_map(found):
+        for picture in draw_map(made):
             console.print(f"figure     {picture}", soft_wrap=True)
     console.print(f"table      {folder / TABLE}", soft_wrap=True)
     console.print(f"map        {path}", soft_wrap=True)

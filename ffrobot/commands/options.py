@@ -23,9 +23,13 @@ POSITIVE = FiniteRange(0.0, min_open=True)
 def processes_option(text: str) -> Callable[[F], F]:
     """Give a command `-j`."""
     return click.option(
-        "-j", "--processes", type=click.IntRange(1, 1000), default=processors, show_default="one for each processor",
+        "-j",
+        "--processes",
+        type=click.IntRange(1, 1000),
+        default=processors,
+        show_default="one for each processor",
         help=text,
-    )  # fmt: skip
+    )
 
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
@@ -59,11 +63,11 @@ def _settings(parameter: inspect.Parameter, entry: str) -> dict[str, Any]:
     match = re.match(r"(.+?)(\.(?=\s|$)(?:  \[.*\])?)", re.sub(r"\n +", " ", entry))
     assert match is not None
     text = match[1][0].upper() + match[1][1:] + "; repeatable" * several + match[2]
-    found = {"help": text, "multiple": several, "is_flag": kind is bool, "required": needed, "default": default}
-    found["show_default"] = not (default is None or several or kind is bool)
+    settings = {"help": text, "multiple": several, "is_flag": kind is bool, "required": needed, "default": default}
+    settings["show_default"] = not (default is None or several or kind is bool)
     if get_origin(kind) is Literal:
-        found["type"] = click.Choice(get_args(kind))
-    return found | {"metavar" if isinstance(one, str) else "type": one for one in about}
+        settings["type"] = click.Choice(get_args(kind))
+    return settings | {"metavar" if isinstance(one, str) else "type": one for one in about}
 
 
 def protect(paths: Iterable[Path]) -> None:

@@ -35,12 +35,7 @@ movie_options = together(
 )
 @movie_options
 def plot(
-    file: Path,
-    output: Path | None,
-    formats: str,
-    only: tuple[str, ...],
-    movie: Path | None,
-    **options: Any,
+    file: Path, output: Path | None, formats: str, only: tuple[str, ...], movie: Path | None, **options: Any
 ) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
@@ -72,13 +67,7 @@ def plot(
 @click.option("--time", metavar="SECONDS", type=FiniteRange(), help="Time of the picture [largest deflections].")
 @click.option("--pictures/--no-pictures", default=None, help="PNG pictures [if PyVista can draw].")
 @movie_options
-def view(
-    file: Path,
-    output: Path | None,
-    movie: Path | None,
-    seconds: float,
-    **options: Any,
-) -> None:
+def view(file: Path, output: Path | None, movie: Path | None, seconds: float, **options: Any) -> None:
     """Write links and motions as solids: VTKHDF files for ParaView, pictures by PyVista.
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
@@ -124,7 +113,7 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     studies = {file: study_files(file) for file in results_files}
     first = results_files[0]
     path = output or (first.parent / f"{first.resolve().name}.html" if first.is_dir() else first.with_suffix(".html"))
-    solved = [file for file, found in studies.items() if not found]
-    with protected(file for found in studies.values() for file in found), reading(*solved):
+    solved = [file for file, inside in studies.items() if not inside]
+    with protected(file for inside in studies.values() for file in inside), reading(*solved):
         write_report(results_files, path)
     click.echo(path)

@@ -56,7 +56,6 @@ class Display(Watcher):
     def __init__(self) -> None:
         self._progress: Progress | None = None
         self._task: TaskID | None = None
-        self.signal = 0  # that has asked for an end
         self._title = ""
         self._began = self._last_shown = time.monotonic()
 

@@ -21,7 +21,7 @@ from ..mbs.linear.joint_conditions import translational_stiffness
 from ..mbs.model.body import Body
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
-from ..mbs.run.outcome import Details, Outcome
+from ..mbs.run.record import Details, Run
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
 from ..run.mode_search import ModeChoice
@@ -31,7 +31,7 @@ from .lines import alike, error_budget, folded, integrated, named_tables, warnin
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 
 
-def print_details(solution: Solution, results: Results, seconds: Mapping[str, float], console: Console) -> None:
+def print_details(solution: Solution, results: Results, console: Console) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     verdict = results.verdict
     rows = ((one.name, analysis_cells(results, one)) for one in verdict.analyses)
@@ -53,7 +53,7 @@ def print_details(solution: Solution, results: Results, seconds: Mapping[str, fl
     for line in control_lines(_details(solution)):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
-    for title, text in _notes(solution, seconds):
+    for title, text in _notes(solution):
         notes.add_row(title, text)
     console.print()
     console.print(notes)
@@ -74,7 +74,7 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
     yield from _control_tables(_details(solution))
 
 
-def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _notes(solution: Solution) -> Iterator[tuple[str, str]]:
     runs = {result.analysis.name: result.run for result in integrated(solution)}
     yield from (("path", note) for note in folded(solution.path_notes))
     chosen = ((name, run.statistics.integrator) for name, run in runs.items())
@@ -89,12 +89,12 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         yield "pieces", ", ".join(f"{name}: {len(body.names)}" for name, body in solution.divided.items())
     yield from (("links", note) for note in solution.notes)
     yield "accuracy", "\n".join(error_budget(solution))
-    yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
+    yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in solution.seconds.items())
     if solution.omissions:
         yield "omitted", "; ".join(solution.omissions)
 
 
-def _inversion(run: Outcome, around: AroundPath) -> str:
+def _inversion(run: Run, around: AroundPath) -> str:
     inversion = around.inversion
     assert inversion is not None
     linear, factor = inversion.linearisation, inversion.servo.factor

@@ -10,7 +10,9 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.meanings import names_of, write_record
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import body_motion, joint_motion
+from ..mbs.quantities.supply import actuator_forces
+from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES, Space
 from ..run.actuation import Actuation
 from ..run.solution import Solution
@@ -114,7 +116,7 @@ def write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces,
     group.attrs["condition_number"] = forces.condition_number
 
 
-def write_placement(group: h5py.Group, _motion: RobotMotion, placed: Placed) -> None:
+def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
     """Of an analysis: placement/, with the patches found and those spread evenly.
 
     What each reaches, and what one patch would reach anywhere.
@@ -127,35 +129,35 @@ def write_placement(group: h5py.Group, _motion: RobotMotion, placed: Placed) -> 
     write_record(group.create_group("even"), placed.even)
 
 
-def write_tracking(group: h5py.Group, motion: RobotMotion, found: TrackedPath) -> None:
+def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
     """tracking/ of an analysis: what it made small, and what that takes.
 
     Work (J) and largest power (W) of motors and of patches, what each zero asks for (V), prices of limits.
     """
     group = group.create_group("tracking")
     about = group.attrs
-    write_record(group, found)
-    for kind, prices in found.prices.items():
+    write_record(group, tracked)
+    for kind, prices in tracked.prices.items():
         for name, values in prices.items():
             if kind in ("voltage", "torque") or values.any():
                 group[f"{kind}_price/{name}"] = values
-    if (bounds := found.bounds) is not None:
+    if (bounds := tracked.bounds) is not None:
         group["bound/voltage"], group["bound/time"] = bounds.voltages, bounds.times
         group["bound/zero"] = np.stack([bounds.zeros.real, bounds.zeros.imag], axis=1)
-    for name, power in zip(("motor", "patch"), _powers(motion), strict=True):
-        about[f"{name}_work"] = float(np.diff(motion.time) @ (power[1:] + power[:-1]) / 2)
+    for name, power in zip(("motor", "patch"), _powers(run), strict=True):
+        about[f"{name}_work"] = float(np.diff(run.time) @ (power[1:] + power[:-1]) / 2)
         about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
 
 
-def _powers(motion: RobotMotion) -> tuple[Array, Array]:
+def _powers(run: Run) -> tuple[Array, Array]:
     """(T,) W of all motors, and of the modal forces of all patches."""
-    forces, motors, patches = motion.motor_forces, np.zeros_like(motion.time), np.zeros_like(motion.time)
+    forces, motors, patches = actuator_forces(run), np.zeros_like(run.time), np.zeros_like(run.time)
     assert forces is not None
     for joint, moments in forces.moments.items():
-        of_joint = motion.joint(joint)
+        of_joint = joint_motion(run, joint)
         assert of_joint is not None
         motors = motors + (moments * of_joint[1]).sum(axis=1)
     for body, F_p in forces.modal.items():
         if F_p.shape[1]:
-            patches = patches + (F_p * motion.body(body).datasets["modal_velocity"]).sum(axis=1)
+            patches = patches + (F_p * body_motion(run, body).datasets["modal_velocity"]).sum(axis=1)
     return motors, patches

@@ -59,11 +59,11 @@ class AnalysisAccess(Datasets):
         """Names of the histories of an analysis: datasets over its outputs."""
         known: dict[str, list[str]] = self.__dict__.setdefault("_histories", {})  # a walk through a file takes ms
         if analysis not in known:
-            found, outputs = known.setdefault(analysis, []), len(self.time(analysis))
+            names, outputs = known.setdefault(analysis, []), len(self.time(analysis))
 
             def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
                 if isinstance(item, h5py.Dataset) and item.shape[:1] == (outputs,) and not name.startswith("resume/"):
-                    found.append(name)
+                    names.append(name)
 
             self._file[analysis].visititems(collect)
         return list(known[analysis])

@@ -12,20 +12,11 @@ import numpy as np
 from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
+from .kinds import own_results
 from .linear import held_in_words
+from .off_path import off_path, tool_error
 from .peaks import POWER, peak_of
-from .verdict import (
-    AnalysisVerdict,
-    PatchNeed,
-    Place,
-    Settled,
-    Verdict,
-    attributes_of,
-    millimeters,
-    off_path,
-    tool_error,
-    vibrates,
-)
+from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, Verdict, millimeters, vibrates
 
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
@@ -45,7 +36,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
     motors = _motors(group, coordinates)
     units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
-    answer, feasible = _answer(group, motors, patches)
+    own, (answer, feasible) = own_results(group), _answer(group, motors, patches)
     answer = answer or ", ".join(
         f"{point} off its path by {millimeters(most)} at most, {millimeters(rms)} RMS"
         for point, most, rms in off_path(group, scene)
@@ -65,7 +56,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         tool_error=tool_error(group, scene, feasible=feasible),
         deflection=None if _ended_early(group) else _deflection(group),
         stress=None if _ended_early(group) else _stress(group),
-        margins=_margins(group),
+        margins=own.margins(own.about(group)),
         settled=_settled(group),
         held=held_in_words(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
@@ -84,7 +75,7 @@ def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasi
     """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
     if "feasibility" in group:
         return read_motors(group["feasibility"], list(coordinates))
-    found, time = {}, group["time"][()]
+    motors, time = {}, group["time"][()]
     for label, (joint, coordinate) in coordinates.items():
         entry = group.get(f"joints/{joint}")
         if entry is not None and "moment" in entry and "rate" in entry:
@@ -92,15 +83,18 @@ def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasi
 
             rate_of = "motor_rate" if "motor_rate" in entry else "rate"
             moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", rate_of))
-            found[label] = judge_motion(time, moment, rate, coordinate.limits, float(time[-1]))
+            motors[label] = judge_motion(time, moment, rate, coordinate.limits, float(time[-1]))
             if POWER in entry.attrs:
                 of_moment, of_rate = entry["moment"].attrs, entry[rate_of].attrs
-                found[label] = replace(
-                    found[label], moment=float(of_moment["peak"]), speed=float(of_rate["peak"]),
-                    power=float(entry.attrs[POWER]), moment_time=float(of_moment["peak_time"]),
+                motors[label] = replace(
+                    motors[label],
+                    moment=float(of_moment["peak"]),
+                    speed=float(of_rate["peak"]),
+                    power=float(entry.attrs[POWER]),
+                    moment_time=float(of_moment["peak_time"]),
                     rms_moment=float(of_moment["rms"]),
-                )  # fmt: skip
-    return found
+                )
+    return motors
 
 
 def _patches(entry: h5py.Group) -> PatchNeed:
@@ -114,13 +108,10 @@ def _answer(
     group: h5py.Group, motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
 ) -> tuple[str, bool | None]:
     """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
-    if loop := attributes_of(group, "control"):
-        held = f", {100 * loop['saturated']:.2g} % of the samples saturated" if loop["saturated"] else ""
-        most, rms = (millimeters(loop[f"tip_error_{key}"]) for key in ("max", "rms"))
-        error = f"tip off by {most} at most, {rms} RMS"
-        is_settled = loop["verdict"] == "stable" and np.isfinite(loop["settling_time"])
-        alone = "" if "spectral_radius" in loop else ", by the run alone"
-        return f"loop {'settled' if is_settled else loop['verdict']}{alone}: {error}{held}", None
+    own = own_results(group)
+    about = own.about(group)
+    if about and (answer := own.answer(about)):
+        return answer, None
     if "feasibility" not in group or _ended_early(group):
         return "", None
     short = dict(_short(motors, patches))
@@ -137,16 +128,8 @@ def _answer(
         means = "motors and patches" if missed.with_patches else "motor torques"
         within = " within their limits" if has_limits else ""
         return f"{means}{within} cannot do it: the path needs other forces on the links, see the warning", False
-    within, least = "within the limits that are given" if has_limits else "no limits are given", ""
-    if tracked := attributes_of(group, "tracking"):
-        off = tracked.get("without_patches", np.nan)
-        alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
-        limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
-        is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
-        is_one &= not any("range" in one.attrs for one in group["pzt"].values())
-        size = f"{tracked['least_voltage']:.3g} V" if is_one else f"{100 * tracked['least_share']:.3g} % of limits"
-        least = f"; least voltage {size}{alone}"
-    return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True
+    within = "within the limits that are given" if has_limits else "no limits are given"
+    return f"motors{' and patches' if patches else ''} can do it, {within}{own.least(group) if about else ''}", True
 
 
 def _ended_early(group: h5py.Group) -> bool:
@@ -166,30 +149,31 @@ def _short(
 
 
 def _deflection(group: h5py.Group) -> Place | None:
-    """Of all points of flexible bodies."""
     time = group["time"][()]
-    found = [_peak(point["deflection"], name, time) for name, point in group.get("points", {}).items()
-             if "deflection" in point]  # fmt: skip
-    return max((place for place in found if place[0] > 0.0), default=None)
+    places = [
+        _peak(point["deflection"], name, time)
+        for name, point in group.get("points", {}).items()
+        if "deflection" in point
+    ]
+    return max((place for place in places if place[0] > 0.0), default=None)
 
 
 def _settled(group: h5py.Group) -> Settled | None:
     """Of the point that vibrates most; None where that is next to nothing."""
     keys = ("residual", "frequency", "time_to", "tolerance")
     moving = {name: at.attrs for name, at in group.get("settling", {}).items() if vibrates(at.attrs)}
-    found = (Settled(name, *(float(about[key]) for key in keys)) for name, about in moving.items())
-    return max(found, key=lambda one: one.residual, default=None)
+    settled = (Settled(name, *(float(about[key]) for key in keys)) for name, about in moving.items())
+    return max(settled, key=lambda one: one.residual, default=None)
 
 
 def _stress(group: h5py.Group) -> Place | None:
-    """Of stress points and surfaces."""
-    time, found = group["time"][()], []
+    time, places = group["time"][()], []
     for body, entry in group.get("stress", {}).items():
         points = entry.get("points", {}).items()
-        found += [_peak(point["von_mises"], f"{body}, {name}", time) for name, point in points]
+        places += [_peak(point["von_mises"], f"{body}, {name}", time) for name, point in points]
         if "surface" in entry:
-            found.append(_peak(entry["surface/von_mises_max"], f"the surface of {body}", time))
-    return max(found, default=None)
+            places.append(_peak(entry["surface/von_mises_max"], f"the surface of {body}", time))
+    return max(places, default=None)
 
 
 def _peak(dataset: h5py.Dataset, where: str, time: Array) -> Place:
@@ -236,14 +220,9 @@ def _advice(
         inversion = 'kind = "motors-only", or ' if from_rest else ""
         tracked = "" if is_compliant else ' with kind = "tracking"'
         yield f"{inversion}patches ([[pzt]]) on the links{tracked}"
-    if asked and not attributes_of(group, "tracking").get("is_needed", True):
-        yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
-    if text := attributes_of(group, "linear").get("advice", ""):
-        yield str(text)
-    if loop := attributes_of(group, "control"):
-        yield from map(str, texts := loop.get("advice", ()))
-        if not len(texts) and loop["verdict"] not in ("stable", "not settled"):
-            yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
+    own = own_results(group)
+    if about := own.about(group):
+        yield from own.advice(about, asked)
 
 
 def _is_from_rest_to_rest(group: h5py.Group) -> bool:
@@ -254,21 +233,6 @@ def _is_from_rest_to_rest(group: h5py.Group) -> bool:
         if len(steps) and (steps[[0, -1]].max(axis=0) > AT_REST * steps.mean(axis=0)).any():
             return False
     return True
-
-
-def _margins(group: h5py.Group) -> str:
-    """Of a closed loop, by its linear model."""
-    about = attributes_of(group, "control")
-    if "gain_margin" not in about:
-        return ""
-    if about["delay_margin"] == 0.0:
-        return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
-    gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
-    texts = (
-        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow freely",
-        f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
-    )
-    return f"margins (linear model): {', '.join(texts)}"
 
 
 def _number(value: float) -> str:

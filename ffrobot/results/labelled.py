@@ -51,7 +51,6 @@ def _add(results: Datasets, analysis: str, name: str, variables: dict[str, Any],
 
 
 def _columns(results: Datasets, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
-    """Name and labels of the second dimension of a dataset (T, columns)."""
     count, part = values.shape[1], [*name.split("/"), name][1]
     known = meaning(name)
     columns = known.columns if known is not None and known.columns else name

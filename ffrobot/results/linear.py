@@ -12,6 +12,7 @@ import numpy as np
 
 from ..common.arrays import Array, ComplexArray
 from ..common.meanings import names_of, write_record
+from ..mbs.quantities.motion import body_motion, modal_rates, reported_points
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
@@ -20,7 +21,8 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.metrics import Metrics
     from ..actuation.control.observer import Estimates
     from ..mbs.analysis.operating_points import RobotAtRest
-    from ..mbs.quantities.motion import RobotMotion
+    from ..mbs.inversion.motors_only import AroundPath
+    from ..mbs.run.record import Run
 
 MATRICES = names_of("LinearModel")
 NAMES = ("state_names", "input_names", "output_names")
@@ -31,25 +33,27 @@ Shapes = Mapping[str, Mapping[str, Array]]
 """By body, what the robot's modes (T, f) do to it: displacement, turn, modal coordinates."""
 
 
-def write_linear(group: h5py.Group, motion: RobotMotion, linear: LinearModels) -> None:
+def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
     """Of an analysis: linear/, and what is held; `motion` is what it is about."""
-    n_v, space = motion.model.tree.n_v, motion.space
-    shapes = _shapes(motion, np.array([modes.motion.real for modes in linear.modes]))
-    write_joint_conditions(group, motion, linear)
+    n_v, space = run.model.tree.n_v, run.space
+    shapes = _shapes(run, np.array([modes.motion.real for modes in linear.modes]))
+    write_joint_conditions(group, run, linear)
     if space.is_plane:
-        models = (replace(model, transformation=_of_frames(motion, k) @ model.transformation[:n_v])
-                  for k, model in enumerate(linear.models))  # fmt: skip
+        models = (
+            replace(model, transformation=_of_frames(run, k) @ model.transformation[:n_v])
+            for k, model in enumerate(linear.models)
+        )
         linear = replace(linear, models=tuple(models))
     _write_models(group, linear, shapes)
 
 
-def write_joint_conditions(group: h5py.Group, motion: RobotMotion, found: LinearModels | RobotAtRest) -> None:
+def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | RobotAtRest) -> None:
     """Of an analysis, by condition of the joints (`joint_conditions`): joints_locked/ and joints_compliant/."""
-    for condition in found.conditions[0]:
-        held, own = [at[condition] for at in found.conditions], group.create_group(f"joints_{condition}")
+    for condition in details.conditions[0]:
+        held, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
         own["frequency"] = np.array([one.modes.frequency for one in held])
         own["damping_ratio"] = np.array([one.modes.damping_ratio for one in held])
-        _write_shapes(own, _shapes(motion, np.array([one.modes.motion.real for one in held])))
+        _write_shapes(own, _shapes(run, np.array([one.modes.motion.real for one in held])))
         for point in held[0].compliance:
             own[f"compliance/{point}"] = np.array([one.compliance[point] for one in held])
 
@@ -76,14 +80,14 @@ def held_in_words(group: h5py.Group) -> str:
     return "; ".join(texts)
 
 
-def _shapes(motion: RobotMotion, along_v: Array) -> Shapes:
+def _shapes(run: Run, along_v: Array) -> Shapes:
     """What modes with rates `along_v` (T, f, coordinates) do to bodies about the states of `motion`."""
-    along_v, shapes = along_v[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
+    along_v, shapes = along_v[:, :, : run.model.tree.n_v], {}  # motors behind gears come last
     T, f, n_v = along_v.shape
-    moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(T * f, n_v))
-    space, turning = motion.space, "angle" if motion.space.is_plane else "rotation"
-    for name in motion.points if T * f else ():
-        body = moving.body(name)
+    moving = replace(run, time=np.repeat(run.time, f), q=np.repeat(run.q, f, 0), v=along_v.reshape(T * f, n_v))
+    space, turning = run.space, "angle" if run.space.is_plane else "rotation"
+    for name in reported_points(run) if T * f else ():
+        body = body_motion(moving, name)
         rates = {"position": space.along(body.velocity), turning: space.about(body.angular_velocity)}
         rates["modal"] = body.modal_velocity
         shapes[name] = {key: values.reshape(T, f, *values.shape[1:]) for key, values in rates.items()}
@@ -96,17 +100,16 @@ def _write_shapes(group: h5py.Group, shapes: Shapes) -> None:
             group[f"modes/{body}/{key}"] = values
 
 
-def _of_frames(motion: RobotMotion, row: int) -> Array:
+def _of_frames(run: Run, row: int) -> Array:
     """(coordinates, n_v) rates of place, angle and modes of each body that moves in the plane, by v."""
-    n_v, space = motion.model.tree.n_v, motion.space
-    moving = replace(motion, time=np.repeat(motion.time[row], n_v), q=np.repeat(motion.q[row : row + 1], n_v, 0),
-                     v=np.eye(n_v))  # fmt: skip
-    found = []
-    for name in motion.points:
-        body = moving.body(name)
+    n_v, space = run.model.tree.n_v, run.space
+    moving = replace(run, time=np.repeat(run.time[row], n_v), q=np.repeat(run.q[row : row + 1], n_v, 0), v=np.eye(n_v))
+    rates = []
+    for name in reported_points(run):
+        body = body_motion(moving, name)
         turn = space.about(body.angular_velocity)
-        found += [space.along(body.velocity).T, turn[None], moving.modal_velocity(name).T]
-    return np.concatenate(found)
+        rates += [space.along(body.velocity).T, turn[None], modal_rates(moving, name).T]
+    return np.concatenate(rates)
 
 
 def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> None:
@@ -124,19 +127,35 @@ def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> No
         group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
     _write_shapes(group, shapes)
     group.attrs["advice"] = linear.advice
-    for k, (pair, found) in enumerate(linear.zeros.items(), 1):
-        _write_zeros(group, f"zeros/{k}", pair, found)
+    for k, (pair, zeros) in enumerate(linear.zeros.items(), 1):
+        _write_zeros(group, f"zeros/{k}", pair, zeros)
 
 
-def _write_zeros(group: h5py.Group, name: str, pair: tuple[str, ...], found: tuple[Zeros, ...]) -> None:
+def _write_zeros(group: h5py.Group, name: str, pair: tuple[str, ...], every: tuple[Zeros, ...]) -> None:
     """(T, most, 2), nan where there are fewer."""
-    values = np.full((len(found), max(len(zeros.values) for zeros in found), 2), np.nan)
-    for row, zeros in zip(values, found, strict=True):
+    values = np.full((len(every), max(len(zeros.values) for zeros in every), 2), np.nan)
+    for row, zeros in zip(values, every, strict=True):
         row[: len(zeros.values)] = np.column_stack([zeros.values.real, zeros.values.imag])
     dataset, half = group.create_dataset(name, data=values), len(pair) // 2
     dataset.attrs["columns"] = ["real", "imaginary"]
     dataset.attrs["inputs"], dataset.attrs["outputs"] = list(pair[:half]), list(pair[half:])
-    dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in found]
+    dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in every]
+
+
+def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
+    """Write zero_dynamics/ of an analysis with motors only."""
+    from ..mbs.inversion.motors_only import is_minimum_phase
+
+    entry, inversion = group.create_group("zero_dynamics"), around.inversion
+    assert inversion is not None
+    linear = inversion.linearisation
+    entry["time"] = linear.times
+    entry["zeros"] = np.stack([linear.zeros.real, linear.zeros.imag], axis=2)
+    entry.attrs["columns"] = ["real", "imaginary"]
+    entry.attrs["factor"] = inversion.servo.factor
+    entry.attrs["minimum_phase"] = is_minimum_phase(linear)
+    entry.attrs["unmet_force"] = inversion.unmet
+    entry.attrs["off_rest"] = inversion.off_rest
 
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
@@ -144,11 +163,11 @@ def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
     from ..actuation.control.linear_model import LinearModel
 
     group, time = file[f"{analysis}/linear"], file[f"{analysis}/time"][()]
-    states, inputs, outputs = (tuple(str(name) for name in group.attrs[key]) for key in NAMES)
+    names: dict[str, Any] = {key: tuple(str(name) for name in group.attrs[key]) for key in NAMES}
     models = []
     for k, t in enumerate(time):
-        A, B, C, D, mass, transformation = (np.asarray(group[key][k], dtype=float) for key in MATRICES)
-        models.append(LinearModel(A, B, C, D, states, inputs, outputs, float(t), mass, transformation))
+        matrices = {key: np.asarray(group[key][k], dtype=float) for key in MATRICES}
+        models.append(LinearModel(**names | matrices, time=float(t)))
     return tuple(models)
 
 
@@ -165,16 +184,16 @@ def save_models(models: Sequence[LinearModel], path: Path) -> None:
     save_arrays(models[0].arrays() | stacked, path)
 
 
-def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> None:
+def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
     """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
-    found, error = record.metrics, group.create_dataset("tip_error", data=record.tip_error)
-    error.attrs.update(peak=found.tip_error_max, peak_time=record.tip_error_peak_time, rms=found.tip_error_rms)
+    metrics, error = record.metrics, group.create_dataset("tip_error", data=record.tip_error)
+    error.attrs.update(peak=metrics.tip_error_max, peak_time=record.tip_error_peak_time, rms=metrics.tip_error_rms)
     group = group.create_group("control")
     write_record(group, record)
     group.attrs["inputs"] = list(record.inputs)
     group.attrs["outputs"] = list(record.outputs)
     group.attrs["warnings"] = list(record.warnings)
-    write_record(group, found)
+    write_record(group, metrics)
     group.attrs["advice"] = list(record.advice)
     if (of := record.feedback) is not None:
         for key in ("A", "B", "C", "D"):
@@ -200,17 +219,17 @@ def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
     group["pole"].attrs["columns"] = ["real", "imaginary"]
 
 
-def _write_estimates(group: h5py.Group, found: Estimates) -> None:
+def _write_estimates(group: h5py.Group, estimates: Estimates) -> None:
     """By name; of the tip also its standard deviation and its distance from the truth."""
-    for name, values in zip(found.names, found.values.T, strict=True):
+    for name, values in zip(estimates.names, estimates.values.T, strict=True):
         of, _, ending = name.rpartition("/")
         if not name.startswith("point/"):
             group[f"rate/{of}" if ending == "rate" else name] = values
-    if found.position.size:
+    if estimates.position.size:
         for key in ("position", "error", "sigma"):
-            group[f"points/{found.tip}/{key}"] = getattr(found, key)
-    group.attrs.update(nees=found.nees, inside=found.inside)
-    _write_poles(group, _by_size(found.poles))
+            group[f"points/{estimates.tip}/{key}"] = getattr(estimates, key)
+    group.attrs.update(nees=estimates.nees, inside=estimates.inside)
+    _write_poles(group, _by_size(estimates.poles))
 
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:

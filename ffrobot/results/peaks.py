@@ -11,6 +11,8 @@ import numpy as np
 from ..common.arrays import Array, Indices, as_floats
 from ..common.meanings import matches, meaning
 from ..common.peaks import largest, shares
+from ..mbs.quantities.motion import deflection, joint_motion, reported_points
+from ..mbs.quantities.supply import followed_trajectories, gear_moment, motor_moments, motor_motion, path_force
 
 if TYPE_CHECKING:  # reading can do without the core
     from ..mbs.joints.joint import JointRecord
@@ -26,15 +28,15 @@ MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
 
 def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
     """Name in its analysis and values (T, …) of all that has peaks; the moment in a joint of the plane is its own."""
-    motion, space = of.motion, of.motion.space
-    for body, labels in motion.points.items():
+    run, space = of.run, of.run.space
+    for body, labels in reported_points(run).items():
         for point in (f"{body}.{label}" for label in labels):
-            yield f"points/{point}/deflection", space.along(motion.deflection(point))
+            yield f"points/{point}/deflection", space.along(deflection(run, point))
     for joint in solution.scene.joint:
         for key, values in _of_joint(solution, of, joint):
             yield f"joints/{joint.name}/{key}", values
-    for trajectory in motion.followed:
-        yield f"trajectories/{trajectory.name}/force", motion.path_force(trajectory.name)
+    for trajectory in followed_trajectories(run):
+        yield f"trajectories/{trajectory.name}/force", path_force(run, trajectory.name)
     for body, forces in of.point_forces.items():
         yield f"actuation_points/{body}/force", forces.force
     for body, stress in of.stresses.items():
@@ -48,13 +50,13 @@ def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
 
 
 def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator[tuple[str, Array]]:
-    motion, acting, is_single = of.motion, of.reactions[joint.name], len(joint.units) == 1
-    yield "reaction", motion.space.along(acting.force)
-    if not (motion.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
-        yield "reaction_moment", motion.space.about(acting.moment)
-    if (found := motion.joint(joint.name)) is not None:
-        yield "rate", np.squeeze(found[1], 1) if is_single else found[1]
-    moment, motor = motion.motor_moments.get(joint.name), motion.motor_motion(joint.name)
+    run, acting, is_single = of.run, of.reactions[joint.name], len(joint.units) == 1
+    yield "reaction", run.space.along(acting.force)
+    if not (run.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
+        yield "reaction_moment", run.space.about(acting.moment)
+    if (moving := joint_motion(run, joint.name)) is not None:
+        yield "rate", np.squeeze(moving[1], 1) if is_single else moving[1]
+    moment, motor = motor_moments(run).get(joint.name), motor_motion(run, joint.name)
     if moment is not None and joint in solution.scene.motor_joints:
         moment = np.squeeze(moment, 1) if is_single else moment
         yield "moment", moment
@@ -62,7 +64,7 @@ def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator
             yield "motor_moment", moment / (joint.given_gear_ratio or 1.0)
     if motor is not None:
         yield "motor_rate", motor[1]
-    if (moment := motion.gear_moment(joint.name)) is not None:
+    if (moment := gear_moment(run, joint.name)) is not None:
         yield "gear_moment", moment
 
 
@@ -82,13 +84,13 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
     return largest(time, np.linalg.norm(values, axis=1) if is_vector else np.abs(values).max(axis=1))
 
 
-def write_peaks(group: h5py.Group, time: Array, found: Mapping[str, Array], outputs: Indices) -> None:
-    """To an analysis histories `found` at `time` (T,), s: those of them that are outputs, and peaks of all.
+def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], outputs: Indices) -> None:
+    """To an analysis `histories` at `time` (T,), s: those of them that are outputs, and peaks of all.
 
     Attributes `peak`, `peak_time`, `rms`, `mean` are of every column, of vectors of the length.
     """
     weights = shares(time)
-    for name, values in found.items():
+    for name, values in histories.items():
         dataset = group.create_dataset(name, data=values[outputs])
         if len(time):
             columns = as_floats(values.reshape(len(time), -1))
@@ -102,7 +104,7 @@ def write_peaks(group: h5py.Group, time: Array, found: Mapping[str, Array], outp
                 dataset.attrs[key] = sizes[0] if len(sizes) == 1 else sizes
     for name, joint in group.get("joints", {}).items():
         of = f"joints/{name}/"
-        moment, rate = found.get(of + "moment"), found.get(of + "motor_rate", found.get(of + "rate"))
+        moment, rate = histories.get(of + "moment"), histories.get(of + "motor_rate", histories.get(of + "rate"))
         if moment is not None and rate is not None and len(time):
             power = (moment * rate).reshape(len(time), -1).sum(axis=1)
             joint.attrs[MEAN_POWER], joint.attrs[RMS_POWER] = weights @ power, np.sqrt(weights @ power**2)

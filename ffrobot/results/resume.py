@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,8 +24,9 @@ from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
 from ..common.version import VERSION
 from ..mbs import _core
+from ..mbs.model.model import Model
 from ..mbs.run.integrators import Choice
-from ..mbs.run.outcome import Continuation, EarlierRun, Motion, Outcome, Statistics
+from ..mbs.run.record import Continuation, Run, Statistics
 from ..mbs.scene.analysis import Analysis
 from ..run.bodies import LoadedBody
 from ..run.inputs import digest_of_file, named_files, python_files
@@ -57,7 +58,7 @@ def left_out(solution: Solution) -> list[str]:
     return [one.name for one in solution.scene.analysis if one.name not in solution.outcomes]
 
 
-def stopped(solution: Solution) -> Outcome | None:
+def stopped(solution: Solution) -> Run | None:
     """The analysis that was stopped."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
 
@@ -67,10 +68,10 @@ MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> None:
     """Raise `InputError` naming the first thing that is not as it was."""
-    found = next(_changes(scene, bodies, file), None)
-    if found is not None:
+    change = next(_changes(scene, bodies, file), None)
+    if change is not None:
         raise InputError(
-            f"{file.path}: resume: expected results of the same input, found that {found} has changed; solve it from"
+            f"{file.path}: resume: expected results of the same input, found that {change} has changed; solve it from"
             " the start, or undo the change"
         )
 
@@ -112,8 +113,8 @@ def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()
         inner = ((k, *pair) for k, pair in enumerate(zip(then, now, strict=True)))
     else:
         return loc
-    found = (_first_difference(old, new, (*loc, key)) for key, old, new in inner)
-    return next((place for place in found if place is not None), loc)
+    places = (_first_difference(old, new, (*loc, key)) for key, old, new in inner)
+    return next((place for place in places if place is not None), loc)
 
 
 def write_input_files(file: h5py.File, scene: Scene) -> None:
@@ -121,8 +122,8 @@ def write_input_files(file: h5py.File, scene: Scene) -> None:
     file.attrs["input_files"] = json.dumps(input_files(scene))
     folder = scene.path.parent
     if python := python_files(tomllib.loads(scene.text), folder):
-        found = imported_files(folder, *(file.parent for file in python), *allowed_python())
-        names = {os.path.relpath(file, folder.resolve()): digest for file, digest in found.items()}
+        imported = imported_files(folder, *(file.parent for file in python), *allowed_python())
+        names = {os.path.relpath(file, folder.resolve()): digest for file, digest in imported.items()}
         file.attrs["imported_files"] = json.dumps(names)
 
 
@@ -137,13 +138,15 @@ def input_files(scene: Scene) -> dict[str, str]:
 
 ROWS = ("q", "v", "a", "multipliers")
 KEPT: dict[str, type[_core.TreeCheckpoint | _core.Recording | _core.Samples]] = {
-    "checkpoint": _core.TreeCheckpoint, "recording": _core.Recording, "samples": _core.Samples
-}  # fmt: skip
+    "checkpoint": _core.TreeCheckpoint,
+    "recording": _core.Recording,
+    "samples": _core.Samples,
+}
 """What a `Continuation` may have, as bytes of the core."""
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 
 
-def write_earlier_run(group: h5py.Group, outcome: Outcome) -> None:
+def write_earlier_run(group: h5py.Group, outcome: Run) -> None:
     """What the next step of a run depends on, and its numbers that results files do not hold anyway."""
     assert outcome.continuation is not None
     for name in ROWS:
@@ -153,29 +156,35 @@ def write_earlier_run(group: h5py.Group, outcome: Outcome) -> None:
             group[name] = np.frombuffer(kept.to_bytes(), dtype=np.uint8)
 
 
-def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, EarlierRun]:
-    """Of those `analyses` of which something was kept, by name.
+def earlier_runs(file: Results, solution: Solution) -> dict[str, Run]:
+    """The kept runs of the analyses of a solution, by name.
 
     A run that was stopped before its first step begins anew: what acts on it may not have been known yet.
     """
-    found = {}
-    for one in analyses:
+    runs = {}
+    for one in solution.scene.analysis:
         about = file.attributes(one.name) if file.has(f"{one.name}/{GROUP}") else None
         if about is not None and (about["steps"] > 0 or about["status"] == "completed"):
-            found[one.name] = _earlier_run(file, one)
-    return found
+            runs[one.name] = _earlier_run(file, one, solution.model)
+    return runs
 
 
-def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
-    """The run of `analysis` as far as it got."""
+def _earlier_run(file: Results, analysis: Analysis, model: Model) -> Run:
     name, about, group = analysis.name, file.attributes(analysis.name), f"{analysis.name}/{GROUP}"
     q, v, a, multipliers = (file[f"{group}/{row}"] for row in ROWS)
     counts = {count: about[count].item() for count in COUNTS}
     ends = file[f"{name}/step_ends"] if file.has(f"{name}/step_ends") else np.zeros(0)
-    return EarlierRun(
-        Motion(file.time(name), q, v, a, multipliers),
-        Statistics(about["status"], Choice(about["integrator"], about["integrator_reason"]), **counts, step_ends=ends),
-        _continuation(file, group),
+    choice = Choice(about["integrator"], about["integrator_reason"])
+    return Run(
+        analysis=analysis,
+        model=model,
+        time=file.time(name),
+        q=q,
+        v=v,
+        a=a,
+        multipliers=multipliers,
+        statistics=Statistics(about["status"], choice, **counts, step_ends=ends),
+        continuation=_continuation(file, group),
     )
 
 
@@ -204,7 +213,7 @@ def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Kee
             return None
         if solution.scene.geometric_stiffening == "auto" and file.attributes("/")["geometric_stiffening"]:
             solution = with_stiffening(solution)
-        solution = replace(solution, earlier=earlier_runs(file, solution.scene.analysis))
+        solution = replace(solution, earlier=earlier_runs(file, solution))
     return run_analyses(solution, watcher, keep)
 
 

@@ -5,22 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from ..common.structs import struct
-from .actuators import read_unsupplied
-from .joints import Scene
 
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
 
 ROUND_OFF = 1e-9  # m, N·m, rad/s, W: numbers below it are rounding
-
-
-def attributes_of(group: h5py.Group, part: str) -> Mapping[str, Any]:
-    """Attributes of a part of an analysis; none where it has no such part."""
-    return group[part].attrs if part in group else {}
 
 
 def number(value: float) -> str:
@@ -31,10 +23,6 @@ def number(value: float) -> str:
 def millimeters(value: float, digits: int = 4) -> str:
     """A length `value` in m as text in mm."""
     return f"{1e3 * value:.{digits}g} mm" if value >= ROUND_OFF else f"< {1e9 * ROUND_OFF:g} nm"
-
-
-AXES = "xyz"
-SAME_TIME = 9  # digits of output times (s) that count
 
 
 @struct
@@ -51,52 +39,6 @@ class ToolError:
     controlled: float | None = None
     open_loop: float | None = None
     growth: float = 0.0
-
-
-def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
-    """Of an analysis; `feasible` as its verdict says."""
-    if loop := attributes_of(group, "control"):
-        return ToolError(controlled=float(loop["tip_error_max"]))
-    if (replayed := max((most for _, most, _ in off_path(group, scene)), default=None)) is not None:
-        return ToolError(open_loop=replayed)
-    missed = read_unsupplied(group["feasibility"]) if "feasibility" in group else None
-    if missed is not None and missed.point:
-        growth = missed.growth if np.isfinite(missed.growth) else 0.0
-        return ToolError(missed.angles_kept, missed.moments_repeated, growth)
-    if feasible and missed is None:
-        return ToolError(max((most for _, most, _ in _apart(group, group, scene)), default=None))
-    return ToolError()
-
-
-def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
-    """Of a replay: each point with its largest distance (m) from the path and the RMS, while both last.
-
-    Of points whose path was given, along the axes for which it was; of old files at outputs that both have.
-    """
-    if "off_path" in group:
-        for one in group["off_path"].values():
-            yield str(one.attrs["point"]), float(one.attrs["distance"]), float(one.attrs["distance_rms"])
-        return
-    name = str(group.attrs.get("actuation", ""))  # of an analysis that takes none: empty
-    if not name or attributes_of(group, "control"):
-        return
-    if (source := group.parent.get(name)) is not None:
-        yield from _apart(group, source, scene)
-
-
-def _apart(group: h5py.Group, source: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
-    """Points of `group` from the paths that `source` follows."""
-    times, path_times = (one["time"][()].round(SAME_TIME) for one in (group, source))
-    shared, now, then = np.intersect1d(times, path_times, return_indices=True)
-    for record in scene.get("trajectory", ()):
-        point, path = f"points/{record.get('point')}/position", f"trajectories/{record['name']}"
-        if not len(shared) or point not in group or f"{path}/target" not in source:
-            continue
-        places = [(k, AXES.index(axis)) for k, axis in enumerate(source[path].attrs["components"]) if axis in AXES]
-        target, position = source[f"{path}/target"][()][then], group[point][()][now]
-        off = np.sqrt(sum((position[:, axis] - target[:, k]) ** 2 for k, axis in places))
-        if places:
-            yield str(record["point"]), float(off.max()), float(np.sqrt(np.mean(off**2)))
 
 
 Place = tuple[float, str, float]
@@ -132,7 +74,7 @@ class Settled:
 
 @struct
 class PatchNeed:
-    """Required voltage of a body's patches over its limit (0: none), time (s), and sufficient limit (V)."""
+    """What patches of a body need, times their limit (0 without), since when (s), and a limit (V) that would do."""
 
     factor: float
     since: float
@@ -252,7 +194,6 @@ class Verdict:
 
 
 def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
-    """Peaks and RMS, with limits where it has them."""
     speed = "rad/s" if unit == "N·m" else "m/s"
     parts = [
         f"peak {of_limit(motor.moment, motor.moment_limit)} {unit}, RMS {number(motor.rms_moment)} {unit}{interval}",

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import h5py
 
@@ -17,26 +16,18 @@ from ..common.meanings import write_record
 from ..common.version import VERSION
 from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.posture.redundancy import resolving_joints
-from ..mbs.quantities.motion import RobotMotion
-from ..mbs.run.outcome import Outcome
+from ..mbs.quantities.motion import constraint_violation
+from ..mbs.run.record import Details, Run
 from ..run.solution import AnalysisResult, Solution
-from .actuators import write_feasibility, write_placement, write_point_forces, write_tracking, write_voltages
+from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
-from .linear import write_joint_conditions, write_linear, write_loop
-from .motion import write_bending, write_bodies, write_joints, write_off_path, write_paths, write_stress
+from .kinds import own_results
+from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress
+from .off_path import write_off_path
 from .peaks import peaking, write_peaks
 from .resume import write_state
 
 FORMAT_VERSION = 1
-
-DETAILS: dict[str, Callable[[h5py.Group, RobotMotion, Any], None]] = {
-    "RobotAtRest": write_joint_conditions,
-    "LinearModels": write_linear,
-    "LoopRecord": write_loop,
-    "Placed": write_placement,
-    "TrackedPath": write_tracking,
-}
-"""Writers of the datasets of each kind of analysis, by class name."""
 
 
 def write_results(solution: Solution, path: Path) -> None:
@@ -76,11 +67,11 @@ def _write_head(file: h5py.File, solution: Solution) -> None:
 
 
 def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    run, motion = result.run, result.motion
+    run = result.run
     _write_run(group, run, result.warnings, result.notes)
     _write_judgement(group, solution, result)
-    if joints := resolving_joints(motion.model):
-        group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
+    if joints := resolving_joints(run.model):
+        group.attrs.update({"redundancy": run.model.scene.redundancy, "resolved_by": joints})
     write_bodies(group, solution, result)
     write_bending(group, result.bending)
     _write_forces(group, solution, result)
@@ -89,9 +80,9 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
         write_record(group.create_group(f"patch_structure/{name}"), effect)
     for point, shift in result.predicted_shift.items():
-        group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
-    for point, found in result.settling.items():
-        write_record(group.create_group(f"settling/{point}"), found)
+        group[f"points/{point}/predicted_shift"] = run.space.along(shift)
+    for point, settled in result.settling.items():
+        write_record(group.create_group(f"settling/{point}"), settled)
     if (left := result.deviations) is not None:
         about = group.create_group("robustness")
         about.attrs["bandwidth"] = left.bandwidth
@@ -99,12 +90,12 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         for lane, values in left.lanes.items():
             about[lane] = values
     write_record(group.create_group("energy"), result.energies)
-    group["momentum/linear"] = motion.space.along(result.momentum.linear)
-    group["momentum/angular"] = motion.space.about(result.momentum.angular)
-    violation = group.create_dataset("constraint_violation", data=motion.violation)
+    group["momentum/linear"] = run.space.along(result.momentum.linear)
+    group["momentum/angular"] = run.space.about(result.momentum.angular)
+    violation = group.create_dataset("constraint_violation", data=constraint_violation(run))
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
-    if (write := DETAILS.get(type(run.details).__name__)) is not None:
-        write(group, motion, run.details)
+    if type(run.details) is not Details:
+        own_results(group).write(group, run, run.details)
     write_off_path(group, solution, result)
 
 
@@ -114,7 +105,7 @@ def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult)
     write_joints(group, solution, result)
     for body, forces in result.point_forces.items():
         points = group.create_group(f"actuation_points/{body}")
-        write_point_forces(points, solution.points[body], forces, result.motion.space)
+        write_point_forces(points, solution.points[body], forces, result.run.space)
     for body, stress in histories.stresses.items():
         write_stress(group.create_group(f"stress/{body}"), stress, histories.outputs)
     write_paths(group, result)
@@ -123,7 +114,7 @@ def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult)
     write_peaks(group, histories.run.time, dict(peaking(solution, histories)), histories.outputs)
 
 
-def _write_run(group: h5py.Group, outcome: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:
+def _write_run(group: h5py.Group, outcome: Run, warnings: Sequence[str], notes: Sequence[str]) -> None:
     """What is known of a run whether it has outputs or not: its analysis, how it went, its times and steps.
 
     `warnings` say why its results may be wrong, `notes` what is worth knowing of right ones.

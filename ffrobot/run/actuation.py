@@ -12,8 +12,8 @@ from ..common.arrays import Array, Indices
 from ..common.structs import struct
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model, modal_directions
-from ..mbs.quantities.motion import RobotMotion
-from ..mbs.scene.analysis import Analysis
+from ..mbs.quantities.supply import actuator_forces, motors_fit
+from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES
 from ..scene.scene import Scene
 from .bodies import LoadedBody
@@ -53,16 +53,16 @@ def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
         return {}
     from ..actuation.patches.link_patches import check_reach, link_patches, on_kept_modes
 
-    found = {}
+    patches = {}
     for name, layouts in by_body(scene.pzt):
         body = bodies[name]
         assert body.modal is not None
         of_link = link_patches(scene.path, layouts, body.modal, body.carrying)
-        found[name] = on_kept_modes(of_link, body.spatial)
+        patches[name] = on_kept_modes(of_link, body.spatial)
     if scene.trajectory and any(analysis.allocates_patches for analysis in scene.analysis):
-        for of_link in found.values():
+        for of_link in patches.values():
             check_reach(scene.path, of_link)
-    return found
+    return patches
 
 
 def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
@@ -85,24 +85,17 @@ def given_voltages(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator
             yield from map(Drive, directions, load.voltage or ())
 
 
-def find_actuation(
-    scene: Scene,
-    motion: RobotMotion,
-    analysis: Analysis,
-    bodies: Bodies,
-    patches: Mapping[str, LinkPatches],
-    known: Mapping[str, Array],
-) -> Actuation:
+def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:
     """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it.
 
     Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
-    `known`: voltages (T, k) by body, V.
     """
     from ..actuation.feasibility import find_unmet, judge_actuators, links_in_motion
 
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
-    links = links_in_motion(motion, flexible)
+    links = links_in_motion(run, flexible)
     voltages: dict[str, Voltages] = {}
+    analysis, known = run.analysis, run.voltages
     for name, of_link in patches.items():
         F_p = links[name].F_p
         voltages |= of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
@@ -112,13 +105,15 @@ def find_actuation(
         others |= links.keys()
     if analysis.supplies_all:
         others |= links.keys()
-    judged = judge_actuators(scene.path, motion, links, patches, voltages, analysis, others)
+    judged = judge_actuators(
+        path=scene.path, run=run, links=links, patches=patches, voltages=voltages, analysis=analysis, others=others
+    )
     return Actuation(voltages, unmet, judged)
 
 
-def missing_forces(motion: RobotMotion, actuation: Actuation) -> dict[str, Array]:
+def missing_forces(run: Run, actuation: Actuation) -> dict[str, Array]:
     """By body, modal forces (T, n), modes of its file, that nothing supplies; none where nothing is missing."""
-    forces = motion.motor_forces
-    if forces is None or not motion.motors_fit or not (actuation.unmet or actuation.feasibility.unsupplied):
+    forces = actuator_forces(run)
+    if forces is None or not motors_fit(run) or not (actuation.unmet or actuation.feasibility.unsupplied):
         return {}
     return {**forces.modal, **actuation.unmet}

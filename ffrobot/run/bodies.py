@@ -143,9 +143,14 @@ def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str]
             raise InputError(f'tool: name: expected one that no point of "{made.name}" has, found "{tool.name}"')
         made = with_tool(made, tool)
     return LoadedBody(
-        spatial=made, carrying=made, modal=modal, path=path, computed=computed, reused=reused,
+        spatial=made,
+        carrying=made,
+        modal=modal,
+        path=path,
+        computed=computed,
+        reused=reused,
         motions=IN_PLANE if scene.is_planar else FAMILIES,
-    )  # fmt: skip
+    )
 
 
 def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:

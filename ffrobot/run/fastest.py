@@ -45,10 +45,10 @@ class Search:
     def keeps_limits(self, stretch: float) -> bool:
         """Whether the motion at this stretch does."""
         if stretch not in self.tried:
-            found = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
-            factors = {"no motion along the path": inf} if found is None else found.factors
+            feasibility = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
+            factors = {"no motion along the path": inf} if feasibility is None else feasibility.factors
             self.tried[stretch] = max((factor, name) for name, factor in factors.items())
-            motors = {} if found is None else found.motors
+            motors = {} if feasibility is None else feasibility.motors
             self.too_weak = tuple(name for name, one in motors.items() if one.static_moment > one.moment_limit)
         return self.tried[stretch][0] <= KEPT
 
@@ -60,8 +60,8 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
     """
     search = Search(scene, judging(scene), judge)
     least, most = _bounds(scene, search.analysis)
-    found = least_stretch(search.keeps_limits, least, most)
-    if found is None:
+    stretch = least_stretch(search.keeps_limits, least, most)
+    if stretch is None:
         factor, name = search.tried[most]
         helps = (
             "No slower path helps, as torques at rest exceed limits: less load, or another motor or gear for"
@@ -74,11 +74,11 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
             f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, with required/available ='
             f" {factor:.3g} at stretch = {most:.4g}. {helps}"
         )
-    factor, name = search.tried[found]
+    factor, name = search.tried[stretch]
     at = f"{name} is at {100 * factor:.3g} % of its limit"
-    limit = at if found > least else f"the keys of the path limit it, and {at}"
-    note = f"{_names(scene)}: fastest at stretch = {found:.4g}, where {limit}; {len(search.tried)} motions tried"
-    return stretched(scene, found), note
+    limit = at if stretch > least else f"the keys of the path limit it, and {at}"
+    note = f"{_names(scene)}: fastest at stretch = {stretch:.4g}, where {limit}; {len(search.tried)} motions tried"
+    return stretched(scene, stretch), note
 
 
 def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: float) -> float | None:
@@ -176,23 +176,23 @@ def _shaped(scene: Scene, model: Model) -> tuple[Scene, Notes]:
     if not asking:
         return scene, of_tables
     begin, end = _span(scene)
-    found = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
-    shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, found) for name, shaper in asking.items()}
+    frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
+    shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, frequencies) for name, shaper in asking.items()}
     changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
-    of_shapers: Notes = tuple(f"{name}: {_in_words(shaper, found)}" for name, shaper in asking.items())
+    of_shapers: Notes = tuple(f"{name}: {_in_words(shaper, frequencies)}" for name, shaper in asking.items())
     return scene.model_copy(update={"trajectory": tuple(changed)}), (*of_tables, *of_shapers)
 
 
-def _for_robot(shaper: Shaper, found: PathFrequencies) -> Shaper:
+def _for_robot(shaper: Shaper, frequencies: PathFrequencies) -> Shaper:
     """The shaper for the mean frequencies and damping along the path."""
-    frequency = tuple(found.frequency[:, : shaper.modes].mean(axis=0).tolist())
-    damping_ratio = float(found.damping_ratio[:, : shaper.modes].mean())
+    frequency = tuple(frequencies.frequency[:, : shaper.modes].mean(axis=0).tolist())
+    damping_ratio = float(frequencies.damping_ratio[:, : shaper.modes].mean())
     given = shaper.damping_ratio
     return Shaper(kind=shaper.kind, frequency=frequency, damping_ratio=damping_ratio if given is None else given)
 
 
-def _in_words(shaper: Shaper, found: PathFrequencies) -> str:
-    ranges = (f"{f.mean():.4g} Hz ({f.min():.4g} to {f.max():.4g} along the path)" for f in found.frequency.T)
+def _in_words(shaper: Shaper, frequencies: PathFrequencies) -> str:
+    ranges = (f"{f.mean():.4g} Hz ({f.min():.4g} to {f.max():.4g} along the path)" for f in frequencies.frequency.T)
     return f"{shaper.kind} shaper for {', '.join(list(ranges)[: shaper.modes])}"
 
 

@@ -22,9 +22,9 @@ from ..mbs.model.known_motion import State
 from ..mbs.model.model import Model, without_paths
 from ..mbs.posture.redundancy import resolved
 from ..mbs.posture.start import undeformed_posture
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import section_motion
 from ..mbs.run.drive import drive_robot
-from ..mbs.run.outcome import Outcome
+from ..mbs.run.record import Run
 from ..mbs.run.replay import replay_times, supplied
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.bodies import BodyKeys
@@ -102,7 +102,7 @@ def _twice_as_many(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:
     return keys | {"modes": modes | {"count": 2 * modal.eigenmode_count}, "damping": damping}
 
 
-def _check(solution: Solution, source: Outcome, finer: Solution, watcher: Watcher) -> FinerCheck:
+def _check(solution: Solution, source: Run, finer: Solution, watcher: Watcher) -> FinerCheck:
     """Replay `source`, a run of `solution`, on the same robot with finer links."""
     scene = solution.scene
     if not source.model.motors or finer.model.tree.gears or any(getattr(j, "stiffness", None) for j in scene.joint):
@@ -122,22 +122,24 @@ def _check(solution: Solution, source: Outcome, finer: Solution, watcher: Watche
     return FinerCheck(modes, worst, errors[worst], run.status, open_loop_growth(source), least)
 
 
-def _drives(solution: Solution, source: Outcome, finer: Solution) -> Drives:
-    """What the source found of moments and voltages, on the finer links."""
+def _drives(solution: Solution, source: Run, finer: Solution) -> Drives:
     bends = "joints+pzt" in source.analysis.applicable
     patches, on_finer = (of.patches if bends else {} for of in (solution, finer))
-    found = supplied(source, largest_moments(source.model, limits=False), patches, limited=False)
-    return Drives(replayed=Replayed(found, actuator_commands(finer.model, on_finer)))
+    source_forces = supplied(source, largest_moments(source.model, limits=False), patches, limited=False)
+    return Drives(replayed=Replayed(source_forces, actuator_commands(finer.model, on_finer)))
 
 
-def _replayed(source: Outcome, finer: Model, drives: Drives, watcher: Watcher) -> Outcome:
+def _replayed(source: Run, finer: Model, drives: Drives, watcher: Watcher) -> Run:
     """Forward dynamics of the finer robot under moments of its motors and voltages of its patches."""
     given = source.analysis
     assert isinstance(given, TimedAnalysis)
     analysis = Forward(
-        name=f"check of {given.name}", kind="forward", end=given.end, output_step=given.output_step,
+        name=f"check of {given.name}",
+        kind="forward",
+        end=given.end,
+        output_step=given.output_step,
         tolerance=max(given.tolerance, TIGHTEST),
-    )  # fmt: skip
+    )
     end = float(source.time[-1])
 
     def progress(t: float) -> bool:
@@ -147,7 +149,7 @@ def _replayed(source: Outcome, finer: Model, drives: Drives, watcher: Watcher) -
     return drive_robot(without_paths(finer), analysis, _start(source, finer), progress, drives=drives, times=times)
 
 
-def _start(source: Outcome, finer: Model) -> State:
+def _start(source: Run, finer: Model) -> State:
     """Where the source starts: on its trajectories, or of motors alone with their coordinates.
 
     Links are in equilibrium there, or undeformed where those of the source are.
@@ -163,7 +165,7 @@ def _start(source: Outcome, finer: Model) -> State:
     return static_equilibrium(model, start) if is_bent else start
 
 
-def _as_in(source: Outcome, model: Model) -> Array:
+def _as_in(source: Run, model: Model) -> Array:
     """Q (n_q,) of `model`, links undeformed, with the joints where `source` has them at its start."""
     q = np.zeros(model.tree.n_q)
     for node, other in zip(model.tree.nodes, source.model.tree.nodes, strict=True):
@@ -171,9 +173,7 @@ def _as_in(source: Outcome, model: Model) -> Array:
     return q
 
 
-def _distance(source: Outcome, run: Outcome, point: str) -> float:
-    """The largest, m, between where the two runs have a point."""
-    motions = (RobotMotion(one.model, one.time, one.q, one.v, one.a, one.multipliers) for one in (source, run))
-    path, found = (motion.point(point).position for motion in motions)
-    rows = min(len(path), len(found))
-    return float(np.linalg.norm(path[:rows] - found[:rows], axis=1).max(initial=0.0))
+def _distance(source: Run, run: Run, point: str) -> float:
+    path, replayed = (section_motion(one, point).r for one in (source, run))
+    rows = min(len(path), len(replayed))
+    return float(np.linalg.norm(path[:rows] - replayed[:rows], axis=1).max(initial=0.0))

@@ -70,8 +70,8 @@ def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
     By the file's name, and `PROGRAM` for the version. TOML files count by their tables: comments change nothing.
     """
     files = dict.fromkeys(named_files(dict(scene), path.parent))
-    found = {PROGRAM: VERSION, str(path): digest_of_tables(scene)}
-    return found | {os.path.normpath(file): digest_of_file(file) for file in files}
+    prints = {PROGRAM: VERSION, str(path): digest_of_tables(scene)}
+    return prints | {os.path.normpath(file): digest_of_file(file) for file in files}
 
 
 def digest_of_tables(tables: Mapping[str, Any]) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
+from ..mbs.quantities.motion import point_motion
+from ..mbs.quantities.supply import followed_trajectories, motor_moments, path_force
 from ..scene.scene import Scene
 from .bodies import LoadedBody
 from .solution import AnalysisResult
@@ -23,24 +25,24 @@ ALIKE = 1e-9  # of ω²: of a round link, both planes of bending
 
 def reported_modes(result: AnalysisResult) -> Reported:
     """Everything of an analysis whose error counts; moments on joints and paths as forces at the arm of a link."""
-    motion = result.motion
-    nodes = [node for node in motion.model.tree.nodes if node.body.n_modes]
+    run = result.run
+    nodes = [node for node in run.model.tree.nodes if node.body.n_modes]
     size = max((node.body.length or 0.0 for node in nodes), default=0.0) or 1.0
     forces: dict[str, Array] = {}
-    for trajectory in motion.followed:
-        found, places = motion.path_force(trajectory.name), len(trajectory.components)
-        forces[f"trajectory {trajectory.name}"] = found[:, :places]
-        forces[f"trajectory {trajectory.name}, moment"] = as_floats(found[:, places:] / size)
+    for trajectory in followed_trajectories(run):
+        force, places = path_force(run, trajectory.name), len(trajectory.components)
+        forces[f"trajectory {trajectory.name}"] = force[:, :places]
+        forces[f"trajectory {trajectory.name}, moment"] = as_floats(force[:, places:] / size)
     for joint, acting in result.reactions.items():
         forces[f"joint {joint}"], forces[f"joint {joint}, moment"] = acting.force, as_floats(acting.moment / size)
     found_by_kind = {
         "deflections": {
-            f"{node.body.name}.{label}": motion.point(f"{node.body.name}.{label}").deflection
+            f"{node.body.name}.{label}": point_motion(run, f"{node.body.name}.{label}").deflection
             for node in nodes
             for label in node.body.points
         },
         "forces": {name: values for name, values in forces.items() if values.size},
-        "motors": motion.motor_moments,
+        "motors": motor_moments(run),
         "voltages": {}
         if result.actuation is None
         else {name: of.required for name, of in result.actuation.voltages.items()},
@@ -66,7 +68,7 @@ def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str
     auto = {name: whole[name] for name, modes in wanted.items() if modes == "auto"}
     if not auto:
         return [fixed]
-    found: list[dict[str, Body]] = []
+    levels: list[dict[str, Body]] = []
     squares = np.sort(_counted(scene, {name: bodies[name] for name in auto}))
     each = 1
     while each * len(auto) < len(squares):
@@ -77,10 +79,10 @@ def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str
         }
         if all(body.reduction is None for body in level.values()):
             break
-        found.append(fixed | level)
+        levels.append(fixed | level)
         each = int(np.ceil(GROWTH * each))
-    found.append(fixed | auto)
-    return found
+    levels.append(fixed | auto)
+    return levels
 
 
 def _counted(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Array:

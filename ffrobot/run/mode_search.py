@@ -102,7 +102,7 @@ def _remaining(ratio: float) -> float:
 
 def difference(now: Reported, before: Reported) -> dict[str, float]:
     """By kind, the largest difference of two solves relative to the peak of its quantity."""
-    found = {}
+    errors = {}
     for kind, quantities in now.items():
         peaks = {name: np.abs(values).max(initial=0.0) for name, values in quantities.items()}
         floor = max(SMALLEST * max(peaks.values(), default=0.0), 1e-300)
@@ -110,8 +110,8 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
             float(np.abs(values - before[kind][name]).max(initial=0.0) / max(peaks[name], floor))
             for name, values in quantities.items()
         ]
-        found[kind] = max(changes, default=0.0)
-    return found
+        errors[kind] = max(changes, default=0.0)
+    return errors
 
 
 class ModeSearch:
@@ -151,7 +151,6 @@ class ModeSearch:
 
     @property
     def _more(self) -> int:
-        """How many levels there are with more modes."""
         return len(self._levels) - 1 - self._level
 
     def choice(self) -> ModeChoice:

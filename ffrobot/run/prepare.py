@@ -45,8 +45,8 @@ def with_bodies(solution: Solution, spatial: Mapping[str, Body]) -> Solution:
     """The scene with some of its bodies replaced, nothing solved yet. Raises `InputError` as `made_solution`."""
     scene, divided = solution.scene, solution.divided
     bodies, parts = (_with_equations(of, spatial) for of in (solution.bodies, solution.parts))
-    found, points = make_patches(scene, bodies), points_3d(scene, bodies)
-    patches = {name: solution.patches[name] if name in divided else of_link for name, of_link in found.items()}
+    made, points = make_patches(scene, bodies), points_3d(scene, bodies)
+    patches = {name: solution.patches[name] if name in divided else of_link for name, of_link in made.items()}
     bodies, parts = (_with_points(of, points) for of in (bodies, parts))
     return _unsolved(replace(solution, bodies=bodies, parts=parts, patches=patches, points=points))
 
@@ -56,7 +56,6 @@ def _with_equations(bodies: Bodies, spatial: Mapping[str, Body]) -> Bodies:
 
 
 def _with_points(bodies: Bodies, points: Mapping[str, PointSet]) -> Bodies:
-    """With actuation points among their points."""
     return {
         name: replace(body, spatial=with_points(body.spatial, points[name])) if name in points else body
         for name, body in bodies.items()
@@ -161,6 +160,8 @@ def _known_between(scene: Scene, bodies: Mapping[str, Body], links: Iterable[tup
     """
     at = [point for reference in scene.references() if (point := reference.body_and_point) is not None]
     between = {
-        body for body, point in at if (found := bodies[body].stiffening) is not None and point not in found.K_points
+        body
+        for body, point in at
+        if (stiffening := bodies[body].stiffening) is not None and point not in stiffening.K_points
     }
     return {name for names in links if between.isdisjoint(names) for name in names}

@@ -24,7 +24,7 @@ from ..mbs.model.gears import elastic_joints
 from ..mbs.model.known_motion import State, mass_matrices
 from ..mbs.model.model import Model, build_model, without_paths
 from ..mbs.run.context import place_of
-from ..mbs.run.outcome import Outcome
+from ..mbs.run.record import Run
 from ..mbs.scene.loads import Load
 from ..mbs.scene.robustness import Robustness
 from ..scene.scene import Scene
@@ -54,7 +54,7 @@ def robust(scene: Scene) -> Scene:
     return scene.model_copy(update={"analysis": tuple(changed)})
 
 
-def deviations(context: ActuatedContext, source: Outcome) -> Deviations:
+def deviations(context: ActuatedContext, source: Run) -> Deviations:
     """Of the result of an analysis that asks for them. Raises `InputError` for robots with compliant gears."""
     asked: Robustness = source.analysis.robustness  # type: ignore[attr-defined]
     if elastic_joints(context.model):
@@ -70,7 +70,7 @@ def deviations(context: ActuatedContext, source: Outcome) -> Deviations:
     forces = asked.force * np.eye(3)[: 2 if nominal.scene.is_planar else 3]
     robots[f"{asked.force:g} N at the tip"] = [_with_force(nominal, runs.points[-1], force) for force in forces]
 
-    def lane(run: Callable[[Model], Outcome], *, is_sampled: bool) -> Array:
+    def lane(run: Callable[[Model], Run], *, is_sampled: bool) -> Array:
         """Those that are sampled anyhow have no first row."""
         first = [np.nan] if is_sampled else [runs.worst(run, [nominal]), runs.worst(runs.held, [nominal])]
         return np.array(first + [runs.worst(run, of) for of in list(robots.values())[len(first) :]])
@@ -107,7 +107,7 @@ def _with_force(model: Model, point: str, force: Array) -> Model:
 class _Runs:
     """Simulations of other robots under what `source` found."""
 
-    def __init__(self, context: ActuatedContext, source: Outcome, asked: Robustness) -> None:
+    def __init__(self, context: ActuatedContext, source: Run, asked: Robustness) -> None:
         given, scene = source.analysis, context.model.scene
         self.context = replace(context, outcomes={**context.outcomes, given.name: source}, earlier=None)
         self.source, self.asked = source, asked
@@ -117,9 +117,12 @@ class _Runs:
         lowest = [float(node.body.stiffness.min()) ** 0.5 for node in source.model.tree.nodes if node.body.n_modes]
         self.bandwidth = asked.bandwidth or 0.5 * min(lowest, default=2.0 / asked.sample_time)
         self.keys = {
-            "name": "robustness", "actuation": given.name, "end": given.last_time,
-            "output_step": getattr(given, "output_step", 0.0), "tolerance": min(given.tolerance, LOOSEST),
-        }  # fmt: skip
+            "name": "robustness",
+            "actuation": given.name,
+            "end": given.last_time,
+            "output_step": getattr(given, "output_step", 0.0),
+            "tolerance": min(given.tolerance, LOOSEST),
+        }
         self.wanted = [_positions(source, point) for point in self.points]
         self.controller = self._controller()
 
@@ -143,22 +146,22 @@ class _Runs:
         encoders = [Sensor(joint=joint, resolution=self.asked.resolution) for joint in motors]
         return {"controller": (pid,), "sensor": tuple(encoders)}
 
-    def replayed(self, model: Model) -> Outcome:
+    def replayed(self, model: Model) -> Run:
         """Under the torques and voltages of the source, at any time."""
         return self._run(Forward.model_validate({**self.keys, "kind": "forward", "apply": self.applied}), model)
 
-    def controlled(self, model: Model, part: str = "") -> Outcome:
+    def controlled(self, model: Model, part: str = "") -> Run:
         """Sampled, with the controller of the joints."""
         return self.held(model, part, self.controller)
 
-    def held(self, model: Model, part: str = "", controller: Mapping[str, Any] | None = None) -> Outcome:
+    def held(self, model: Model, part: str = "", controller: Mapping[str, Any] | None = None) -> Run:
         """Sampled, with a controller beside them or without."""
         keys = {"kind": "closed-loop", "sample_time": self.asked.sample_time, "feed_forward": part or self.applied}
         return self._run(ClosedLoop.model_validate({**self.keys, **keys, **(controller or {})}), model)
 
-    def _run(self, analysis: Any, model: Model) -> Outcome:
+    def _run(self, analysis: Any, model: Model) -> Run:
         run = analysis.run(replace(self.context, model=model, start=self._start(model)))
-        assert isinstance(run, Outcome)
+        assert isinstance(run, Run)
         return run
 
     def _start(self, model: Model) -> State | None:
@@ -173,23 +176,23 @@ class _Runs:
             replace(alone, rows=(*alone.rows, *locked_motors(alone, q))), State(q, 0.0 * source.v[0])
         )
 
-    def worst(self, run: Callable[[Model], Outcome], robots: Sequence[Model]) -> float:
+    def worst(self, run: Callable[[Model], Run], robots: Sequence[Model]) -> float:
         """The largest distance, m, of the followed points from where they are to be; infinite where a run fails."""
         most = 0.0
         for robot in robots:
             try:
-                found = run(robot)
+                simulated = run(robot)
             except SolveError:
                 return np.inf
-            if found.failed or len(found.time) < len(self.source.time):
+            if simulated.failed or len(simulated.time) < len(self.source.time):
                 return np.inf
             offs = (
-                np.linalg.norm(_positions(found, p) - at, axis=1)
+                np.linalg.norm(_positions(simulated, p) - at, axis=1)
                 for p, at in zip(self.points, self.wanted, strict=True)
             )
             most = max(most, *(float(off.max()) for off in offs))
         return most
 
 
-def _positions(run: Outcome, point: str) -> Array:
+def _positions(run: Run, point: str) -> Array:
     return run.model.tree.places(run.q).at(run.model.tree.section(point)).r

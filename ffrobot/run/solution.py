@@ -28,14 +28,14 @@ from ..mbs.quantities.attachment_error import (
     start_jolt,
     start_of_motion,
 )
-from ..mbs.quantities.motion import Energies, Momentum, RobotMotion
 from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing
 from ..mbs.quantities.settling import Settling
 from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.supply import Energies, Momentum, gear_motions
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.run.gears import unresolved_gears
-from ..mbs.run.outcome import EarlierRun, Outcome
+from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
@@ -87,7 +87,7 @@ class Histories:
     """What has peaks, at outputs of an analysis and at times between them.
 
     Attributes:
-        run, motion: at these times.
+        run: at these times.
         outputs: (T,) which of the times are outputs.
         reactions: forces in joints by name.
         actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
@@ -95,8 +95,7 @@ class Histories:
         point_forces: at actuation points, by body.
     """
 
-    run: Outcome
-    motion: RobotMotion
+    run: Run
     outputs: Indices
     reactions: Mapping[str, Wrench]
     actuation: Actuation | None
@@ -109,8 +108,7 @@ class AnalysisResult:
     """What was computed of one analysis.
 
     Attributes:
-        run: how it went, and states.
-        motion: what is read off them.
+        run: its motion, with forces that redundant constraints share, and how it went.
         energies, momentum: of the robot.
         histories: what has peaks.
         point_forces: at actuation points, by body.
@@ -122,8 +120,7 @@ class AnalysisResult:
         deviations: what is left of it where the robot is not its model, where that is asked for.
     """
 
-    run: Outcome
-    motion: RobotMotion
+    run: Run
     energies: Energies
     momentum: Momentum
     histories: Histories = field(repr=False)
@@ -144,8 +141,8 @@ class AnalysisResult:
     @cached_property
     def actuation(self) -> Actuation | None:
         """What patches have to do, and whether motors and patches can; None where nothing is prescribed."""
-        found = self.histories.actuation
-        return None if found is None else found.at(self.histories.outputs)
+        actuation = self.histories.actuation
+        return None if actuation is None else actuation.at(self.histories.outputs)
 
     @property
     def analysis(self) -> Analysis:
@@ -155,7 +152,7 @@ class AnalysisResult:
     @cached_property
     def mode_error(self) -> float | None:
         """Estimated for too few modes, of peaks; None where it is not known."""
-        error = mode_error(modes_in_motion(self.motion)) if self._is_integrated else None
+        error = mode_error(modes_in_motion(self.run)) if self._is_integrated else None
         return None if error is None else hypot(error, phase_error(self._start))
 
     @cached_property
@@ -165,11 +162,11 @@ class AnalysisResult:
 
     @cached_property
     def _start(self) -> Start:
-        return start_of_motion(self.motion)
+        return start_of_motion(self.run)
 
     @property
     def _is_integrated(self) -> bool:
-        return self.analysis.is_integrated and len(self.motion.time) > 0
+        return self.analysis.is_integrated and len(self.run.time) > 0
 
     @property
     def status(self) -> str:
@@ -181,12 +178,12 @@ class AnalysisResult:
         """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
         bent, run = deflection_warning(self.bending), self.run
         texts = [bent] if bent else []
-        texts += [*self._doubts, *run.statistics.warnings, *unresolved_gears(self.motion.gears), *run.details.warnings]
+        texts += [*self._doubts, *run.statistics.warnings, *unresolved_gears(gear_motions(run)), *run.details.warnings]
         if not isinstance(self.analysis, IntegratedAnalysis) and len(run.time):
             of = self.histories.run
             texts += left_ranges(of.model, None, of.time, of.q, of.v)
-        if self.motion.is_prescribed:
-            texts += path_warnings(run.analysis, run.time, self.motion.model.scene.trajectory)
+        if run.is_prescribed:
+            texts += path_warnings(run.analysis, run.time, run.model.scene.trajectory)
         if self.actuation is not None and (missed := self.actuation.feasibility.unsupplied) is not None:
             texts.append(missed.in_words)
         return tuple(texts)
@@ -194,15 +191,15 @@ class AnalysisResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """What is worth knowing of results that are right, a text each."""
-        model = self.motion.model
+        model = self.run.model
         texts = () if self.sharing is None else (self.sharing.in_words,)
-        if self.motion.is_prescribed and model.tree.loops and not model.motors:
+        if self.run.is_prescribed and model.tree.loops and not model.motors:
             return (*texts, "no motors, so no torques: joints of kinematic loops have motors with motor = true alone")
         return texts
 
     @cached_property
     def _doubts(self) -> tuple[str, ...]:
-        return tuple(doubts(self.motion, self.run.analysis.tolerance))
+        return tuple(doubts(self.run, self.run.analysis.tolerance))
 
     @property
     def stiffening_effect(self) -> float:
@@ -238,10 +235,10 @@ class Solution:
     analyses: Mapping[str, AnalysisResult]
     seconds: Mapping[str, float]
     failure: Exception | None = None
-    unread: Outcome | None = None
+    unread: Run | None = None
     path_notes: tuple[str, ...] = ()
     points: Mapping[str, PointSet] = field(default_factory=dict)
-    earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
+    earlier: Mapping[str, Run] = field(default_factory=dict)
     mode_choice: ModeChoice | None = None
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
     parts: Mapping[str, LoadedBody] = field(default_factory=dict)
@@ -249,12 +246,12 @@ class Solution:
     stiffened: bool = False
 
     @property
-    def outcomes(self) -> dict[str, Outcome]:
+    def outcomes(self) -> dict[str, Run]:
         """How each analysis went, by its name."""
         runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
         return {run.analysis.name: run for run in runs}
 
-    def goes_on(self, outcome: Outcome) -> bool:
+    def goes_on(self, outcome: Run) -> bool:
         """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
         searched = any("auto" in (body.modes, body.pieces) for body in self.scene.body)
         return not searched and outcome.analysis.is_resumable

@@ -18,11 +18,12 @@ from ..common.arrays import Array, Indices
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.posture.reach import turned_guesses
 from ..mbs.posture.start import check_turning
-from ..mbs.quantities.motion import RobotMotion, totals
-from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
+from ..mbs.quantities.motion import reported_points
+from ..mbs.quantities.reactions import reactions, shared_evenly
 from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
+from ..mbs.quantities.supply import actuator_forces, gear_motions, totals
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
-from ..mbs.run.outcome import Outcome
+from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis, TimedAnalysis
 from ..scene.load import load_scene
 from ..scene.scene import Scene
@@ -30,7 +31,7 @@ from .actuation import Actuation, find_actuation, missing_forces
 from .bodies import load_bodies
 from .fastest import with_paths
 from .mode_choice import mode_levels, reported_modes
-from .pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces
+from .pieces import bending_of_links, links_in_pieces, wanted_pieces
 from .prepare import made_solution, with_bodies, with_pieces, with_scene, with_stiffening
 from .solution import AnalysisResult, Histories, Solution
 from .stresses import find_stresses
@@ -38,8 +39,6 @@ from .watcher import Interruption, Watcher
 from .whole_links import make_whole_links
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
     from ..actuation.feasibility import Feasibility
 
 logger = logging.getLogger(__name__)
@@ -54,7 +53,7 @@ def solve_scene(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep 
     Shapers for the robot's frequencies and the fastest motion are found first (see `fastest`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
-    An analysis that does not reach its end is kept as far as it got, and ends the run (`Outcome.check_completed`).
+    An analysis that does not reach its end is kept as far as it got, and ends the run (`Run.check_completed`).
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
@@ -127,9 +126,11 @@ def _with_enough_modes(solution: Solution, interruption: Interruption) -> Soluti
         solution = _completed(with_bodies(solution, search.bodies), interruption)
         if solution.failure is not None:
             return solution
-        found = solution.analyses
-        is_whole = len(found) == len(solution.scene.analysis) and all(of.status == "completed" for of in found.values())
-        reported = {name: reported_modes(result) for name, result in found.items()} if is_whole else None
+        results = solution.analyses
+        is_whole = len(results) == len(solution.scene.analysis) and all(
+            of.status == "completed" for of in results.values()
+        )
+        reported = {name: reported_modes(result) for name, result in results.items()} if is_whole else None
         search.add(reported, last=interruption.requested)
         if search.is_over:
             return replace(solution, mode_choice=search.choice())
@@ -147,11 +148,11 @@ def _with_enough_pieces(solution: Solution, interruption: Interruption) -> Solut
 def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        found = _completed(with_scene(solution, trial), interruption)
-        if found.unread is not None:
-            assert found.failure is not None
-            raise found.failure
-        (result,) = found.analyses.values()
+        solved = _completed(with_scene(solution, trial), interruption)
+        if solved.unread is not None:
+            assert solved.failure is not None
+            raise solved.failure
+        (result,) = solved.analyses.values()
     except SolveError as error:
         numerical = FfrobotError | ArithmeticError | np.linalg.LinAlgError | None
         if not isinstance(error.__cause__, numerical):  # a fault of the program, which the log has
@@ -162,9 +163,9 @@ def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Fea
 
 def _completed(solution: Solution, interruption: Interruption) -> Solution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
-    found = _run_all(solution, interruption) or _run_all(with_stiffening(solution), interruption)
-    assert found is not None
-    return found
+    completed = _run_all(solution, interruption) or _run_all(with_stiffening(solution), interruption)
+    assert completed is not None
+    return completed
 
 
 def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
@@ -180,7 +181,7 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
         try:
             with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
                 run = analysis.run(_context(solution, analysis, results, interruption))
-                assert isinstance(run, Outcome)
+                assert isinstance(run, Run)
             if not results:
                 texts = (*run.statistics.warnings, *turned_guesses(solution.scene))
                 run = replace(run, statistics=replace(run.statistics, warnings=texts))
@@ -210,7 +211,7 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
     return replace(solution, analyses=results, seconds=seconds)
 
 
-def _unread(solution: Solution, run: Outcome, error: Exception) -> Solution:
+def _unread(solution: Solution, run: Run, error: Exception) -> Solution:
     """The solution with a run whose outputs failed with `error`: its states are kept where `resume` takes them up."""
     kept = replace(run, statistics=replace(run.statistics, status="not evaluated"))
     if run.continuation is None or not solution.goes_on(kept):
@@ -247,78 +248,70 @@ def _context(
     )
 
 
-def _result(solution: Solution, run: Outcome, earlier: Mapping[str, AnalysisResult]) -> AnalysisResult:
+def _result(solution: Solution, run: Run, earlier: Mapping[str, AnalysisResult]) -> AnalysisResult:
     """What is read off a run; what has peaks at its outputs and between, as far as that is known."""
-    motion, sharing = _moving(solution, run)
-    twists = {joint: gear.curve for joint, gear in motion.gears.items()}  # splines through outputs
+    seen, sharing = shared_evenly(replace(run, links=links_in_pieces(solution)))
+    twists = {joint: gear.curve for joint, gear in gear_motions(seen).items()}  # splines through outputs
     known = {joint: curve for joint, curve in twists.items() if curve is not None}
-    closest, among = run, motion
+    closest = seen
     if run.closer is not run and len(known) == len(twists):
-        closest, among = run.closer, _moving(solution, run.closer, known)[0]
-    histories = _histories(solution, closest, among, np.searchsorted(closest.time, run.time))
-    found = AnalysisResult(
-        run, motion, *totals(motion), histories, sharing=sharing, bending=bending_of_links(solution, among),
-        point_forces=histories.point_forces if closest is run else _point_forces(solution, run),
-        settling=_settling(solution, run, earlier),
-    )  # fmt: skip
-    return replace(found, predicted_shift=_predicted_shift(solution, found))
+        closest = shared_evenly(replace(run.closer, links=seen.links, twists=known))[0]
+    histories = _histories(solution, closest, np.searchsorted(closest.time, run.time))
+    energies, momentum = totals(seen)
+    result = AnalysisResult(
+        run=seen,
+        energies=energies,
+        momentum=momentum,
+        histories=histories,
+        sharing=sharing,
+        bending=bending_of_links(solution, closest),
+        point_forces=histories.point_forces if closest is seen else _point_forces(solution, run),
+        settling=_settling(solution, seen, earlier),
+    )
+    return replace(result, predicted_shift=_predicted_shift(solution, result))
 
 
-def _settling(solution: Solution, run: Outcome, earlier: Mapping[str, AnalysisResult]) -> dict[str, Settling]:
+def _settling(solution: Solution, run: Run, earlier: Mapping[str, AnalysisResult]) -> dict[str, Settling]:
     """By point, of a run that goes on after the paths that it, or the analysis that it replays, follows."""
     analysis = run.analysis
     source = earlier.get(analysis.source or "") if analysis.takes_actuation else None
     commanding = run if source is None else source.run
     if not isinstance(analysis, TimedAnalysis) or run.status != "completed":
         return {}
-    rest, closer = commanded_rest(commanding), run.closer
+    rest = commanded_rest(commanding)
     if rest is None or not rest.since < run.time[-1]:
         return {}
-    metrics, motion = getattr(run.details, "metrics", None), _moving(solution, closer)[0]
+    metrics = getattr(run.details, "metrics", None)
     lowest = rest.frequency if metrics is None else metrics.lowest_frequency
-    return settling(motion, rest, list(end_points(solution.scene, motion.points)), analysis.settled, lowest)
+    points = list(end_points(solution.scene, reported_points(run)))
+    return settling(replace(run.closer, links=run.links), rest, points, analysis.settled, lowest)
 
 
-def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Array]:
+def _predicted_shift(solution: Solution, result: AnalysisResult) -> dict[str, Array]:
     """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces as of the whole links.
 
     None where the joints of whole links cannot say how the pieces move.
     """
-    motion, of = found.motion, found.histories
-    missing = {} if of.actuation is None else missing_forces(of.motion, of.actuation)
+    run, of = result.run, result.histories
+    missing = {} if of.actuation is None else missing_forces(of.run, of.actuation)
     if not missing:
         return {}
     from ..actuation.feasibility import quasi_static_shift
 
-    points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
+    points = [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
     if (whole := make_whole_links(solution)) is not None:
         try:
-            as_links = whole.as_links(found.run)
+            run = whole.as_links(run)
         except InputError:
             return {}
-        motion = RobotMotion(as_links.model, as_links.time, as_links.q, as_links.v, as_links.a, as_links.multipliers)
-    return quasi_static_shift(motion, {name: forces[of.outputs] for name, forces in missing.items()}, points)
+    return quasi_static_shift(run, {name: forces[of.outputs] for name, forces in missing.items()}, points)
 
 
-def _moving(
-    solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None
-) -> tuple[MotionOfLinks, Sharing | None]:
-    """The motion of a run, with its forces; `twists` of compliant gears where they are known."""
-    forces = run.forces
-    found = MotionOfLinks(
-        run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
-        forces.applied, forces.commanded, twists or {}, divided_links(solution),
-    )  # fmt: skip
-    return shared_evenly(found)
-
-
-def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actuation | None:
+def _actuation(solution: Solution, run: Run) -> Actuation | None:
     """What a run asks of motors and patches; None where nothing is asked of them."""
-    if motion.motor_forces is None or not run.analysis.is_motion:
+    if actuator_forces(run) is None or not run.analysis.is_motion:
         return None
-    actuation = find_actuation(
-        solution.scene, motion, run.analysis, solution.bodies, solution.patches, run.forces.voltages
-    )
+    actuation = find_actuation(solution.scene, run, solution.bodies, solution.patches)
     if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
         from ..mbs.analysis.operating_points import open_loop_growth
 
@@ -327,26 +320,25 @@ def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actua
     return actuation
 
 
-def _histories(solution: Solution, run: Outcome, motion: MotionOfLinks, outputs: Indices) -> Histories:
-    """What has peaks at the times of `run`."""
+def _histories(solution: Solution, run: Run, outputs: Indices) -> Histories:
     return Histories(
-        run, motion, outputs, reactions(motion), _actuation(solution, run, motion),
-        find_stresses(motion, solution.parts or solution.bodies, solution.patches, solution.divided),
-        _point_forces(solution, run),
-    )  # fmt: skip
+        run=run,
+        outputs=outputs,
+        reactions=reactions(run),
+        actuation=_actuation(solution, run),
+        stresses=find_stresses(run, solution.parts or solution.bodies, solution.patches, solution.divided),
+        point_forces=_point_forces(solution, run),
+    )
 
 
-def _point_forces(solution: Solution, run: Outcome) -> dict[str, PointForces]:
+def _point_forces(solution: Solution, run: Run) -> dict[str, PointForces]:
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         return {name: solve_points(points, run) for name, points in solution.points.items()}
     return {}
 
 
-def _log(outcome: Outcome) -> None:
-    """One line on how an analysis went."""
-    run = outcome.statistics
-    logger.info(
-        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
-        outcome.analysis.name, run.status, outcome.time[-1] if len(outcome.time) else 0.0, run.steps, run.rejected,
-        run.evaluations, run.wall_seconds, run.integrator.name, run.integrator.reason,
-    )  # fmt: skip
+def _log(run: Run) -> None:
+    of, end = run.statistics, run.time[-1] if len(run.time) else 0.0
+    work = f"{of.steps} steps, {of.rejected} rejected, {of.evaluations} evaluations, {of.wall_seconds:.3f} s"
+    how = f"integrator {of.integrator.name}: {of.integrator.reason}"
+    logger.info('analysis "%s": %s at t = %g s, %s; %s', run.analysis.name, of.status, end, work, how)

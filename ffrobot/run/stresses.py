@@ -12,7 +12,7 @@ from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.quantities.link_loads import LinkLoads, loads_on_links
-from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.motion import modal_coordinates
 from ..mbs.quantities.stress import (
     METHODS,
     BodyStress,
@@ -22,6 +22,7 @@ from ..mbs.quantities.stress import (
     mode_acceleration,
     mode_displacement,
 )
+from ..mbs.run.record import Run
 from ..scene.pieces import BodyInPieces
 from .bodies import LoadedBody
 
@@ -31,10 +32,7 @@ if TYPE_CHECKING:
 
 
 def find_stresses(
-    motion: RobotMotion,
-    bodies: Mapping[str, LoadedBody],
-    patches: Mapping[str, LinkPatches],
-    divided: Mapping[str, BodyInPieces],
+    run: Run, bodies: Mapping[str, LoadedBody], patches: Mapping[str, LinkPatches], divided: Mapping[str, BodyInPieces]
 ) -> dict[str, BodyStress]:
     """By body of the scene, those of links in pieces from their pieces, which are among `bodies`.
 
@@ -47,19 +45,20 @@ def find_stresses(
     unknown = {name for name, of in stiff.items() if _in_plane(of) is None}
     unknown |= {piece for name in stiff.keys() & divided.keys() for piece in divided[name].names}
     known = [name for name, link in links.items() if link.stress_loads and name not in unknown]
-    loads = loads_on_links(motion, known) if known else {}
-    found = {}
+    loads = loads_on_links(run, known) if known else {}
+    stresses = {}
     for name, link in links.items():
-        p, spatial = motion.modal(name), bodies[name].spatial
+        p, spatial = modal_coordinates(run, name), bodies[name].spatial
         recovery = mode_displacement(p)
-        if name in loads and _is_known(link, loads[name].sizes):
+        sizes = loads[name].sizes if name in loads else None
+        if sizes is not None and all(load in link.stress_loads or not size.any() for load, size in sizes.items()):
             sections = _sections(stiff[name], link, spatial, p, loads[name]) if name in stiff else None
-            recovery = mode_acceleration(link, spatial.modal_transform, p, loads[name].sizes, sections)
-        found[name] = body_stress(link, recovery)
+            recovery = mode_acceleration(link, spatial.modal_transform, p, sizes, sections)
+        stresses[name] = body_stress(link, recovery)
     for name, pieces in divided.items():
-        if of_pieces := [found.pop(piece) for piece in pieces.names if piece in found]:
-            found[name] = _of_pieces(of_pieces, motion.modal(name))
-    return found
+        if of_pieces := [stresses.pop(piece) for piece in pieces.names if piece in stresses]:
+            stresses[name] = _of_pieces(of_pieces, modal_coordinates(run, name))
+    return stresses
 
 
 def _of_pieces(stresses: Sequence[BodyStress], p: Array) -> BodyStress:
@@ -89,8 +88,3 @@ def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, lo
         return None
     F_p = of_link.reached.forces(loads.modal_force @ spatial.on_file)
     return section_loads(PlacedLayout(array.layout, array.edges), link, p, F_p @ voltage_gain(of_link.reach).T)
-
-
-def _is_known(link: ModalBody, sizes: Mapping[str, Array]) -> bool:
-    """Whether the file of a link has the static stress of everything that acts on it."""
-    return all(name in link.stress_loads or not np.any(size) for name, size in sizes.items())

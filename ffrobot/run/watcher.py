@@ -10,7 +10,12 @@ from ..common.interrupts import SIGNALS, EndOfCommand
 
 
 class Watcher:
-    """Observes the progress of a solve. The command line shows it; library users may omit it."""
+    """Observes the progress of a solve. The command line shows it; library users may omit it.
+
+    `signal` is the number of the one that requested an end; 0 without one.
+    """
+
+    signal = 0
 
     def stage(self, title: str) -> None:
         """A step begins that may take long."""

@@ -14,8 +14,9 @@ from ..mbs.model.divided_link import DividedLink, PieceOfLink, divided_link_of
 from ..mbs.model.model import Model
 from ..mbs.model.nodes import Node
 from ..mbs.run.context import WholeLinks
-from ..mbs.run.outcome import Outcome
+from ..mbs.run.record import Run
 from ..scene.pieces import places_on_pieces
+from .pieces import links_in_pieces
 from .solution import Solution
 
 
@@ -23,30 +24,21 @@ def make_whole_links(solution: Solution) -> WholeLinks | None:
     """The links of a solution in which some are in pieces; None where none is."""
     if solution.whole is None:
         return None
-    divided = {name: _divided(solution, name) for name in solution.divided}
-    return WholeLinks(
-        solution.whole, divided, places_on_pieces(solution.divided), partial(_as_links, solution, divided)
-    )
+    divided = {}
+    for name, link in links_in_pieces(solution).items():
+        own = (solution.parts[piece].spatial for piece in link.names)
+        pieces = [PieceOfLink(*of) for of in zip(link.starts, link.pieces, own, strict=True)]
+        divided[name] = divided_link_of(link.modal, solution.bodies[name].spatial, pieces)
+    places = places_on_pieces(solution.divided)
+    return WholeLinks(solution.whole, divided, places, partial(_as_links, solution.whole, divided))
 
 
-def _divided(solution: Solution, name: str) -> DividedLink:
-    link, body = solution.bodies[name], solution.divided[name]
-    pieces = []
-    for piece, start in zip(body.names, body.cut.starts, strict=True):
-        modal = solution.parts[piece].modal
-        assert modal is not None
-        pieces.append(PieceOfLink(start, modal, solution.parts[piece].spatial))
-    assert link.modal is not None
-    return divided_link_of(link.modal, link.spatial, pieces)
-
-
-def _as_links(solution: Solution, divided: Mapping[str, DividedLink], run: Outcome) -> Outcome:
+def _as_links(whole: Model, divided: Mapping[str, DividedLink], run: Run) -> Run:
     """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
 
     Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.
     """
-    whole, tree = solution.whole, run.model.tree
-    assert whole is not None
+    tree = run.model.tree
     q = np.zeros((len(run.time), whole.tree.n_q))
     v, a = np.zeros((2, len(run.time), whole.tree.n_v))
     for node in whole.tree.nodes:
@@ -58,11 +50,12 @@ def _as_links(solution: Solution, divided: Mapping[str, DividedLink], run: Outco
         T = np.eye(node.body.n_modes) if link is None else link.gathered
         for to, values, place in zip((q, v, a), (run.q, run.v, run.a), ("p_q", "p_v", "p_v"), strict=True):
             to[:, getattr(node, place)] = np.hstack([values[:, getattr(of, place)] for of in bodies]) @ T.T
-    motion = replace(run.motion, q=q, v=v, a=a, multipliers=np.zeros((len(run.time), len(whole.rows))))
-    return replace(run, model=whole, motion=motion, forces=replace(run.forces, required=None), prescribed=None)
+    multipliers = np.zeros((len(run.time), len(whole.rows)))
+    alone = replace(run, required=None, prescribed=None, twists={}, links={})
+    return replace(alone, model=whole, q=q, v=v, a=a, multipliers=multipliers)
 
 
-def _take_joint(whole: Model, node: Node, run: Outcome, states: tuple[Array, Array, Array]) -> None:
+def _take_joint(whole: Model, node: Node, run: Run, states: tuple[Array, Array, Array]) -> None:
     """Coordinates, rates and accelerations of the joint of `node`, from the tree of the pieces to that of the links."""
     tree = run.model.tree
     number = tree.carried.get(node.joint.name)

@@ -15,6 +15,7 @@ from ..exchange.motion.read_motion import read_record
 from ..mbs.analysis.pcid import Pcid
 from ..mbs.fields.waypoints import Record, column_of, load_record
 from ..mbs.joints.joint import JointRecord
+from ..mbs.quantities.motion import joint_motion
 from ..mbs.scene.analysis import TimedAnalysis
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
@@ -116,10 +117,10 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     outputs = int(np.ceil(timed[0].end / step - STILL))
     analysis = Pcid(name="plan", kind="pcid", end=outputs * step, output_step=step)
     solution = solve_scene(scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)}), watcher)
-    motion, joints = solution.analyses["plan"].motion, tuple(joint.name for joint in scene.motor_joints)
-    found = [motion.joint(joint) for joint in joints]
+    run, joints = solution.analyses["plan"].run, tuple(joint.name for joint in scene.motor_joints)
+    found = [joint_motion(run, joint) for joint in joints]
     values = np.column_stack([coordinate for coordinate, _ in filter(None, found)])
-    return without_rest(Recording(joints, motion.time, values, motion.time))
+    return without_rest(Recording(joints, run.time, values, run.time))
 
 
 def _columns(path: Path, record: Record, names: Sequence[str]) -> list[int]:

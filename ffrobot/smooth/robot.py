@@ -19,8 +19,10 @@ from ..mbs.model.gears import with_compliance
 from ..mbs.model.known_motion import State
 from ..mbs.model.model import without_paths
 from ..mbs.posture.start import relaxed_gears, undeformed_posture
+from ..mbs.quantities.motion import point_motion, section_motion
 from ..mbs.quantities.settling import Settling, commanded_rest, settling
-from ..mbs.run.outcome import GearMotion
+from ..mbs.quantities.supply import gear_motions, motor_moments
+from ..mbs.run.record import GearMotion
 from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
 from ..run.prepare import with_scene
@@ -127,19 +129,18 @@ class Robot:
         period = 1 / self._lowest(path)
         until = path.end + period
         found = self._solved(path, "motor", until + min(LAST * period, LONGEST), period / PER_PERIOD)
-        motion, rest = found.motion, commanded_rest(found.run)
-        place = motion.point(self.point).position
-        moments = {joint: float(np.abs(of).max()) for joint, of in motion.motor_moments.items()}
+        run, rest = found.run, commanded_rest(found.run)
+        place = point_motion(run, self.point).position
+        moments = {joint: float(np.abs(of).max()) for joint, of in motor_moments(run).items()}
         if rest is None:
-            return Ride(None, motion.time, np.full(len(place), np.nan), place, moments, found.run.q)
+            return Ride(None, run.time, np.full(len(place), np.nan), place, moments, run.q)
         rest = rest._replace(since=last)
-        (whole,) = settling(motion, rest, [self.point], self.tolerance, rest.frequency).values()
-        first = motion.time <= until
-        soon = replace(motion, **{name: getattr(motion, name)[first] for name in ("time", "q", "v", "a")})
+        (whole,) = settling(run, rest, [self.point], self.tolerance, rest.frequency).values()
+        soon = run.at(np.flatnonzero(run.time <= until).tolist())
         (after,) = settling(soon, rest, [self.point], self.tolerance, rest.frequency).values()
-        final = replace(motion, model=rest.model, q=rest.q[None], v=0 * motion.v[:1]).point(self.point).position[0]
+        final = section_motion(replace(run, model=rest.model, q=rest.q[None], v=0 * run.v[:1]), self.point).r[0]
         off = np.linalg.norm(place - final, axis=1)
-        return Ride(replace(whole, residual=after.residual), motion.time, off, place, moments, found.run.q)
+        return Ride(replace(whole, residual=after.residual), run.time, off, place, moments, run.q)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
         """Set points (T, n) at even `times` from 0 that make links follow `motion`, and the torques (T, n) of motors.
@@ -150,10 +151,10 @@ class Robot:
         own = np.array([motion.sample(times, order) for order in range(3)])
         moments = np.zeros(own.shape[1:])
         for k, joint in enumerate(self.joints):
-            gear: GearMotion | None = found.motion.gears.get(joint)
+            gear: GearMotion | None = gear_motions(found.run).get(joint)
             if gear is not None:
                 own[:, :, k] = gear.angle, gear.rate, gear.acceleration
-            moments[:, k] = found.motion.motor_moments[joint].reshape(len(times))
+            moments[:, k] = motor_moments(found.run)[joint].reshape(len(times))
         command = self.servo.command(own)
         command[[0, -1]] = own[0, [0, -1]]  # at rest, whatever derivatives jump there
         return command, moments

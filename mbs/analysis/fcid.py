@@ -30,7 +30,7 @@ from ..posture.reach import check_reach
 from ..posture.redundancy import resolved
 from ..posture.start import shape_in_redundant_loops, undeformed_posture
 from ..run.context import Context
-from ..run.outcome import Forces, Motion, Outcome, Prescription, Statistics
+from ..run.record import Prescription, Run, Statistics
 from ..scene.analysis import Check, TimedAnalysis
 
 ZERO = TimeFunction.constant(0.0)
@@ -72,7 +72,7 @@ class Fcid(TimedAnalysis):
             for k, function in enumerate(functions):
                 yield f"modal.{body}[{k}]", function, 2
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> Run:
         """Motion and forces for the trajectories and the prescribed shape.
 
         Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
@@ -97,13 +97,10 @@ class Fcid(TimedAnalysis):
         has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
         motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
 
-        def at(times: Array) -> Outcome:
-            found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
-            return Outcome(
-                analysis=self, model=model, forces=Forces(required=found.required),
-                motion=Motion(times, found.q, found.v, found.a, found.multipliers),
-                statistics=Statistics(warnings=warnings), prescribed=Prescription(equations, shape, q),
-            )  # fmt: skip
+        def at(times: Array) -> Run:
+            states = prescribed_motion(model, motion, sampled(shape, times), times, q[None])._asdict()
+            how, prescribed = Statistics(warnings=warnings), Prescription(equations, shape, q)
+            return Run(analysis=self, model=model, time=times, **states, statistics=how, prescribed=prescribed)
 
         try:
             shape = _shape(context, self, model, motion, q)

@@ -26,7 +26,7 @@ from ..posture.start import displaced_joints
 from ..run.context import Context, PatchedLink
 from ..run.drive import drive_robot
 from ..run.gears import DEGREE, with_motor_coordinates
-from ..run.outcome import Outcome
+from ..run.record import Run
 from ..run.replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 
@@ -63,7 +63,7 @@ class Forward(ActuatedAnalysis):
             )
         return self
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> Run:
         """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
 
         Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no
@@ -81,9 +81,14 @@ class Forward(ActuatedAnalysis):
         if self.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
             replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
         run = drive_robot(
-            model, self, context.start or State(source.q[0], source.v[0]), progress,
-            drives=Drives(replayed=replayed), times=replay_times(source, self), earlier=context.earlier,
-        )  # fmt: skip
+            model,
+            self,
+            context.start or State(source.q[0], source.v[0]),
+            progress,
+            drives=Drives(replayed=replayed),
+            times=replay_times(source, self),
+            earlier=context.earlier,
+        )
         if self.apply == "trajectory":  # others act without what makes up for vibrations
             statistics = run.statistics
             warnings = (*statistics.warnings, *left_paths(source, run))
@@ -107,23 +112,22 @@ class Forward(ActuatedAnalysis):
             )
 
 
-def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:
-    """What acts."""
+def _replayed(context: Context, source: Run, analysis: Forward) -> Replayed:
     model = source.model
     nothing = Command(np.zeros(model.tree.n_v))
     if analysis.apply == "trajectory":
-        found, joints, at_points, count = path_numbers(source)
+        forces, joints, at_points, count = path_numbers(source)
         rows = [row for row in model.rows if row.is_trajectory and row.kind == "coordinate"]
         along = [Command(row.sign * np.eye(model.tree.n_v)[row.coordinate]) for row in rows]
-        return Replayed(found, (*along, *[nothing] * (count - len(along))), at_points, joints)
+        return Replayed(forces, (*along, *[nothing] * (count - len(along))), at_points, joints)
     if analysis.apply == "points":
         chosen = list(context.at_points(source))
         at_points = {point: dict(zip("xyz", range(3 * k, 3 * k + 3), strict=True)) for k, point in enumerate(chosen)}
         return Replayed(point_numbers(source, context.points), (nothing,) * (3 * len(chosen)), at_points)
     _check_motors(model, analysis, source.q[0])
     patches = context.patches if analysis.apply == "joints+pzt" else {}
-    found = _supplied(source, largest_moments(model, limits=analysis.limits), patches, analysis)
-    return Replayed(found, actuator_commands(model, patches), moments=numbers_of_motors(model))
+    forces = _supplied(source, largest_moments(model, limits=analysis.limits), patches, analysis)
+    return Replayed(forces, actuator_commands(model, patches), moments=numbers_of_motors(model))
 
 
 def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
@@ -138,7 +142,7 @@ def numbers_of_motors(model: Model) -> dict[str, list[int]]:
     return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
 
 
-def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Context) -> Outcome:
+def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context) -> Run:
     """Where gears of `model` give: moments at the outputs of `source` and splines between these, and its voltages."""
     if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
@@ -151,17 +155,22 @@ def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Con
     wanted = np.hstack([in_motors.moments[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
-    found: _core.ForceSource = _core.ForcesOfTime(sizes)
+    forces: _core.ForceSource = _core.ForcesOfTime(sizes)
     commands = actuator_commands(model, context.patches)
     motors, patches = commands[: len(most)], commands[len(most) :]
     if analysis.apply == "joints+pzt":  # moments of rigid gears come with the voltages, and do nothing
-        found = _core.ForcesOfBoth(found, _supplied(source, most, context.patches, analysis))
+        forces = _core.ForcesOfBoth(forces, _supplied(source, most, context.patches, analysis))
         motors = (*motors, *[Command(np.zeros(model.tree.n_v))] * len(most), *patches)
-    replayed = Replayed(found, motors, moments=numbers_of_motors(model))
+    replayed = Replayed(forces, motors, moments=numbers_of_motors(model))
     return drive_robot(
-        model, analysis, State(in_motors.q[0], in_motors.v[0]), context.progress, drives=Drives(replayed=replayed),
-        times=replay_times(source, analysis), earlier=context.earlier,
-    )  # fmt: skip
+        model,
+        analysis,
+        State(in_motors.q[0], in_motors.v[0]),
+        context.progress,
+        drives=Drives(replayed=replayed),
+        times=replay_times(source, analysis),
+        earlier=context.earlier,
+    )
 
 
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
@@ -176,19 +185,19 @@ def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array
     return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
 
 
-def _supplied(source: Outcome, most: Array, patches: Mapping[str, PatchedLink], analysis: Forward) -> _core.ForceSource:
+def _supplied(source: Run, most: Array, patches: Mapping[str, PatchedLink], analysis: Forward) -> _core.ForceSource:
     """What motors and amplifiers make of what `source` found: its charges are those of its own motion."""
-    found, amplifiers = supplied(source, most, patches, limited=analysis.limits), joined(patches.values())
+    forces, amplifiers = supplied(source, most, patches, limited=analysis.limits), joined(patches.values())
     amplifiers = amplifiers if analysis.limits else amplifiers.unlimited()
     if not amplifiers.acts:
-        return found
+        return forces
     times, late = replay_times(source, analysis), np.append(amplifiers.lag, amplifiers.delay)
     step = min(float(late[late > 0.0].min(initial=np.inf)), analysis.output_step) / STEPS
     count = int(np.clip(np.ceil(np.ptp(times) / step), 1, MOST_STEPS))
     grid, closer = as_floats(np.linspace(times[0], times[-1], count + 1)), source.closer
     current = closer.v @ strain_directions(source.model, patches).T
     strain = np.stack([np.interp(grid, closer.time, of) for of in current.T], axis=1)
-    V = amplifiers.output(grid, found.sample(as_list(grid))[:, len(most) :], strain)
+    V = amplifiers.output(grid, forces.sample(as_list(grid))[:, len(most) :], strain)
     return _core.ForcesOfBoth(
         supplied(source, most, {}, limited=analysis.limits), _core.ForcesOfTime(spline(grid, V, 1))
     )
@@ -208,9 +217,9 @@ def _check_motors(model: Model, analysis: Forward, q: Array) -> None:
         raise InputError(
             f'{key}: expected joints with motors for "{analysis.apply}", found none: name them with motor = true'
         )
-    found, freedom = sum(map(len, model.motors.values())), mobility(model, q).freedom
-    if model.scene.is_planar and found != freedom:
+    count, freedom = sum(map(len, model.motors.values())), mobility(model, q).freedom
+    if model.scene.is_planar and count != freedom:
         raise InputError(
-            f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}", found {found};'
+            f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}", found {count};'
             ' name them with motor = true, or use apply = "trajectory"'
         )

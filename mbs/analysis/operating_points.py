@@ -26,11 +26,11 @@ from ..posture.redundancy import resolved
 from ..posture.start import undeformed_posture
 from ..run.context import Context, place_of
 from ..run.gears import with_motor_coordinates
-from ..run.outcome import Details, Motion, Outcome, Statistics
+from ..run.record import Details, Run, Statistics
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 
 
-def run_static(context: Context, analysis: Analysis) -> Outcome:
+def run_static(context: Context, analysis: Analysis) -> Run:
     """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
 
     Raises `SolveError` where there is none.
@@ -40,10 +40,15 @@ def run_static(context: Context, analysis: Analysis) -> Outcome:
     statics = Statics(model)
     q = statics.equilibrium(undeformed_posture(model).q)
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
-    return Outcome(
+    return Run(
         analysis=analysis,
         model=model,
-        motion=Motion(times, q[None], at_rest, at_rest, statics.holding_multipliers(q)[None], is_at_rest=True),
+        time=times,
+        q=q[None],
+        v=at_rest,
+        a=at_rest,
+        multipliers=statics.holding_multipliers(q)[None],
+        is_at_rest=True,
         statistics=Statistics(wall_seconds=time.perf_counter() - began, warnings=tuple(statics.unstable_ways(q))),
     )
 
@@ -107,7 +112,7 @@ class OperatingPoints(NamedTuple):
     a: Array  # (T, n_v)
 
 
-def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Outcome, OperatingPoints]:
+def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Run, OperatingPoints]:
     """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
     if analysis.source is None:
         run = _equilibrium(context, analysis)
@@ -117,7 +122,7 @@ def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[
     return of_earlier(source, analysis).at(rows), linear_states(context.model, source, rows)
 
 
-def linear_states(model: Model, source: Outcome, rows: Sequence[int]) -> OperatingPoints:
+def linear_states(model: Model, source: Run, rows: Sequence[int]) -> OperatingPoints:
     """The states of some outputs of a motion, of the robot that follows nothing and whose gears are compliant."""
     model = with_compliance(without_paths(model))
     q, v, a = with_motor_coordinates(source, model)[:3]
@@ -125,7 +130,7 @@ def linear_states(model: Model, source: Outcome, rows: Sequence[int]) -> Operati
     return OperatingPoints(model, source.time[at], q[at], v[at], a[at])
 
 
-def open_loop_growth(run: Outcome) -> float:
+def open_loop_growth(run: Run) -> float:
     """Mean over a run of the fastest growth, 1/s, of small deviations where its torques act open loop.
 
     By linear models about `INSTANTS` of the run; 0 where none of them has a pole that grows; nan where the robot has no
@@ -166,13 +171,13 @@ def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = 
     return {point: place_of(whole, point) or point for point in points}
 
 
-def of_earlier(source: Outcome, analysis: Analysis) -> Outcome:
+def of_earlier(source: Run, analysis: Analysis) -> Run:
     """The motion of `source` as that of `analysis`, which has made no steps of its own."""
     statistics = replace(source.statistics, steps=0, evaluations=0, wall_seconds=0.0, warnings=())
     return replace(source, analysis=analysis, statistics=statistics, prescribed=None, look_closer=None)
 
 
-def row_at(path: Path, analysis: Analysis, source: Outcome, t: float) -> int:
+def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
     """The output of an earlier analysis at time t. Raises `InputError` where there is none."""
     row = int(np.abs(source.time - t).argmin())
     if abs(source.time[row] - t) > NEAR * source.analysis.last_time:
@@ -184,7 +189,7 @@ def row_at(path: Path, analysis: Analysis, source: Outcome, t: float) -> int:
     return row
 
 
-def _equilibrium(context: Context, analysis: Analysis) -> Outcome:
+def _equilibrium(context: Context, analysis: Analysis) -> Run:
     """Static; where nothing is followed, motors keep the initial posture."""
     model = context.model
     if not any(row.is_trajectory for row in model.rows):
@@ -226,14 +231,14 @@ class Static(Analysis):
     allocates_patches = True
     refers_to = (("points", "body"),)
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> Run:
         """Motion and forces at t = 0."""
-        found = run_static(context, self)
+        run = run_static(context, self)
         try:
-            model, _, (q,), (v,), (a,) = linear_states(context.model, found, [0])
+            model, _, (q,), (v,), (a,) = linear_states(context.model, run, [0])
             mechanism = LinearEquations(model, q, places_of(context, self.points, loaded=True)).at(0.0, q, v, a)
         except (InputError, SolveError) as error:
             text = f"no natural frequencies and no compliance: {error}"
-            statistics = replace(found.statistics, warnings=(*found.statistics.warnings, text))
-            return replace(found, statistics=statistics)
-        return replace(found, details=RobotAtRest((joint_conditions(mechanism),)))
+            statistics = replace(run.statistics, warnings=(*run.statistics.warnings, text))
+            return replace(run, statistics=statistics)
+        return replace(run, details=RobotAtRest((joint_conditions(mechanism),)))

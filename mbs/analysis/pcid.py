@@ -12,7 +12,7 @@ from ..posture.redundancy import resolved
 from ..posture.start import undeformed_posture
 from ..run.context import Context
 from ..run.drive import drive_robot
-from ..run.outcome import Outcome
+from ..run.record import Run
 from ..scene.analysis import Check, IntegratedAnalysis
 
 
@@ -30,7 +30,7 @@ class Pcid(IntegratedAnalysis):
     allocates_patches = True
     applicable = ("joints", "joints+pzt", "trajectory", "points")
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> Run:
         """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.
 
         Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to
@@ -45,6 +45,11 @@ class Pcid(IntegratedAnalysis):
         if way.followed < way.freedom:
             warnings += tuple(hanging_joints(model, start))
         return drive_robot(
-            model, self, start, context.progress, warnings=warnings, earlier=context.earlier,
+            model,
+            self,
+            start,
+            context.progress,
+            warnings=warnings,
+            earlier=context.earlier,
             is_recorded=context.is_replayed,
-        )  # fmt: skip
+        )

@@ -29,7 +29,7 @@ from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, path_errors, without_paths
 from ..run.context import Context
 from ..run.integrators import Choice
-from ..run.outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
+from ..run.record import ADVICE, Details, Prescription, Run, Statistics
 from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
 from ..scene.mechanism import MechanismScene
 from ..scene.robustness import Robustness
@@ -108,7 +108,7 @@ def durations(
 ) -> tuple[float, float]:
     """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
     automatic = decay_times(linear, float(linear.times[-1]), needs_future=needs_future)
-    chosen = (found if value is None else value for value, found in zip(given, automatic, strict=True))
+    chosen = (duration if value is None else value for value, duration in zip(given, automatic, strict=True))
     before, after = (math.ceil(time / step - 1e-9) * step for time in chosen)
     return before, after
 
@@ -175,7 +175,7 @@ class MotorsOnly(TimedAnalysis):
         """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
         return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> Run:
         """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
         Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of
@@ -221,35 +221,42 @@ def _check_loads(scene: MechanismScene, times: Array) -> None:
             check_domain(function, times, f"{scene.path}: load no. {k}: {component}", 0)
 
 
-def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Outcome:
+def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Run:
     curve = inversion.curve
     how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
     statistics = Statistics(
-        inversion.status, Choice("collocation", how), steps=len(curve.x) - 1, evaluations=inversion.iterations,
+        inversion.status,
+        Choice("collocation", how),
+        steps=len(curve.x) - 1,
+        evaluations=inversion.iterations,
         cause=cause_of(inversion),
-    )  # fmt: skip
+    )
     return outcome_along(curve, inversion.servo, analysis, model, statistics, times)
 
 
 def outcome_along(
     curve: PPoly, servo: Servo, analysis: Analysis, model: Model, statistics: Statistics, times: Array
-) -> Outcome:
+) -> Run:
     """The motion whose modes follow the curve, at `times` (T,), up to the first without a posture."""
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
     states = servo.motion.motion(as_list(times), *modes, servo.postures(times))
     is_met = np.isfinite(states.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
-    return Outcome(
+    return Run(
         analysis=analysis,
         model=without_paths(model),
-        motion=Motion(times, states.q, states.v, states.a, states.loops).at(kept),
-        forces=Forces(required=states.required).at(kept),
+        time=times,
+        q=states.q,
+        v=states.v,
+        a=states.a,
+        multipliers=states.loops,
+        required=states.required,
         statistics=statistics,
         prescribed=Prescription(servo.equations, shape_of(curve, servo.mode_counts), servo.near[0]),
-    )
+    ).at(kept)
 
 
-def _warnings(inversion: Inversion, run: Outcome) -> tuple[str, ...]:
+def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     if run.failed or inversion.servo.factor == 1:
         return ()

@@ -208,7 +208,6 @@ def make_servo(
 
 
 def _with_functions(row: ConstraintRow, change: Callable[[TimeFunction], TimeFunction]) -> ConstraintRow:
-    """With each function of time that it follows changed."""
     target = None if row.target is None else change(row.target)
     law = row.law
     if law is not None:

@@ -105,9 +105,15 @@ def invert(
             break
     assert solver.curve is not None
     return Inversion(
-        servo, linear, solver.curve, solver.status, solver.iterations, unmet=solver.unmet / force, worst=solver.worst,
+        servo=servo,
+        linearisation=linear,
+        curve=solver.curve,
+        status=solver.status,
+        iterations=solver.iterations,
+        unmet=solver.unmet / force,
+        worst=solver.worst,
         off_rest=_off_rest(servo, solver.curve, start.state),
-    )  # fmt: skip
+    )
 
 
 class _Solver:

@@ -8,7 +8,7 @@ static shape does no work with that load), and so are turns of sections from cut
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
-from .body import Body
+from .body import Body, BodyPoint
 
 INTERVALS = 32  # of a piece, over which strains are taken as constant
 
@@ -32,6 +32,29 @@ class DividedLink:
     # (n, N) p of the link that are nearest to those of the pieces, in strain energy; the smallest where the link has
     # more modes than its pieces
     gathered: Array
+
+
+@struct
+class LinkInPieces:
+    """A link in pieces, to read the motion of the pieces as that of the link.
+
+    Attributes:
+        modal: its modal body.
+        names: of the pieces, from the root to the tip.
+        starts: where each begins, m from the root.
+        pieces: their modal bodies.
+        places: of its points by label, as "PIECE.POINT".
+        points: the same in the whole link.
+        to_own: (n_file, n) modal coordinates of the whole link in the equations, by those of its file.
+    """
+
+    modal: ModalBody
+    names: tuple[str, ...]
+    starts: Sequence[float]
+    pieces: tuple[ModalBody, ...]
+    places: Mapping[str, str]
+    points: Mapping[str, BodyPoint]
+    to_own: Array
 
 
 class PieceOfLink(NamedTuple):

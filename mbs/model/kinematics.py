@@ -195,7 +195,7 @@ class Motion(NamedTuple):
 
 
 class PostureSearch(NamedTuple):
-    """Settings of the posture search."""
+    """How postures are sought."""
 
     scales: Array  # (n_v,) natural sizes of coordinates; those of size 0 stay
     sizes: Array  # (rows,) natural sizes of C

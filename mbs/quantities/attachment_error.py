@@ -22,7 +22,8 @@ from ...fe_models.modal_body import ModalBody
 from ..model.body import Body, bent_section
 from ..model.kinematics import Motion
 from ..model.known_motion import mass_matrices
-from .motion import RobotMotion
+from ..run.record import Run
+from .motion import constraint_rows
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
 DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of the largest ω²
@@ -109,11 +110,11 @@ def phase_error(start: Start) -> float:
     """
     if not start.largest:
         return 0.0
-    found = start_vibrations(start)
-    slower = 0.5 * (start.stiffness * start.late) @ found.shapes**2
-    decay = 0.5 * np.einsum("ki,kl,li->i", found.shapes, start.damping, found.shapes)
+    vibrations = start_vibrations(start)
+    slower = 0.5 * (start.stiffness * start.late) @ vibrations.shapes**2
+    decay = 0.5 * np.einsum("ki,kl,li->i", vibrations.shapes, start.damping, vibrations.shapes)
     time = start.duration / np.maximum(1.0, np.e * decay * start.duration)
-    return _of_largest(start, found.amplitudes * np.minimum(2.0, np.sqrt(found.squares) * slower * time))
+    return _of_largest(start, vibrations.amplitudes * np.minimum(2.0, np.sqrt(vibrations.squares) * slower * time))
 
 
 def start_vibrations(start: Start) -> Vibrations:
@@ -135,27 +136,36 @@ def _of_largest(start: Start, amplitudes: Array) -> float:
     return float(np.sqrt((amplitudes**2).sum() / start.largest))
 
 
-def modes_in_motion(motion: RobotMotion) -> Iterator[ModesInMotion]:
+def modes_in_motion(run: Run) -> Iterator[ModesInMotion]:
     """Of the flexible bodies of a run."""
-    for node in motion.model.tree.nodes:
+    for node in run.model.tree.nodes:
         if node.body.n_modes:
-            yield ModesInMotion(node.body, motion.q[:, node.p_q], motion.a[:, node.p_v])
+            yield ModesInMotion(node.body, run.q[:, node.p_q], run.a[:, node.p_v])
 
 
-def start_of_motion(motion: RobotMotion) -> Start:
+def start_of_motion(run: Run) -> Start:
     """Of a run."""
-    tree, n_v = motion.model.tree, motion.model.tree.n_v
+    tree, n_v = run.model.tree, run.model.tree.n_v
     stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
-    energy: Array = np.zeros(len(motion.time))
+    energy: Array = np.zeros(len(run.time))
     for node in tree.nodes:
         stiffness[node.p_v], damping[node.p_v, node.p_v] = node.body.stiffness, node.body.damping
-        energy += motion.q[:, node.p_q] ** 2 @ node.body.stiffness
+        energy += run.q[:, node.p_q] ** 2 @ node.body.stiffness
         if node.body.attachment_modes and node.body.n_eigenmodes:
             late[node.p_v] = _late(node.body)
-    (M,) = mass_matrices(motion.model, motion.q[:1], float(motion.time[0]))
-    duration = float(motion.time[-1] - motion.time[0])
+    (M,) = mass_matrices(run.model, run.q[:1], float(run.time[0]))
+    duration = float(run.time[-1] - run.time[0])
     largest = float(energy.max(initial=0.0))
-    return Start(M, motion.rows[1][0], motion.a[0], stiffness, damping, late, largest, duration)
+    return Start(
+        M=M,
+        C_q=constraint_rows(run)[1][0],
+        a=run.a[0],
+        stiffness=stiffness,
+        damping=damping,
+        late=late,
+        largest=largest,
+        duration=duration,
+    )
 
 
 INTERVALS = 16  # of a piece, over each of which curvature is constant but for its share in the direction

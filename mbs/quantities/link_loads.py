@@ -19,8 +19,10 @@ from ..model.known_motion import MotionForces, Wrench, motion_forces, required_f
 from ..model.masses import turns_as_a_body
 from ..model.motors import split_forces
 from ..model.nodes import Section
+from ..run.record import Run
 from ..scene.bodies import Payload, tensor
-from .motion import RobotMotion
+from .motion import acting_forces, places, system_of
+from .supply import behind_gears
 
 
 @struct
@@ -31,49 +33,49 @@ class LinkLoads:
     modal_force: Array  # (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches
 
 
-def loads_on_links(motion: RobotMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Of each of `bodies`. Nothing where motors turn frames: what they do to a link acts at no interface."""
-    if motion.model.scene.motors == "frame":
+    if run.model.scene.motors == "frame":
         return {}
-    return _link_loads(motion, bodies, _with_motors(motion))
+    return _link_loads(run, bodies, _with_motors(run))
 
 
-def loads_in_equations(motion: RobotMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+def loads_in_equations(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Of each of `bodies`, as its equations of motion have them: forces along trajectories where these act."""
-    return _link_loads(motion, bodies, motion.behind_gears.forces)
+    return _link_loads(run, bodies, acting_forces(behind_gears(run)))
 
 
-def _link_loads(motion: RobotMotion, bodies: Iterable[str], forces: MotionForces) -> dict[str, LinkLoads]:
-    tree, gravity, found = motion.model.tree, np.array(motion.model.scene.gravity), {}
+def _link_loads(run: Run, bodies: Iterable[str], forces: MotionForces) -> dict[str, LinkLoads]:
+    tree, gravity, loads = run.model.tree, np.array(run.model.scene.gravity), {}
     for name in bodies:
         number = tree.index[name]
-        node, F = tree.nodes[number], motion.places.frame(number).F
+        node, F = tree.nodes[number], places(run).frame(number).F
         at_points = _at_points(F, forces.at_points[number])
         left = forces.found.modal[:, node.p_v].copy()
         for point, wrench in at_points.items():
             at = node.body.points[point]
             left -= wrench @ np.vstack([at.translation, at.rotation])
-        for payload in motion.model.scene.payload:
+        for payload in run.model.scene.payload:
             body, point = split_point(payload.point)
-            if body == name and not turns_as_a_body(motion.model.scene, payload):  # others are bodies of their own
-                at_points[point] = at_points.get(point, 0.0) + _of_mass(motion, payload)
+            if body == name and not turns_as_a_body(run.model.scene, payload):  # others are bodies of their own
+                at_points[point] = at_points.get(point, 0.0) + _of_mass(run, payload)
         a, alpha, omega = forces.of_body(number)
         sizes = _of_frame(*np.hsplit(_in_axes_of(F, (a - gravity, alpha, omega)), 3))
         for point, wrench in at_points.items():
             sizes |= dict(zip(interface_load_names([point]), wrench.T, strict=True))
-        found[name] = LinkLoads(sizes, left)
-    return found
+        loads[name] = LinkLoads(sizes, left)
+    return loads
 
 
 def _at_points(F: Array, acting: Iterable[tuple[Section, Wrench]]) -> dict[str, Array]:
     """(T, 6) by point, in axes of the body F (T, 3, 3); without what turns its frame and not the section."""
-    found = dict[str, Array]()
+    wrenches = dict[str, Array]()
     for section, wrench in acting:
         if section.point:
             force, moment = np.hsplit(_in_axes_of(F, wrench), 2)
             own = np.hstack([force, section.turned(moment[..., None])[..., 0]])
-            found[section.point] = found.get(section.point, 0.0) + own
-    return found
+            wrenches[section.point] = wrenches.get(section.point, 0.0) + own
+    return wrenches
 
 
 def _in_axes_of(F: Array, vectors: Iterable[Array]) -> Array:
@@ -83,27 +85,27 @@ def _in_axes_of(F: Array, vectors: Iterable[Array]) -> Array:
 
 def _of_frame(a: Array, alpha: Array, omega: Array) -> dict[str, Array]:
     """Sizes of the d'Alembert forces of the frame's motion, (T, 3) each in its axes; gravity is taken off a."""
-    found = {f"t_{axis}": column for axis, column in zip("xyz", a.T, strict=True)}
-    found |= {f"r_{axis}": column for axis, column in zip("xyz", alpha.T, strict=True)}
-    return found | {f"omega_{name}": omega[:, i] * omega[:, j] for name, (i, j) in PAIRS.items()}
+    sizes = {f"t_{axis}": column for axis, column in zip("xyz", a.T, strict=True)}
+    sizes |= {f"r_{axis}": column for axis, column in zip("xyz", alpha.T, strict=True)}
+    return sizes | {f"omega_{name}": omega[:, i] * omega[:, j] for name, (i, j) in PAIRS.items()}
 
 
-def _of_mass(motion: RobotMotion, payload: Payload) -> Array:
+def _of_mass(run: Run, payload: Payload) -> Array:
     """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
-    of_point = motion.forces.of_point(payload.point)
-    force = -payload.mass * (of_point.a - np.array(motion.model.scene.gravity))
-    F = motion.frame(split_point(payload.point)[0]).F
+    of_point = acting_forces(run).of_point(payload.point)
+    force = -payload.mass * (of_point.a - np.array(run.model.scene.gravity))
+    F = places(run).frame(run.model.tree.index[split_point(payload.point)[0]]).F
     return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))
 
 
-def _with_motors(motion: RobotMotion) -> MotionForces:
+def _with_motors(run: Run) -> MotionForces:
     """Where motors carry the motion, without forces on its paths: these stay where the motors do not fit."""
-    model = motion.model
+    model = run.model
     loops, motors = int(model.loop_rows.sum()), sum(len(columns) for columns in model.motors.values())
-    if not motion.is_prescribed or loops + motors != int(model.tree.joint_columns.sum()):
-        return motion.behind_gears.forces
-    total = required_forces(model, motion, motion.time)
-    multipliers = np.zeros_like(motion.multipliers)
-    multipliers[:, model.loop_rows] = split_forces(model, motion.q, total).loops
-    behind = motion.behind_gears
-    return motion_forces(behind.system, behind, motion.time, multipliers)
+    if not run.is_prescribed or loops + motors != int(model.tree.joint_columns.sum()):
+        return acting_forces(behind_gears(run))
+    total = required_forces(model, run, run.time)
+    multipliers = np.zeros_like(run.multipliers)
+    multipliers[:, model.loop_rows] = split_forces(model, run.q, total).loops
+    behind = behind_gears(run)
+    return motion_forces(system_of(behind), behind, run.time, multipliers)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -20,53 +19,53 @@ from ..linear.statics import natural_sizes
 from ..model.known_motion import MotionForces, Wrench, multiplier_forces
 from ..model.nodes import Node
 from ..posture.posture import SINGULAR, robot_size, row_sizes
+from ..run.record import Run
 from ..scene.loads import OF_POINT
-from .motion import RobotMotion
+from .motion import acting_forces, constraint_rows, places, system_of
+from .supply import behind_gears
 
 
-def reactions(motion: RobotMotion) -> Mapping[str, Wrench]:
+def reactions(run: Run) -> Mapping[str, Wrench]:
     """By joint: force on its second side, and moment about where that side is, N and N·m.
 
     A joint of the tree carries what its body and its outboard subtree need, less what else acts there and what acts
     along its coordinates: motors, friction, loads, rotors. One that closes a loop has its multipliers.
     """
-    behind = motion.behind_gears
-    return _carried(motion, behind.forces, behind.q)
+    behind = behind_gears(run)
+    return _carried(run, acting_forces(behind), behind.q)
 
 
-def reactions_of_loops(motion: RobotMotion, forces: Array) -> Mapping[str, Wrench]:
+def reactions_of_loops(run: Run, forces: Array) -> Mapping[str, Wrench]:
     """What forces (T, rows that close loops) along these rows are in `reactions`."""
-    multipliers = np.zeros_like(motion.multipliers)
-    multipliers[:, motion.model.loop_rows] = -forces
-    return _carried(motion, multiplier_forces(motion.system, motion.q, motion.time, multipliers), motion.q)
+    multipliers = np.zeros_like(run.multipliers)
+    multipliers[:, run.model.loop_rows] = -forces
+    return _carried(run, multiplier_forces(system_of(run), run.q, run.time, multipliers), run.q)
 
 
-def _carried(motion: RobotMotion, forces: MotionForces, q: Array) -> dict[str, Wrench]:
+def _carried(run: Run, forces: MotionForces, q: Array) -> dict[str, Wrench]:
     """By joint what it carries but does no work along it; q (T, n) are those of the tree of `forces`."""
-    found, model = dict[str, Wrench](), motion.model
+    wrenches, model = dict[str, Wrench](), run.model
     for number, row in enumerate(model.rows):
         if not row.is_trajectory and row.coordinate < 0:  # else it turns a rotor, along the joint
             on_b = forces.of_row(number)[1]
-            found[row.owner] = found[row.owner].plus(on_b) if row.owner in found else on_b
+            wrenches[row.owner] = wrenches[row.owner].plus(on_b) if row.owner in wrenches else on_b
     loops = {joint.name for joint in model.tree.loops}
     for node, carried in zip(model.tree.nodes, forces.carried(q), strict=False):
         if node.joint.name not in loops:
-            found[node.joint.name] = _on_second(motion, node, carried)
-    return found
+            wrenches[node.joint.name] = _on_second(run, node, carried)
+    return wrenches
 
 
-def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
+def _on_second(run: Run, node: Node, on_outer: Wrench) -> Wrench:
     """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
     if not node.backwards:
         return on_outer
-    outer, inner = (motion.places.at(section).r for section in (node.outer, node.inner))
+    outer, inner = (places(run).at(section).r for section in (node.outer, node.inner))
     return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
 
 
 OPEN = 1e-6  # share of a component in reactions that change together, above which it is open
 SAMPLES = 5  # outputs that are looked at: constraints that depend on each other in all of them do so everywhere
-
-M = TypeVar("M", bound=RobotMotion)
 
 
 @struct
@@ -88,59 +87,63 @@ class Sharing:
         )
 
 
-def shared_evenly(motion: M) -> tuple[M, Sharing | None]:
+def shared_evenly(run: Run) -> tuple[Run, Sharing | None]:
     """The motion with the least sum of squares of all joints' forces, and moments over the robot's size; what is open.
 
     None where nothing is: then the motion is as it was.
     """
-    is_loop = motion.model.loop_rows
-    if not is_loop.any() or not len(motion.time):
-        return motion, None
-    B, measured = _multipliers_of_loops(motion)
-    row_scales = row_sizes(motion.model)[measured]
-    J = np.einsum("rm,tri->tmi", B, motion.rows[1][:, is_loop]) * natural_sizes(motion.model) / row_scales[:, None]
+    is_loop = run.model.loop_rows
+    if not is_loop.any() or not len(run.time):
+        return run, None
+    B, measured = _multipliers_of_loops(run)
+    row_scales = row_sizes(run.model)[measured]
+    J = (
+        np.einsum("rm,tri->tmi", B, constraint_rows(run)[1][:, is_loop])
+        * natural_sizes(run.model)
+        / row_scales[:, None]
+    )
     some = np.unique(np.linspace(0, len(J) - 1, SAMPLES).astype(int))
     values = np.linalg.svd(J[some], compute_uv=False)
     redundant = J.shape[1] - int(np.max(np.sum(values > SINGULAR * np.maximum(values[:, :1], 1.0), axis=1)))
     if redundant == 0:
-        return motion, None
+        return run, None
     null = B @ (np.linalg.eigh(J @ J.swapaxes(1, 2))[1][:, :, :redundant] / row_scales[:, None])  # ascending
-    changes = [_side_by_side(motion, reactions_of_loops(motion, column)) for column in null.transpose(2, 0, 1)]
+    changes = [_side_by_side(run, reactions_of_loops(run, column)) for column in null.transpose(2, 0, 1)]
     basis = np.stack(changes, axis=-1)  # (T, components, redundant)
-    even = -np.einsum("tkc,tc->tk", np.linalg.pinv(basis), _side_by_side(motion, reactions(motion)))
-    multipliers = motion.multipliers.copy()
+    even = -np.einsum("tkc,tc->tk", np.linalg.pinv(basis), _side_by_side(run, reactions(run)))
+    multipliers = run.multipliers.copy()
     multipliers[:, is_loop] -= np.einsum("trk,tk->tr", null, even)
-    components = _open(motion, basis)
-    return replace(motion, multipliers=multipliers), Sharing(redundant, components) if components else None
+    components = _open(run, basis)
+    return replace(run, multipliers=multipliers), Sharing(redundant, components) if components else None
 
 
-def _multipliers_of_loops(motion: RobotMotion) -> tuple[Array, Integers]:
+def _multipliers_of_loops(run: Run) -> tuple[Array, Integers]:
     """B (rows that close loops, m): multipliers of these rows by those that do something; m rows with their measures.
 
     In planar scenes only those in the plane do.
     """
-    is_loop = motion.model.loop_rows
-    plane = motion.system.plane if motion.space.is_plane else None
+    is_loop = run.model.loop_rows
+    plane = system_of(run).plane if run.space.is_plane else None
     if plane is None:
         return np.eye(int(is_loop.sum())), np.flatnonzero(is_loop)
     of_loops = is_loop[plane.followed]
-    B = motion.system.row_signs[:, None] * plane.spread
+    B = system_of(run).row_signs[:, None] * plane.spread
     return B[np.ix_(is_loop, of_loops)], plane.followed[of_loops]
 
 
-def _side_by_side(motion: RobotMotion, found: Mapping[str, Wrench]) -> Array:
+def _side_by_side(run: Run, wrenches: Mapping[str, Wrench]) -> Array:
     """(T, 6 joints) force and moment of the scene's joints, N, moments over the size of the robot."""
-    length = robot_size(motion.model)
-    parts = (found[joint.name] for joint in motion.model.scene.joint)
+    length = robot_size(run.model)
+    parts = (wrenches[joint.name] for joint in run.model.scene.joint)
     return np.hstack([values for acting in parts for values in (acting.force, acting.moment / length)])
 
 
-def _open(motion: RobotMotion, basis: Array) -> dict[str, tuple[str, ...]]:
+def _open(run: Run, basis: Array) -> dict[str, tuple[str, ...]]:
     """Components that the space has of joints which any combination of changes (T, 6 joints, redundant) moves."""
     directions = np.linalg.svd(basis, full_matrices=False)[0]
-    joints = [joint.name for joint in motion.model.scene.joint]
+    joints = [joint.name for joint in run.model.scene.joint]
     moved = np.linalg.norm(directions, axis=2).max(axis=0).reshape(len(joints), len(OF_POINT)) > OPEN
-    space = motion.space
+    space = run.space
     moved[:, [axis not in (*space.translations, *(3 + k for k in space.rotations)) for axis in range(6)]] = False
     found = {name: tuple(np.array(OF_POINT)[of].tolist()) for name, of in zip(joints, moved, strict=True)}
     return {name: components for name, components in found.items() if components}

@@ -169,15 +169,15 @@ def missing_to_first_order(
 
 def _moved(point: LoadedPoint, p: Array, change: Array) -> Array:
     """(6, T) ΦΔp − ½ pᵀK p of p and Δp (T, n)."""
-    found: Array = point.by_modes @ change.T - 0.5 * ((p @ point.K) * p).sum(axis=2)
-    return found
+    moved: Array = point.by_modes @ change.T - 0.5 * ((p @ point.K) * p).sum(axis=2)
+    return moved
 
 
 def _carried(held: LoadedPoint, moved: Array, places: Array) -> Array:
     """What a section that is `moved` (6, m) does to points at `places` (k, 3) that it carries: (k, 3, m)."""
     arms = places - held.position
-    found: Array = moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
-    return found
+    carried: Array = moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
+    return carried
 
 
 def missing_to_second_order(
@@ -209,8 +209,8 @@ def _worst_outputs(loads: ModalLoads, p: Array) -> Indices:
     """Indices of outputs whose Δp, or whose −½ pᵀK p, may be the largest."""
     energy = np.sqrt((p**2 * loads.stiffness).sum(axis=1))
     at = [np.argsort(-values)[:OUTPUTS] for values in (np.sqrt(loads.squares) * energy, energy)]
-    found: Indices = np.unique(np.concatenate(at))
-    return found
+    outputs: Indices = np.unique(np.concatenate(at))
+    return outputs
 
 
 def _largest(p: Array, shapes: Array) -> float:

@@ -20,11 +20,11 @@ from .._core import TimeFunction
 from ..linear.statics import Statics
 from ..linear.vibration import without_rows
 from ..model.model import Model
-from ..run.outcome import Outcome
+from ..run.record import Run
 from ..scene.analysis import TimedAnalysis
 from ..scene.mechanism import MechanismScene
 from ..scene.trajectories import Trajectory
-from .motion import RobotMotion
+from .motion import section_motion
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
@@ -61,7 +61,7 @@ class Rest(NamedTuple):
     frequency: float  # Hz, the lowest of that robot there; NaN where nothing vibrates
 
 
-def commanded_rest(commanding: Outcome) -> Rest | None:
+def commanded_rest(commanding: Run) -> Rest | None:
     """Of a run that follows paths; None where these move to its end, or leave the robot free to move.
 
     And where the run did not complete, or no equilibrium is near its last posture.
@@ -113,7 +113,6 @@ def end_of_paths(paths: Sequence[Trajectory], analysis: TimedAnalysis) -> float:
 
 
 def _breaks(path: Trajectory) -> Sequence[float]:
-    """Instants (s) at which its law changes."""
     if path.path is not None:
         return [float(t) for t in path.path.breaks]
     return [t for _, target in path.targets for t in target.switches()]
@@ -152,29 +151,20 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
     yield from found or [f"{body}.{labels[-1]}" for body, labels in list(points.items())[-1:] if labels]
 
 
-def settling(
-    motion: RobotMotion, rest: Rest, points: Sequence[str], tolerance: float, lowest: float
-) -> dict[str, Settling]:
+def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowest: float) -> dict[str, Settling]:
     """Of each of the points of a `motion` that ends at rest; `lowest`: frequency (Hz) of the run, NaN for none."""
     from scipy.interpolate import CubicHermiteSpline
 
-    first = max(int(np.searchsorted(motion.time, rest.since, side="right")) - 1, 0)
-    after = _part(motion, motion.model, *(values[first:] for values in (motion.time, motion.q, motion.v)))
-    at_rest = _part(motion, rest.model, np.zeros(1), rest.q[None], np.zeros((1, rest.model.tree.n_v)))
-    found = {}
+    first = max(int(np.searchsorted(run.time, rest.since, side="right")) - 1, 0)
+    after = replace(run, time=run.time[first:], q=run.q[first:], v=run.v[first:])
+    still = np.zeros((1, rest.model.tree.n_v))
+    at_rest = replace(run, model=rest.model, time=np.zeros(1), q=rest.q[None], v=still)
+    settled = {}
     for point in points:
-        r, r_dot = after.place_and_rate(point)
-        path, place = CubicHermiteSpline(after.time, r, r_dot), at_rest.point(point).position[0]
-        found[point] = _settling(path, place, rest.since, tolerance, lowest)
-    return found
-
-
-def _part(motion: RobotMotion, model: Model, time: Array, q: Array, v: Array) -> RobotMotion:
-    """States of the same robot, alone."""
-    return replace(
-        motion, model=model, time=time, q=q, v=v, a=0.0 * v, multipliers=np.zeros((len(time), len(model.rows))),
-        required=None, applied=(), commanded={}, twists={},
-    )  # fmt: skip
+        moving, place = section_motion(after, point), section_motion(at_rest, point).r[0]
+        path = CubicHermiteSpline(after.time, moving.r, moving.velocity)
+        settled[point] = _settling(path, place, rest.since, tolerance, lowest)
+    return settled
 
 
 def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: float, lowest: float) -> Settling:
@@ -196,4 +186,12 @@ def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: f
     elif beyond.size:
         near = times[beyond[-1] : beyond[-1] + 2]
         time_to = float(brentq(lambda t: float(off(t)) - tolerance, *near)) - since
-    return Settling(residual, float(off(since)), float(off(end)), lowest, time_to, tolerance, since)
+    return Settling(
+        residual=residual,
+        at_path_end=float(off(since)),
+        at_end=float(off(end)),
+        frequency=lowest,
+        time_to=time_to,
+        tolerance=tolerance,
+        path_end=since,
+    )

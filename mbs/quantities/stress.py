@@ -50,15 +50,15 @@ class BodyStress:
 
     def largest(self) -> tuple[float, int, str]:
         """Largest von Mises stress in Pa, at which output, and where: a point's name or a position on the surface."""
-        found = []
+        places = []
         for name, point in self.points.items():
             k = int(np.argmax(point.von_mises))
-            found.append((float(point.von_mises[k]), k, name))
+            places.append((float(point.von_mises[k]), k, name))
         if self.surface is not None:
             k = int(np.argmax(self.surface.von_mises_max))
             place = ", ".join(f"{c:.4g}" for c in self.surface.position_of_max[k])
-            found.append((float(self.surface.von_mises_max[k]), k, f"({place}) m"))
-        return max(found, key=lambda entry: entry[0])
+            places.append((float(self.surface.von_mises_max[k]), k, f"({place}) m"))
+        return max(places, key=lambda entry: entry[0])
 
 
 @struct
@@ -74,12 +74,12 @@ class SectionLoads:
 
     def shares(self, x: Array) -> Array:
         """(m, g) what each place counts for the sections at x (m,): straight lines between those under one patch."""
-        found = np.zeros((len(x), len(self.x)))
+        shares = np.zeros((len(x), len(self.x)))
         for k, (start, end) in enumerate(self.edges):
             own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))
             unit = np.eye(own.size)
-            found[np.ix_(under, own)] = np.stack([np.interp(x[under], self.x[own], row) for row in unit], axis=1)
-        return found
+            shares[np.ix_(under, own)] = np.stack([np.interp(x[under], self.x[own], row) for row in unit], axis=1)
+        return shares
 
 
 @struct
@@ -145,37 +145,37 @@ def has_stresses(body: ModalBody) -> bool:
     return bool(body.stress) or body.surface_stress is not None
 
 
-def body_stress(body: ModalBody, found: Recovery) -> BodyStress:
+def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
     """Stresses over a motion wherever the file of `body` has those of modes."""
     points = {}
     for name, point in body.stress.items():
-        stress = found.cases @ _cases(body, found, point.position[:1], point.stress[None], point.static)[0].T
+        stress = recovery.cases @ _cases(body, recovery, point.position[:1], point.stress[None], point.static)[0].T
         points[name] = PointStress(stress, von_mises(stress))
     surface = None
     if body.surface_stress is not None:
-        cases = _cases(body, found, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
-        surface = _surface(cases, body.mesh.points, found.cases)
-    return BodyStress(points, surface, found)
+        cases = _cases(body, recovery, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
+        surface = _surface(cases, body.mesh.points, recovery.cases)
+    return BodyStress(points, surface, recovery)
 
 
-def surface_stress(body: ModalBody, found: Recovery) -> Array:
+def surface_stress(body: ModalBody, recovery: Recovery) -> Array:
     """(T, p, 6) everywhere on the surface of a body whose file has stresses there, Pa, in the body frame."""
     assert body.surface_stress is not None
-    cases = _cases(body, found, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
-    return np.asarray(np.einsum("pin,tn->tpi", cases, found.cases, optimize=True))
+    cases = _cases(body, recovery, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
+    return np.asarray(np.einsum("pin,tn->tpi", cases, recovery.cases, optimize=True))
 
 
-def _cases(body: ModalBody, found: Recovery, x: Array, modal: Array, static: Array | None) -> Array:
-    """(m, 6, n + l + …) stresses at m places x (m from the root) of all that `found` has sizes of.
+def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: Array | None) -> Array:
+    """(m, 6, n + l + …) stresses at m places x (m from the root) of all that `recovery` has sizes of.
 
     Unit loads that pull at both ends, or bend them, are the unit force and moment in every section.
     """
-    if static is None or (not found.loads and found.sections is None):
+    if static is None or (not recovery.loads and recovery.sections is None):
         return modal
     of = dict(zip(body.stress_loads, np.moveaxis(static.reshape(len(modal), 6, -1), 2, 0), strict=True))
-    parts = [modal, *(of[name][..., None] for name in found.loads)]
-    if found.sections is not None:
-        shares = found.sections.shares(x)[:, None]
+    parts = [modal, *(of[name][..., None] for name in recovery.loads)]
+    if recovery.sections is not None:
+        shares = recovery.sections.shares(x)[:, None]
         for load in ("moment/{}/z", "force/{}/x"):
             unit = of[load.format("tip")] - of[load.format("root")]
             parts.append(unit[..., None] * shares)
@@ -208,7 +208,7 @@ def _surface(modal: Array, positions: Array, p: Array) -> SurfaceStress:
     for start in range(0, len(p), step):
         parts = (rows @ p[start : start + step].T).reshape(5, count, -1)
         squares = np.einsum("apt,apt->pt", parts, parts)
-        found = squares.argmax(axis=0)
-        place[start : start + step] = found
-        largest[start : start + step] = np.sqrt(np.take_along_axis(squares, found[None], axis=0)[0])
+        worst = squares.argmax(axis=0)
+        place[start : start + step] = worst
+        largest[start : start + step] = np.sqrt(np.take_along_axis(squares, worst[None], axis=0)[0])
     return SurfaceStress(largest, positions[place])

@@ -21,8 +21,9 @@ from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
 from ..model.body import Body
 from ..model.nodes import Node
+from ..run.record import Run
 from .link_loads import loads_in_equations
-from .motion import RobotMotion
+from .motion import constraint_rows, cut_motions, node_of, places
 from .second_order import (
     LoadedPoint,
     Missing,
@@ -118,26 +119,26 @@ def enough_pieces(shortening: float, count: int) -> int:
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
-def link_bending(motion: RobotMotion, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
+def link_bending(run: Run, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
     """Of the flexible bodies of the equations by name; `links` are their modal bodies as their files have them."""
-    loads = loads_in_equations(motion, links) if len(motion.time) else {}
-    found = {}
+    loads = loads_in_equations(run, links) if len(run.time) else {}
+    bendings = {}
     for name, link in links.items():
-        body, sizes = motion.node(name).body, loads[name].sizes if name in loads else {}
-        p = motion.q[:, motion.node(name).p_q] @ body.modal_transform.T
-        on_modes = _on_modes(link, motion, name, sizes) if body.n_modes else None
-        on_modes = None if on_modes is None else lasting(on_modes, motion.time)
-        run = LinkInRun(p, body.modal_transform, on_modes, body.stiffening is not None, motion.is_at_rest)
-        found[name] = bending_of_link(link, run, _largest_force(body, sizes, len(p)))
-    return found
+        body, sizes = node_of(run, name).body, loads[name].sizes if name in loads else {}
+        p = run.q[:, node_of(run, name).p_q] @ body.modal_transform.T
+        on_modes = _on_modes(link, run, name, sizes) if body.n_modes else None
+        on_modes = None if on_modes is None else lasting(on_modes, run.time)
+        bent = LinkInRun(p, body.modal_transform, on_modes, body.stiffening is not None, run.is_at_rest)
+        bendings[name] = bending_of_link(link, bent, _largest_force(body, sizes, len(p)))
+    return bendings
 
 
-def _on_modes(link: ModalBody, motion: RobotMotion, name: str, sizes: Mapping[str, Array]) -> ModalLoads:
+def _on_modes(link: ModalBody, run: Run, name: str, sizes: Mapping[str, Array]) -> ModalLoads:
     """Loads of `sizes` (T,) on a body, whether their geometric stiffness is in the equations or not.
 
     Loads by the names of `fe_models.modal_body.unit_loads`; those alone of which the file has a geometric stiffness.
     """
-    node = motion.node(name)
+    node = node_of(run, name)
     T, n = node.body.modal_transform, len(node.body.stiffness)
     K = {load: T.T @ of_load @ T for load, of_load in link.geometric_stiffness.items()}
     known = [load for load in sizes if load in K]
@@ -154,19 +155,19 @@ def _on_modes(link: ModalBody, motion: RobotMotion, name: str, sizes: Mapping[st
     held = points.get(node.outer.point)
     if held is not None:
         counts = np.eye(6)
-        counts[3:, 3:] = _turns_that_count(motion, node)
+        counts[3:, 3:] = _turns_that_count(run, node)
         held = LoadedPoint(held.position, counts @ held.by_modes, np.tensordot(counts, held.K, axes=1))
     K_known = np.array([K[load] for load in known]).reshape(-1, n, n)
     return ModalLoads(f, K_known, node.body.stiffness, tuple(points.values()), held)
 
 
-def _turns_that_count(motion: RobotMotion, node: Node) -> Array:
+def _turns_that_count(run: Run, node: Node) -> Array:
     """(3, 3), axes of the body: what is left of a rotation of its section at a joint without those that it is free to.
 
     What trajectories hold is not free. Joints that turn about more than one axis leave nothing.
     """
-    along = [row for row in motion.model.rows if row.is_trajectory and row.kind == "coordinate"]
-    if node.joint.name in map(motion.model.joint_of, along):
+    along = [row for row in run.model.rows if row.is_trajectory and row.kind == "coordinate"]
+    if node.joint.name in map(run.model.joint_of, along):
         return np.eye(3)
     free = (node.joint.guess_units or node.joint.units).count("rad")
     axis = node.outer.triad[:, 2:]
@@ -209,7 +210,16 @@ def bending_of_link(link: ModalBody, run: LinkInRun, force: Array) -> Bending:
         places = link.stations.position
         missing = missing_to_first_order(run.loads, p, stations, places, link.length, is_at_rest=run.is_at_rest)
     return Bending(
-        w, phi, s, moment, change.largest, link.length, run.is_stiffened, missing, rotations, buckling=change.buckling
+        deflection=w,
+        rotation=phi,
+        foreshortening=s,
+        foreshortening_moment=moment,
+        stiffness_change=change.largest,
+        length=link.length,
+        is_stiffened=run.is_stiffened,
+        missing=missing,
+        rotations=rotations,
+        buckling=change.buckling,
     )
 
 
@@ -254,44 +264,44 @@ TURN = 2 * np.pi
 LEAST = 1e-9  # of the robot's size, or rad: constraints that are off by less are met
 
 
-def doubts(motion: RobotMotion, tolerance: float) -> Iterator[str]:
+def doubts(run: Run, tolerance: float) -> Iterator[str]:
     """Of a motion that was found to `tolerance`: constraints that are not met, turns and angles that are in doubt."""
-    yield from _violated(motion, max(tolerance, LEAST))
-    for one, of_cut in motion.cut:
+    yield from _violated(run, max(tolerance, LEAST))
+    for one, of_cut in cut_motions(run):
         if not of_cut.is_counted:
             yield (
                 f"{one.joint.label}: outputs are too far apart to count the turns of its coordinate, which may be off"
                 " by whole turns: the loop is cut at this joint; choose a smaller output_step"
             )
-    for joint in motion.model.scene.joint:
+    for joint in run.model.scene.joint:
         if max(map(abs, joint.rpy)) > TURN:
             angles = ", ".join(f"{angle:g}" for angle in joint.rpy)
             yield f'{joint.label}: rpy = [{angles}] rad is more than a turn (degrees are written "90*deg")'
 
 
-def _violated(motion: RobotMotion, allowed: float) -> Iterator[str]:
+def _violated(run: Run, allowed: float) -> Iterator[str]:
     """The constraint that is violated most, where that is more than `allowed`, of the robot's size or rad."""
-    if not motion.model.rows or not len(motion.time):
+    if not run.model.rows or not len(run.time):
         return
-    C = np.abs(motion.rows[0])
-    is_way = np.array([motion.model.measures_way(row) for row in motion.model.rows])
-    share = np.where(is_way, C / _extent(motion), C)
+    C = np.abs(constraint_rows(run)[0])
+    is_way = np.array([run.model.measures_way(row) for row in run.model.rows])
+    share = np.where(is_way, C / _extent(run), C)
     at, k = np.unravel_index(int(np.argmax(share)), share.shape)  # the first NaN, if there is one
     if not share[at, k] <= allowed:
-        row = motion.model.rows[k]
+        row = run.model.rows[k]
         yield (
             f'{"trajectory" if row.is_trajectory else "joint"} "{row.owner}" is violated by {C[at, k]:.3g}'
-            f" {'m' if is_way[k] else 'rad'} at t = {motion.time[at]:.6g} s: the result is not a motion of this robot;"
+            f" {'m' if is_way[k] else 'rad'} at t = {run.time[at]:.6g} s: the result is not a motion of this robot;"
             " choose a smaller tolerance or another integrator"
         )
 
 
-def _extent(motion: RobotMotion) -> float:
+def _extent(run: Run) -> float:
     """A length (m) of the robot: its largest body, or the space in which its bodies move."""
-    places: Array = np.concatenate([motion.places.frame(number).r for number in range(len(motion.model.tree.nodes))])
+    origins: Array = np.concatenate([places(run).frame(number).r for number in range(len(run.model.tree.nodes))])
     bodies = [
         np.ptp([at.position for at in node.body.points.values()], axis=0)
-        for node in motion.model.tree.nodes
+        for node in run.model.tree.nodes
         if node.body.points
     ]
-    return max(float(np.linalg.norm(size)) for size in (*bodies, np.ptp(places, axis=0))) or 1.0
+    return max(float(np.linalg.norm(size)) for size in (*bodies, np.ptp(origins, axis=0))) or 1.0

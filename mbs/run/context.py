@@ -14,7 +14,7 @@ from ..model.divided_link import DividedLink
 from ..model.known_motion import State
 from ..model.model import Model
 from .drive import Progress
-from .outcome import EarlierRun, Outcome
+from .record import Run
 
 Point = TypeVar("Point", str, str | None)
 
@@ -53,11 +53,11 @@ class ActuationPoints(Protocol):
         """What `_core.point_reader` takes of their body: directions and positions (3, c), Φ (3 c, n), scale (6 + n)."""
 
 
-ForcesAtPoints = Callable[[Outcome], Mapping[str, Array]]
+ForcesAtPoints = Callable[[Run], Mapping[str, Array]]
 """By "BODY.POINT" what a run's driving forces are there: (T, 3) N, global axes."""
 
 
-def no_points(run: Outcome) -> Mapping[str, Array]:
+def no_points(run: Run) -> Mapping[str, Array]:
     """None."""
     return {}
 
@@ -70,7 +70,7 @@ class WholeLinks:
     divided: Mapping[str, DividedLink]  # the links in pieces by name
     places: Mapping[str, str]  # which point of which piece "BODY.POINT" of such a link is
     # an outcome of the pieces as one of the links; `InputError` where their joints lack coordinates
-    as_links: Callable[[Outcome], Outcome]
+    as_links: Callable[[Run], Run]
 
 
 @struct
@@ -80,9 +80,9 @@ class Context:
     _: KW_ONLY
     progress: Progress  # see `drive.Progress`
     model: Model  # the robot, with the constraint equations of all joints that close loops and of all trajectories
-    outcomes: Mapping[str, Outcome]  # of the analyses before, by name
+    outcomes: Mapping[str, Run]  # of the analyses before, by name
     is_replayed: bool = False  # whether a later analysis takes its actuation
-    earlier: EarlierRun | None = None  # an earlier run of the same analysis, to go on with; None from the start
+    earlier: Run | None = None  # an earlier run of the same analysis, to go on with; None from the start
     patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # of links by body
     points: Mapping[str, ActuationPoints] = field(default_factory=dict)  # actuation points by body
     at_points: ForcesAtPoints = no_points  # what driving forces are there

@@ -30,15 +30,15 @@ def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Ch
     def accelerations() -> Array:
         return _core.tree_outputs(system.core, system.scene, [t], np.array(run.last)[None]).accelerations
 
-    found = (
+    causes = (
         not_a_number(_targets(system), accelerations, t)
         or too_far_bent(_links(system, at))
         or load_jump(_loads(system), t)
         or _friction(system, analysis, choice, at)
         or describe_loops(system.model, t, at.q, at.v)
     )
-    if found or run.status != _core.IntegrationStatus.step_underflow:
-        return found
+    if causes or run.status != _core.IntegrationStatus.step_underflow:
+        return causes
     return beyond_order(choice, analysis) or unmet(choice, run)
 
 

@@ -29,11 +29,11 @@ from ..posture.posture import (
 )
 from ..posture.reach import out_of_reach
 from ..posture.start import rank_of_redundant_loops
-from ..scene.analysis import IntegratedAnalysis
+from ..scene.analysis import Analysis, IntegratedAnalysis
 from .diagnosis import find_cause
 from .integrator_choice import choose_integrator
 from .integrators import beyond_rounding, integration_controls, with_steps_of
-from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from .record import Continuation, Run, Statistics
 from .samples import (
     ALL_LOOKED_AT,
     LOOKED_AT,
@@ -86,9 +86,9 @@ def drive_robot(
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
     control: Control | None = None,
-    earlier: EarlierRun | None = None,
+    earlier: Run | None = None,
     is_recorded: bool = False,
-) -> Outcome:
+) -> Run:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
@@ -126,8 +126,8 @@ def drive_robot(
     )
     continuation = continuation if earlier is None else earlier.continuation
     run = _integrated(system, times, start, controls, control, progress, continuation)
-    motion = _motion(system, run, times)
-    motion = motion if earlier is None else earlier.motion.followed_by(motion)
+    motion = _motion(system, run, times, analysis)
+    motion = motion if earlier is None else motion.after(earlier)
     in_posture = _ends_in_posture(run)
     posture = describe_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     if loop_rank is not None and len(motion.time):
@@ -151,29 +151,27 @@ def drive_robot(
         run.evaluations, time.perf_counter() - began, continuation.checkpoint.time if control is None else None, cause,
         np.array(run.step_ends), texts,
     )  # fmt: skip
-    found = Outcome(
-        analysis=analysis,
-        model=model,
-        motion=motion,
-        forces=Forces(applied=drives.at_points),
+    found = replace(
+        motion,
+        applied=drives.at_points,
         statistics=statistics if earlier is None else statistics.added_to(earlier.statistics),
         continuation=continuation if control is None else None,
     )
-    numbers = _numbers(drives.replayed, run, found, 0 if earlier is None else len(earlier.motion.time))
+    numbers = _numbers(drives.replayed, run, found, 0 if earlier is None else len(earlier.time))
     acting = _under(drives, found, numbers)
     if (reached := reached_samples(continuation.samples, found.time)) is None:
         return acting
 
     @cache
-    def look_closer() -> Outcome:
+    def look_closer() -> Run:
         between, more = _between(system, *reached, ends, found, control)
         order = in_order(found.time, between.time)
-        return _under(drives, found.among(between), np.concatenate([numbers, more])[order])
+        return _under(drives, found.with_rows_of(between, order), np.concatenate([numbers, more])[order])
 
     return replace(acting, look_closer=look_closer)
 
 
-def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Outcome, known: int) -> Array:
+def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Run, known: int) -> Array:
     """What a replay does (T, numbers) at outputs of `run`, of which those that were `known` say nothing."""
     if replayed is None:
         return np.zeros((len(found.time), 0))
@@ -181,7 +179,7 @@ def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Outcome, know
     return np.concatenate([before, run.replayed[known:]]) if known else run.replayed
 
 
-def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
+def _under(drives: Drives, run: Run, numbers: Array) -> Run:
     """The run with what a replay does on joints and points at its times."""
     if drives.replayed is None or not len(run.time):
         return run
@@ -191,13 +189,12 @@ def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
         for point, of_point in drives.replayed.at_points.items()
     )
     commanded = {joint: numbers[:, list(columns)] for joint, columns in drives.replayed.moments.items()}
-    forces = replace(run.forces, commanded=commanded, applied=(*drives.at_points, *applied))
-    return replace(run, forces=forces)
+    return replace(run, commanded=commanded, applied=(*drives.at_points, *applied))
 
 
 def _between(
-    system: MultibodySystem, times: Array, states: Array, ends: Array, found: Outcome, control: Control | None
-) -> tuple[Outcome, Array]:
+    system: MultibodySystem, times: Array, states: Array, ends: Array, found: Run, control: Control | None
+) -> tuple[Run, Array]:
     """The run at `times` (k,) of it, with `states` (k, n), and what a replay does there (T, numbers).
 
     `ends` of steps, s, are among what is looked at.
@@ -219,36 +216,38 @@ def _between(
     rates = states[:, -len(joints) :][:, joints]
     is_long = len(times) > ALL_LOOKED_AT and not found.analysis.is_repeated
     if control is not None and is_long:
-        motion = _telling_motion(system, at, times)
-        return replace(found, motion=motion), np.zeros((len(motion.time), 0))
+        motion = _telling_motion(system, at, times, found.analysis)
+        return motion, np.zeros((len(motion.time), 0))
     some = some_of(times, rates, ends, LOOKED_AT if control is None else PARTS_OF_STEP * ALL_LOOKED_AT)
     if is_long:
         some = np.union1d(some, telling(times, states, np.abs(states).max(axis=0)))
     run = at(some)
-    motion, replayed = _motion(system, run, times[some]), run.replayed
+    motion, replayed = _motion(system, run, times[some], found.analysis), run.replayed
     if (more := np.setdiff1d(about_highest(some, np.hstack([motion.multipliers, motion.a[:, joints]])), some)).size:
         others, order = at(more), np.argsort(np.concatenate([some, more]))
-        motion = motion.with_rows_of(_motion(system, others, times[more]), order)
+        motion = motion.with_rows_of(_motion(system, others, times[more], found.analysis), order)
         replayed = np.concatenate([replayed, others.replayed])[order]
-    return replace(found, motion=motion), replayed
+    return motion, replayed
 
 
-def _telling_motion(system: MultibodySystem, at: Callable[[Indices], _core.TreeRun], times: Array) -> Motion:
+def _telling_motion(
+    system: MultibodySystem, at: Callable[[Indices], _core.TreeRun], times: Array, analysis: Analysis
+) -> Run:
     """The motion at those of `times` (k,), s, from which it follows at the others; `at` has it at rows."""
     sizes = np.zeros(1)  # of each column, so far
 
-    def thinned(motion: Motion) -> Motion:
+    def thinned(motion: Run) -> Run:
         nonlocal sizes
         values = np.hstack([motion.q, motion.v, motion.a, motion.multipliers])
         sizes = np.maximum(sizes, np.abs(values).max(axis=0))
         return motion.at(telling(motion.time, values, sizes))
 
     blocks = (np.arange(first, min(first + MANY, len(times))) for first in range(0, len(times), MANY))
-    parts = [thinned(_motion(system, at(rows), times[rows])) for rows in blocks]
-    q, v, a, multipliers = (
-        np.concatenate([getattr(of, name) for of in parts]) for name in ("q", "v", "a", "multipliers")
-    )
-    return thinned(Motion(np.concatenate([of.time for of in parts]), q, v, a, multipliers))
+    parts = [thinned(_motion(system, at(rows), times[rows], analysis)) for rows in blocks]
+    names = ("time", "q", "v", "a", "multipliers")
+    states = {name: np.concatenate([getattr(of, name) for of in parts]) for name in names}
+    whole: Run = replace(parts[0], **states)  # type: ignore[arg-type]
+    return thinned(whole)
 
 
 def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array, Array, Array]:
@@ -265,10 +264,18 @@ def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array
     return every[order], np.concatenate([states, states[near]])[order], both
 
 
-def _motion(system: MultibodySystem, run: _core.TreeRun, times: Array) -> Motion:
+def _motion(system: MultibodySystem, run: _core.TreeRun, times: Array, analysis: Analysis) -> Run:
     """The motion of a run of the core, as far as it got."""
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
-    return Motion(times[: len(q)], q, v, run.accelerations, system.multipliers(run.multipliers))
+    return Run(
+        analysis=analysis,
+        model=system.model,
+        time=times[: len(q)],
+        q=q,
+        v=v,
+        a=run.accelerations,
+        multipliers=system.multipliers(run.multipliers),
+    )
 
 
 def _ends_in_posture(run: _core.TreeRun) -> bool:

@@ -23,7 +23,7 @@ from ..model.known_motion import KnownStates, States, required_forces, rotor_tor
 from ..model.model import Model
 from ..model.motors import MotorForces, motor_forces, turning_motors
 from ..model.nodes import Node, rotor
-from .outcome import GearMotion, Outcome
+from .record import GearMotion, Run
 from .replay import supplied_in
 
 if TYPE_CHECKING:
@@ -64,7 +64,13 @@ def supplied_through_gears(
         forces = motor_forces(model, state.q, wanted + felt)
         gears = {
             node.joint.name: _gear(
-                model, state, time, node, torques[:, model.tree.index[node.body.name]], forces, twists
+                model=model,
+                state=state,
+                time=time,
+                node=node,
+                torque=torques[:, model.tree.index[node.body.name]],
+                forces=forces,
+                twists=twists,
             )
             for node in elastic
         }
@@ -134,7 +140,7 @@ class MotorCoordinates(NamedTuple):
     moments: Mapping[str, Array]  # (T, k) by joint, of all motors where gears are rigid in the motion
 
 
-def with_motor_coordinates(run: Outcome, model: Model) -> MotorCoordinates:
+def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
     """The motion of `run` in the coordinates of `model`: where its gears give, motors as far ahead as they have to be.
 
     Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle goes with their moments.
@@ -200,11 +206,19 @@ def gear_motion(
         coarse = tau[::2] + spring.inertia * _read(_twist(spring, time[::2], transmitted[::2]), time[::2])[:, 2]
         unresolved = float(np.abs(coarse - moment[::2]).max()) / largest
     angle, rate, acceleration = (gamma + twist).T
-    return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved, twist, curve)
+    return GearMotion(
+        gear_moment=transmitted,
+        angle=angle,
+        rate=rate,
+        acceleration=acceleration,
+        moment=moment,
+        unresolved=unresolved,
+        twist=twist,
+        curve=curve,
+    )
 
 
 def _read(curve: BSpline, time: Array) -> Array:
-    """Value, rate and acceleration (T, 3)."""
     return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
 
 
@@ -226,10 +240,10 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
     for _ in range(MOST_STEPS):
         slope = gear.spring.slope(twist)
         left = (diags(slope) @ values + gear.damping * rates).tocsc()
-        found = spsolve(left, moment - gear.spring.moment(twist) + slope * twist)
-        twist = values @ found
+        coefficients = spsolve(left, moment - gear.spring.moment(twist) + slope * twist)
+        twist = values @ coefficients
         if np.array_equal(gear.spring.slope(twist), slope):
-            return BSpline(knots, found, DEGREE)
+            return BSpline(knots, coefficients, DEGREE)
     raise SolveError(
         f"{gear.where}: expected the twist of its gear within {MOST_STEPS} iterations, found none: smooth the path, or"
         " refine output_step"

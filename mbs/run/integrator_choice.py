@@ -60,11 +60,11 @@ def choose_integrator(
     replayed = system.replayed
     if replayed is not None and replayed.integrator in (*EXPLICIT, "radau"):
         return Choice(replayed.integrator, "integrator of the run whose forces act")
-    found = vibrations_of(model, without_rows(model), 0.0, start.q)
-    if not len(found.frequency):
+    vibrations = vibrations_of(model, without_rows(model), 0.0, start.q)
+    if not len(vibrations.frequency):
         return Choice("dop853", "nothing vibrates")
-    excited = _excitation(system, start, found)
-    choice = faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
+    excited = _excitation(system, start, vibrations)
+    choice = faster_of(vibrations.frequency, vibrations.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
     # Under a replay the length of steps says less of what they cost: no integrator takes over.
     return choice if replayed is None else choice._replace(candidates=())
 
@@ -93,21 +93,21 @@ def _sticks(model: Model) -> bool:
     return has_friction and any(node.body.n_modes for node in nodes)
 
 
-def _excitation(system: MultibodySystem, start: State, found: Vibrations) -> Array:
+def _excitation(system: MultibodySystem, start: State, vibrations: Vibrations) -> Array:
     """Size (n,) with which each vibration rings from `start` on, in the elastic forces of a link, relative to these.
 
     A mode at rest follows its load and the links' static deflection; the velocity v, the acceleration a or the jerk j
     about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does beside following statically
     is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
     """
-    model, omega, K = system.model, found.frequency, found.springs
+    model, omega, K = system.model, vibrations.frequency, vibrations.springs
     dt = (1e-3 if system.replay is None else 0.1) / float(omega.max())  # round-off of what is replayed is no jerk
     q, v, a = start.q, start.v, _acceleration(system, 0.0, start, system.replay)
     later = State(model.tree.integrate(q, dt * v), v + dt * a)
     jerk = (_acceleration(system, dt, later, system.replay) - a) / dt
-    project = (K @ found.shape).T / omega[:, None] ** 2
+    project = (K @ vibrations.shape).T / omega[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
-    forces = K @ found.shape * amplitude
+    forces = K @ vibrations.shape * amplitude
     springs = [(node.p_v, node.body.stiffness * q[node.p_q]) for node in model.tree.nodes if node.body.n_modes]
     springs += [(gear.joint.v, gear.spring.moment(gear.twist(q, v)[0])) for gear in model.tree.gears]
     of_each = np.array([np.linalg.norm(forces[columns], axis=0) for columns, _ in springs])

@@ -31,7 +31,7 @@ from ..posture.posture import row_sizes
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
 from .context import ActuationPoints, PatchedLink
-from .outcome import Outcome
+from .record import Run
 
 OFF_PATH = 0.01  # sizes of the robot, rad: a replay that is off by more has left its path
 
@@ -39,13 +39,13 @@ Reader = Callable[[Any], Any]
 """Makes what reads forces of the states of a `_core.PlanarDriven`, or of a `_core.SpatialDriven`."""
 
 
-def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
+def replay_times(source: Run, analysis: TimedAnalysis) -> Array:
     """Output times (T,), s, of a run under what `source` found: with what it does before t = 0, and after the path."""
     after = source.details.post_actuation if analysis.end == source.analysis.last_time else 0.0
     return output_times(analysis.end, analysis.output_step, source.details.pre_actuation, after)
 
 
-def supplied(run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool) -> _core.ForceSource:
+def supplied(run: Run, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool) -> _core.ForceSource:
     """Forces of all motors, `most` (motors,) at most, and voltages of the patches of links by body, within limits.
 
     In the order of `Model.motors`, N·m or N on second sides, then of `patches`, V.
@@ -60,14 +60,14 @@ def _reached(model: Model, to_reached: Mapping[str, Array]) -> tuple[int, Array]
     """Where the modes of the bodies that carry patches begin in v, and (m, …) what makes `reached` of v from there."""
     nodes = [node for node in model.tree.nodes if node.body.name in to_reached]
     first, end = nodes[0].p_v.start, nodes[-1].p_v.stop
-    found = np.zeros((len(to_reached[nodes[0].body.name]), end - first))
+    reached = np.zeros((len(to_reached[nodes[0].body.name]), end - first))
     for node in nodes:
-        found[:, node.p_v.start - first : node.p_v.stop - first] = to_reached[node.body.name] @ node.body.on_file.T
-    return first, found
+        reached[:, node.p_v.start - first : node.p_v.stop - first] = to_reached[node.body.name] @ node.body.on_file.T
+    return first, reached
 
 
 def _with_known_voltages(
-    run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool
+    run: Run, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool
 ) -> _core.ForceSource:
     torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))
     assert run.prescribed is not None
@@ -91,7 +91,7 @@ class OfPaths(NamedTuple):
     total: int
 
 
-def path_numbers(run: Outcome) -> OfPaths:
+def path_numbers(run: Run) -> OfPaths:
     """Forces on the points of paths, about there, and along the coordinates of joints that follow one."""
     model = run.model
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
@@ -131,14 +131,14 @@ def _sides(model: Model, row: ConstraintRow) -> Iterator[tuple[str, float]]:
             yield ".".join(filter(None, (model.tree.nodes[section.body].body.name, section.point))), sign
 
 
-def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:
+def point_numbers(run: Run, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:
     """Driving forces at the actuation points, global axes: three numbers of each component."""
     tree, in_core = run.model.tree, frames_in_core(run.model, driven_system(run.model).core, run.q[0])
     bodies = [(tree.index[name], *in_core[tree.index[name]], *of_body.of_core()) for name, of_body in chosen.items()]
     return _found(run, lambda driven: _core.point_reader(driven, bodies))
 
 
-def _found(run: Outcome, reader: Reader, system: MultibodySystem | None = None) -> _core.ForceSource:
+def _found(run: Run, reader: Reader, system: MultibodySystem | None = None) -> _core.ForceSource:
     """Read of the recorded steps of a run, as `system` was integrated (None: in 3D), or of its prescribed motion."""
     if run.recording is not None:
         of_run = driven_mechanism(run.model, has_motors=False) if system is None else integrated_mechanism(system)
@@ -149,19 +149,19 @@ def _found(run: Outcome, reader: Reader, system: MultibodySystem | None = None) 
     return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
 
 
-def motor_forces_of(run: Outcome) -> MotorForces:
+def motor_forces_of(run: Run) -> MotorForces:
     """τ and F_p of a run, its gears rigid (see `mbs.model.motors`)."""
     return motor_forces(run.model, run.q, supplied_in(run))
 
 
-def supplied_in(run: Outcome) -> Array:
+def supplied_in(run: Run) -> Array:
     """What the paths of a run, or a prescribed shape, take along v (T, n_v)."""
-    if run.forces.required is not None:
-        return run.forces.required
+    if run.required is not None:
+        return run.required
     return path_forces(run.model, run.time, run.q, run.multipliers)
 
 
-def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:
+def left_paths(source: Run, run: Run) -> Iterator[str]:
     """Of a replay under the forces on all rows, which would move as `source` did: a warning where it does not."""
     now = (run.time >= 0.0) & (run.time <= source.time[-1])
     model, times, q = source.model, run.time[now], run.q[now]

@@ -125,8 +125,6 @@ class _Band:
 
 
 class _Newton:
-    """Factors of a band matrix."""
-
     def __init__(self, ab: Array, layout: _Layout) -> None:
         from scipy.linalg.lapack import dgbtrf
 

@@ -38,24 +38,24 @@ def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callabl
 
     Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
     """
-    found, within = near, tolerance**0.5  # Newton's next step is about the square of the last one
+    tracked, within = near, tolerance**0.5  # Newton's next step is about the square of the last one
     while True:
-        found = track(asked, breaks, found, within=within)
-        unmet, excess = _left_over(asked, found, tolerance)
+        tracked = track(asked, breaks, tracked, within=within)
+        unmet, excess = _left_over(asked, tracked, tolerance)
         finer = cut(breaks, excess)
         is_fine = not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on()
-        if not found.converged or (is_fine and within == TOLERANCE):
-            return replace(found, unmet=unmet)
+        if not tracked.converged or (is_fine and within == TOLERANCE):
+            return replace(tracked, unmet=unmet)
         breaks, within = (breaks, TOLERANCE) if is_fine else (finer, within)
 
 
-def _left_over(asked: Transition, found: Tracked, tolerance: float) -> tuple[float, Array]:
+def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[float, Array]:
     """`Tracked.unmet`, and by interval (N,) that, or torques beyond their limits, as multiples of the tolerance."""
-    breaks = found.voltage.x
+    breaks = tracked.voltage.x
     times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
-    motion = [found.curve(times, k) for k in range(3)]
+    motion = [tracked.curve(times, k) for k in range(3)]
     r, tau = asked.driven.forces(times, *motion)
-    r = r - found.voltage(times) @ asked.Phi_V.T
+    r = r - tracked.voltage(times) @ asked.Phi_V.T
     unmet = np.abs(r).max(axis=1) / float(np.abs(asked.driven.scale**2 * motion[0]).max())
     beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
     return float(unmet.max()), np.maximum(unmet, beyond).reshape(len(breaks) - 1, -1).max(axis=1) / tolerance

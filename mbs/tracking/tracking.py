@@ -30,18 +30,10 @@ from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors
 from ..run.context import Context, PatchedLink
 from ..run.integrators import Choice
-from ..run.outcome import Outcome, Statistics
+from ..run.record import Run, Statistics
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..scene.robustness import Robustness
-from .advice import (
-    Bounds,
-    bounds_of_zeros,
-    enough_path_time,
-    enough_time,
-    far_patches,
-    rough_ends,
-    singular_times,
-)
+from .advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends, singular_times
 from .intervals import SETTLED, refined, settled, start_breaks
 from .problem import RATE, Limits, Objective, Tracked, Transition, Weights, track
 
@@ -116,7 +108,7 @@ class Tracking(TimedAnalysis):
         yield Need("kind", self.kind, "trajectory")
         yield Need("kind", self.kind, "pzt")
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> Run:
         """Motion and forces of motors and patches for the trajectories, no other force acting.
 
         Raises `InputError` for patches and motors that do not fit, a path that does not begin and end at rest, or is
@@ -147,20 +139,26 @@ class Tracking(TimedAnalysis):
         (pre, post), servo = posed.around, posed.servo
         has_limits, most = np.isfinite(posed.asked.limits.patches.range).any(), float(posed.asked.units.max())
         around = TrackedPath(
-            pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
+            pre_actuation=pre,
+            post_actuation=post,
+            least_voltage=least.share * most,
             least_voltage_doubt=least.doubt * least.share * most,
-            least_share=least.share if has_limits else float("nan"), objective=objective, cost=tracked.cost,
-            held=servo.model, unmet=tracked.unmet, bounds=bounds,
+            least_share=least.share if has_limits else float("nan"),
+            objective=objective,
+            cost=tracked.cost,
+            held=servo.model,
+            unmet=tracked.unmet,
+            bounds=bounds,
             prices={
-                kind: model.by_motor(of) if kind == "torque" else {
-                    name: prices[0] for name, prices in _by_body(context, of[None]).items()
-                }
+                kind: model.by_motor(of)
+                if kind == "torque"
+                else {name: prices[0] for name, prices in _by_body(context, of[None]).items()}
                 for kind, of in tracked.prices.items()
             },
-        )  # fmt: skip
+        )
         times = output_times(self.end, self.output_step, pre, post)
 
-        def at(times: Array) -> Outcome:
+        def at(times: Array) -> Run:
             return replace(_outcome(self, model, servo, tracked, context, times), details=around)
 
         run = at(times)
@@ -273,7 +271,6 @@ def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
 
 
 def _causes(context: Context, posed: _Posed) -> str:
-    """Why no motion is found."""
     zeros = posed.linear.zeros[[0, -1]]
     return "; ".join(
         [
@@ -340,14 +337,19 @@ def _bounds(posed: _Posed) -> Bounds | None:
         return None
 
 
-def _with_torques_alone(context: Context, run: Outcome, around: TrackedPath) -> TrackedPath:
+def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> TrackedPath:
     """With the distance from the path under the same torques without voltages, by forward simulation."""
     analysis = run.analysis
     assert isinstance(analysis, Tracking)
     alone = Forward(
-        name="torques alone", kind="forward", actuation=analysis.name, apply="joints", end=analysis.end,
-        output_step=analysis.output_step, tolerance=min(analysis.tolerance, REPLAYED),
-    )  # fmt: skip
+        name="torques alone",
+        kind="forward",
+        actuation=analysis.name,
+        apply="joints",
+        end=analysis.end,
+        output_step=analysis.output_step,
+        tolerance=min(analysis.tolerance, REPLAYED),
+    )
     replay = alone.run(replace(context, outcomes={analysis.name: run}, earlier=None))
     if replay.failed:
         return around
@@ -369,21 +371,18 @@ def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     return Weights(torque, voltage, given.rate)
 
 
-def _outcome(
-    analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array
-) -> Outcome:
+def _outcome(analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array) -> Run:
     curve, voltage = tracked.curve, tracked.voltage
     how, steps = Choice("collocation", "interior-point method"), len(curve.x) - 1
     statistics = Statistics("completed", how, steps=steps, evaluations=tracked.iterations)
     run, breaks = outcome_along(curve, servo, analysis, model, statistics, times), voltage.x
     assert run.prescribed is not None
     between = {body: (breaks, V) for body, V in _by_body(context, voltage(breaks)).items()}
-    forces = replace(run.forces, voltages=_by_body(context, voltage(times)))
-    return replace(run, forces=forces, prescribed=run.prescribed._replace(voltages=between))
+    voltages = _by_body(context, voltage(times))
+    return replace(run, voltages=voltages, prescribed=run.prescribed._replace(voltages=between))
 
 
 def _by_body(context: Context, V: Array) -> Mapping[str, Array]:
-    """V (T, k) of all patches, by body."""
     counts = [len(of_link.edges) for of_link in context.patches.values()]
     parts: Sequence[Array] = np.split(V, np.cumsum(counts)[:-1], axis=1)
     return dict(zip(context.patches, parts, strict=True))

@@ -16,6 +16,8 @@ from ffrobot.actuation.control.robot import RigidArm, volts_on_file
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed
 from ffrobot.mbs.model.model import without_paths
+from ffrobot.mbs.quantities.motion import joint_motion, node_of
+from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
@@ -66,7 +68,7 @@ def moving_at(rates, scene):
     context = ActuatedContext(model=prepare_scene(scene).model, outcomes={}, progress=lambda _: True, is_replayed=True)
     inverse, analysis = scene.analysis
     source = inverse.run(context)
-    source = replace(source, motion=replace(source.motion, v=rates(source.v)), look_closer=None)
+    source = replace(source, v=rates(source.v), look_closer=None)
     return analysis.run(replace(context, outcomes={"inverse": source}))
 
 
@@ -189,7 +191,7 @@ def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     acceleration = np.column_stack([-3.6 * np.sin(2 * t), -6.3 * np.cos(3 * t)])
     arm = RigidArm(without_paths(solution.model), inverse.q[0])
     moments = np.array([arm.moments(*state) for state in zip(gamma, rate, acceleration, strict=True)])
-    found = solution.analyses["inverse"].motion.motor_moments
+    found = motor_moments(solution.analyses["inverse"].run)
     tau = np.column_stack([found[joint] for joint in "OA"])
     np.testing.assert_allclose(moments, tau, atol=1e-8 * np.abs(tau).max())
 
@@ -447,7 +449,7 @@ def held_link(link, *analyses, **keys):
 
 def decay(solution, name):
     """Damping ratio and amplitude of the lowest mode after the hit, from the envelope of its vibration."""
-    outcome, node = solution.outcomes[name], solution.analyses[name].motion.node("link")
+    outcome, node = solution.outcomes[name], node_of(solution.analyses[name].run, "link")
     p = outcome.q[:, node.p_q.start] - solution.outcomes["inverse"].q[:, node.p_q.start]
     omega = np.sqrt(node.body.stiffness[0])
     envelope = np.hypot(p, outcome.v[:, node.p_v.start] / omega)
@@ -550,7 +552,7 @@ def test_a_motor_behind_a_spring_is_its_two_masses():
         loop(controller=[ON_MOTORS], sample_time=T_fine, disturbance=blow(), feed_forward="none"), joint=GIVES
     )
     solution = solve_scene(scene)
-    outcome, (angle, _) = solution.outcomes["loop"], solution.analyses["loop"].motion.joint("O")
+    outcome, (angle, _) = solution.outcomes["loop"], joint_motion(solution.analyses["loop"].run, "O")
     # x = (θ_m, γ, rates); the blow is a moment of 5 N times 0.3 m on the wheel for 0.1 s, which turns by little
     M, K = np.diag([I_m, INERTIA]), np.array([[k + P, -k], [-k, k]])
     damping = np.array([[c + D, -c], [-c, c]])

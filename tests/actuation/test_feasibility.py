@@ -8,6 +8,8 @@ from patches_on_links import CERAMIC
 import ffrobot
 from ffrobot.actuation.motors import path_jump
 from ffrobot.actuation.patches.link_patches import link_patches, with_count
+from ffrobot.mbs.quantities.motion import plane_angle, point_motion
+from ffrobot.mbs.quantities.supply import actuator_forces
 from ffrobot.run.solve import solve_scene
 
 LIMIT = 200.0
@@ -76,7 +78,7 @@ def test_strain_under_a_static_load_is_that_of_the_beam():
 
 def modal_forces(solution):
     """(T, n) that patches have to supply."""
-    return solution.analyses["motion"].motion.motor_forces.modal["link"]
+    return actuator_forces(solution.analyses["motion"].run).modal["link"]
 
 
 @pytest.mark.parametrize("word", ["limit", "layers", "thickness"])
@@ -145,7 +147,7 @@ def test_predicted_shift_of_the_tip_is_what_happens():
     for volts in (voltages.required[0], voltages.within_limit[0]):
         load = {"pzt": "link", "voltage": [f"{v!r}" for v in volts.tolist()]}
         held = arm({"kind": "static"}, STILL, load=[load])
-        tips.append(held.analyses["motion"].motion.point("link.tip").deflection[0, 1])
+        tips.append(point_motion(held.analyses["motion"].run, "link.tip").deflection[0, 1])
     assert abs(tips[0]) < 1e-12  # straight
     np.testing.assert_allclose(
         straight.analyses["motion"].predicted_shift["link.tip"][0], [0.0, tips[1], 0.0], rtol=1e-9, atol=1e-15
@@ -158,7 +160,7 @@ def test_predicted_shift_of_an_inclined_tip():
     result, body = solution.analyses["motion"], solution.bodies["link"].carrying
     unmet = result.actuation.unmet["link"]
     deflection = -(unmet @ body.modal_transform / body.stiffness) @ body.points["tip"].translation[1]
-    theta = result.motion.angle("link")
+    theta = plane_angle(result.run, "link")
     expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta), 0 * theta])
     np.testing.assert_allclose(result.predicted_shift["link.tip"], expected, atol=1e-9 * np.abs(expected).max())
 
@@ -187,7 +189,7 @@ def test_rms_and_shares_of_time_by_hand():
 )
 def test_jump_of_a_path_is_seen(value, jump):
     result = arm(trajectory={"joint": "O", "value": value}).analyses["motion"]
-    assert path_jump(result.motion, result.analysis, 0) == jump
+    assert path_jump(result.run, result.analysis, 0) == jump
 
 
 def test_short_peaks_of_motors_only_are_laid_to_the_jerk():

@@ -8,6 +8,8 @@ from patches_on_links import CERAMIC
 
 import ffrobot
 from ffrobot.actuation.points import find_driving_forces
+from ffrobot.mbs.quantities.motion import body_motion, joint_motion, node_of
+from ffrobot.mbs.quantities.supply import actuator_forces, motor_moments, path_force
 from ffrobot.run.solve import solve_scene
 
 ANALYSES, BODIES = ("inverse", "straight", "sagging"), ("link1", "link2")
@@ -44,17 +46,17 @@ def limited():
 
 def velocity(result, body):
     """(T, 6 + n): of the frame and its turn, in axes of the body, and p."""
-    moving, node = result.motion.body(body), result.motion.node(body)
-    F = tree_oracle.frames(result.motion.model.tree, result.motion.q)[result.motion.model.tree.index[body]].F
+    moving, node = body_motion(result.run, body), node_of(result.run, body)
+    F = tree_oracle.frames(result.run.model.tree, result.run.q)[result.run.model.tree.index[body]].F
     frame = [np.einsum("tji,tj->ti", F, of) for of in (moving.velocity, moving.angular_velocity)]
-    return np.column_stack([*frame, result.motion.v[:, node.p_v]])
+    return np.column_stack([*frame, result.run.v[:, node.p_v]])
 
 
 def in_plane(result, body):
     """(T, 3 + n): of (R, θ, p), R in global axes."""
-    moving, node = result.motion.body(body), result.motion.node(body)
+    moving, node = body_motion(result.run, body), node_of(result.run, body)
     frame = moving.velocity[:, :2], moving.angular_velocity[:, 2]
-    return np.column_stack([*frame, result.motion.v[:, node.p_v]])
+    return np.column_stack([*frame, result.run.v[:, node.p_v]])
 
 
 def Q_a_power(result, body):
@@ -72,20 +74,20 @@ def motor_power(solution, result):
 
     def turn(body, point):
         moving = in_plane(result, body)
-        of_section = result.motion.node(body).body.points[point].rotation[2]
+        of_section = node_of(result.run, body).body.points[point].rotation[2]
         return moving[:, 2] + (moving[:, 3:] @ of_section if section else 0.0)
 
     rates = np.column_stack([turn("link1", "root"), turn("link2", "root") - turn("link1", "tip")])
-    found = np.column_stack([result.motion.joint(joint)[1] for joint in "OA"])
+    found = np.column_stack([joint_motion(result.run, joint)[1] for joint in "OA"])
     np.testing.assert_allclose(found, rates, atol=1e-12)
-    return np.column_stack([result.motion.motor_moments[joint] for joint in "OA"]) * rates
+    return np.column_stack([motor_moments(result.run)[joint] for joint in "OA"]) * rates
 
 
 def patch_power(solution, result, which):
     """Of the patches of each link, and of the modal forces they leave unmet."""
     patches, unmet = [], []
     for body, of_link in solution.patches.items():
-        voltages, p_dot = result.actuation.voltages[body], result.motion.body(body).modal_velocity
+        voltages, p_dot = result.actuation.voltages[body], body_motion(result.run, body).modal_velocity
         patches.append(((getattr(voltages, which) @ of_link.Phi_V.T) * p_dot).sum(axis=1))
         unmet.append((result.actuation.unmet[body] * p_dot).sum(axis=1))
     return np.column_stack(patches), np.column_stack(unmet)
@@ -102,7 +104,7 @@ def test_power_of_the_force_on_the_tip_is_that_of_Q_a(solution):
     result = solution.analyses["inverse"]
     rate = -np.pi / 4 * np.sin(np.pi * result.run.time / 4)
     tip_velocity = np.outer(rate, [1.5, np.sqrt(3) / 2])
-    check_sum_is_zero((result.motion.path_force("tip") * tip_velocity).sum(axis=1), -driving_power(result))
+    check_sum_is_zero((path_force(result.run, "tip") * tip_velocity).sum(axis=1), -driving_power(result))
 
 
 @pytest.mark.parametrize("analysis", ANALYSES)
@@ -111,8 +113,8 @@ def test_power_of_motors_and_patches_is_that_of_Q_a(solution, analysis):
     result = solution.analyses[analysis]
     motors, Q_a = motor_power(solution, result), driving_power(result)
     patches, _ = patch_power(solution, result, "required")
-    modal = result.motion.motor_forces.modal
-    unmet = np.hstack([modal[body] * result.motion.body(body).modal_velocity for body in BODIES])
+    modal = actuator_forces(result.run).modal
+    unmet = np.hstack([modal[body] * body_motion(result.run, body).modal_velocity for body in BODIES])
     for supplied in (patches, unmet):
         check_sum_is_zero(motors, supplied, -Q_a)
 
@@ -135,7 +137,7 @@ def test_power_at_the_actuation_points_is_that_of_Q_a(solution, analysis):
 
 def point_power(result, chosen, force):
     """F_a · ṙ of every component, with the velocity of its point from R + A (x + Φ p)."""
-    node, moving, powers = result.motion.node(chosen.body), velocity(result, chosen.body), []
+    node, moving, powers = node_of(result.run, chosen.body), velocity(result, chosen.body), []
     p = result.run.q[:, node.p_q]
     for point, direction, f in zip(chosen.points, chosen.direction.T, force.T, strict=True):
         u = point.position + p @ point.translation.T

@@ -86,7 +86,7 @@ def test_pcid_ratio(benchmark, two_link, program):
         return outcomes[-1].statistics.wall_seconds, hand_written[-1][0][0]
 
     times = minima(both, "pcid", 5 if benchmark.enabled else 3)
-    force = -outcomes[0].motion.multipliers[-1]
+    force = -outcomes[0].multipliers[-1]
     peak = 67.0  # N, of the tip force (cases/two_link)
     np.testing.assert_allclose(force, hand_written[0][1][:2], atol=2e-4 * peak)
     benchmark.pedantic(lambda: None, rounds=1)

@@ -9,6 +9,7 @@ from tables_3d import ORIGIN, X, Z, joint, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.exchange.urdf.read import read_urdf
+from ffrobot.mbs.quantities.motion import node_of
 from ffrobot.mbs.quantities.validity import doubts
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
@@ -164,12 +165,12 @@ def test_constraints_that_do_not_hold_are_told(what, unit):
     run = {"name": "a", "kind": "pcid", "end": 1.0, "output_step": 0.05, "tolerance": 1e-5}
     tables = scene([bar("a", unit), bar("b", unit)], joints, run, gravity=ORIGIN, trajectory=[{"name": "t"} | path])
     (result,) = solve_scene(ffrobot.make_scene(**tables), Watcher()).analyses.values()
-    assert not list(doubts(result.motion, 1e-5))
-    column = result.motion.node("a" if what == "angle" else "b").q.start
+    assert not list(doubts(result.run, 1e-5))
+    column = node_of(result.run, "a" if what == "angle" else "b").q.start
     for off, is_told in ((3e-6, False), (1e-4, True), (1e20, True), (np.nan, True)):
-        q = result.motion.q.copy()
+        q = result.run.q.copy()
         q[7, column] += off * (1.0 if what == "angle" else unit)
-        broken = replace(result, motion=replace(result.motion, q=q))
+        broken = replace(result, motion=replace(result.run, q=q))
         assert any('trajectory "t" is violated by' in text for text in broken.warnings) == is_told
 
 

@@ -12,8 +12,10 @@ from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.model.known_motion import State
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.quantities.motion import RobotMotion, totals
+from ffrobot.mbs.quantities.motion import body_motion
+from ffrobot.mbs.quantities.supply import totals
 from ffrobot.mbs.run.drive import drive_robot
+from ffrobot.mbs.run.record import Run
 from ffrobot.run.bodies import load_bodies
 from ffrobot.scene.load import validated_scene
 
@@ -55,7 +57,8 @@ def spinner():
 
 
 def motion_of(model, times, q, v):
-    return RobotMotion(model, np.array(times), q, v, 0 * v, np.zeros((len(q), 0)))
+    state = {"time": np.array(times), "q": q, "v": v, "a": 0 * v, "multipliers": np.zeros((len(q), 0))}
+    return Run(analysis=Forward(name="state", kind="forward", end=1.0, output_step=1.0), model=model, **state)
 
 
 def spun(spinner, end, step, tolerance):
@@ -69,7 +72,7 @@ def spun(spinner, end, step, tolerance):
 def test_flexible_top(spinner):
     samples = load("top_flexible")["samples"]
     motion = spun(spinner, samples[-1]["t"], samples[1]["t"], 1e-8)
-    body = motion.body("spinner")
+    body = body_motion(motion, "spinner")
     modal = np.array([sample["modal"] for sample in samples])
     for found, expected in zip(body.modal.T, modal.T, strict=True):
         close(found, expected)

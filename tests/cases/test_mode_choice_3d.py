@@ -10,6 +10,7 @@ from tables_3d import joint, scene
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.truncation import with_fewer_modes
+from ffrobot.mbs.quantities.motion import deflection
 from ffrobot.run.bodies import load_bodies
 from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import difference
@@ -125,6 +126,6 @@ def test_motions_of_which_no_mode_is_kept_are_told(modes, rigid, sag):
     tables = scene([body], [joint("wall", "weld", "ground", "beam.root")], {"name": "rest", "kind": "static"})
     solution = solve_scene(ffrobot.make_scene(**tables | {"gravity": [0.0, 0.0, -9.81]}))
     assert f"beam: rigid in {rigid}, of which its equations keep none of the modes" in solution.notes
-    found = solution.analyses["rest"].motion.deflection("beam.tip")[0, 2]
+    found = deflection(solution.analyses["rest"].run, "beam.tip")[0, 2]
     closed_form = -12 * 2700.0 * 9.81 / (8 * 70e9 * 0.02**2)
     assert found == pytest.approx(sag * closed_form, rel=0.015, abs=1e-12)

@@ -168,4 +168,4 @@ def test_saturated_actuators_do_what_their_limits_leave(integrator):
     system = MultibodySystem(without_paths(model))
     required = system.core.required_forces(system.scene, list(back.time), back.q, back.v, back.a)
     np.testing.assert_allclose(required, acting, rtol=0, atol=1e-6 * np.abs(acting).max())
-    np.testing.assert_allclose(np.hstack(list(back.forces.commanded.values())), clipped, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(np.hstack(list(back.commanded.values())), clipped, rtol=0, atol=1e-7)

@@ -14,9 +14,9 @@ from ffrobot.actuation.patches.composite import StructureEffect
 from ffrobot.common.hdf5 import in_memory
 from ffrobot.common.meanings import MODAL_BODY, RESULTS, meaning, names_of, write_record
 from ffrobot.fe_models.modal_body import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint
-from ffrobot.mbs.quantities.motion import Energies
 from ffrobot.mbs.quantities.settling import Settling
 from ffrobot.mbs.quantities.stress import SectionLoads
+from ffrobot.mbs.quantities.supply import Energies
 from ffrobot.present.info import describe
 
 # inverse and forward motion, patches, linear models, compliant gears, motion in 3D

@@ -86,10 +86,11 @@ def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
     from benchmark_tables import benchmark_page
     from gallery import gallery_page
     from interfaces import interface_pages
-    from key_tables import key_pages
+    from key_tables import files_page, key_pages
 
     measured = DOCS / "developer" / "benchmark_records.md"
-    pages = {**key_pages(), **interface_pages(), measured.name: benchmark_page(DOCS / "benchmarks", measured)}
+    pages = {**key_pages(), **interface_pages(), "files.md": files_page()}
+    pages |= {measured.name: benchmark_page(DOCS / "benchmarks", measured)}
     assert (DOCS / "cases.md").read_text(encoding="utf-8") == gallery_page(), "python docs/gallery.py"
     for name, text in pages.items():
         assert (measured if name == measured.name else DOCS / "reference" / name).read_text(encoding="utf-8") == text, (

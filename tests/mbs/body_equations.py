@@ -14,7 +14,7 @@ from triad_measures import Ground, Joint, Section, Spinning
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.gears import resistance
 from ffrobot.mbs.model.nodes import rotor
-from ffrobot.mbs.quantities.motion import Energies, Momentum
+from ffrobot.mbs.quantities.supply import Energies, Momentum, behind_gears
 
 
 class Accelerated(NamedTuple):
@@ -208,7 +208,7 @@ def gear_energy(tree, q: Array, v: Array) -> tuple[Array, Array]:
 
 def energies(motion) -> Energies:
     """Of all bodies and rotors; compliant gears store ½ k δ², and their motors turn as they have to."""
-    motion = motion.behind_gears
+    motion = behind_gears(motion)
     tree, model = motion.model.tree, motion.model
     mechanism = mechanism_of(tree, model.scene.gravity)
     found = [mechanism.energies(at.q, at.v) for at in absolute_states(mechanism, accelerated(motion))]
@@ -224,7 +224,7 @@ def energies(motion) -> Energies:
 
 def momentum(motion) -> Momentum:
     """Of all bodies and rotors, about the global origin."""
-    motion = motion.behind_gears
+    motion = behind_gears(motion)
     tree, state, (linear, angular) = motion.model.tree, accelerated(motion), np.zeros((2, len(motion.time), 3))
     mechanism = Mechanism([node.body for node in tree.nodes], np.zeros(3))
     for k, at in enumerate(absolute_states(mechanism, state)):

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import tree_oracle
 from checkpoint_scenes import as_scene, coordinates, rpy, tree_model
+from moving_trees import state_of
 from random_mechanisms import Tree, random_tree
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.motion import RobotMotion
 from ffrobot.mbs.scene.loads import Load
 
 FRICTION = {"viscous_friction": 0.4, "coulomb_friction": 0.7, "friction_speed": 0.3}
@@ -88,4 +88,4 @@ def evaluated(model, q, v):
     system = MultibodySystem(model)
     run = _core.tree_outputs(system.core, system.scene, [NOW], np.concatenate([q, v])[None])
     multipliers = run.multipliers * system.row_signs
-    return RobotMotion(model, np.array([NOW]), q[None], v[None], run.accelerations, multipliers)
+    return state_of(model, np.array([NOW]), q[None], v[None], run.accelerations, multipliers)

@@ -5,11 +5,19 @@ from checkpoint_scenes import as_scene, coordinates, tree_model
 from random_mechanisms import random_tree
 from tree_oracle import row_values
 
+from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.run.record import Run
 
 SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
 NOW = np.zeros(1)
+
+
+def state_of(model, time, q, v, a, multipliers=None):
+    """A run that was at these states."""
+    multipliers = np.zeros((len(time), len(model.rows))) if multipliers is None else multipliers
+    analysis = Static(name="state", kind="static")
+    return Run(analysis=analysis, model=model, time=time, q=q, v=v, a=a, multipliers=multipliers)
 
 
 def moving(rng, types, kinds, loops=0):
@@ -27,4 +35,4 @@ def moving(rng, types, kinds, loops=0):
     if len(model.rows):
         system.core.keep_independent_rows(q, v)
     a, multipliers = system.core.evaluate(q, v, np.zeros(len(model.rows)), None, None)
-    return RobotMotion(model, NOW, q[None], v[None], a[None], multipliers[None]), system
+    return state_of(model, NOW, q[None], v[None], a[None], multipliers[None]), system

@@ -1,21 +1,23 @@
 """Analyses of planar robots, and what they found in coordinates (R, θ, p) of one body after the other."""
 
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from mechanisms import always, random_state
+from moving_trees import state_of
 from scipy.integrate import simpson
 from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.start import undeformed_posture
-from ffrobot.mbs.quantities.motion import RobotMotion, totals
+from ffrobot.mbs.quantities import motion
+from ffrobot.mbs.quantities.motion import acting_forces, body_motion, node_of, plane_angle
 from ffrobot.mbs.quantities.reactions import reactions
+from ffrobot.mbs.quantities.supply import actuator_forces, motor_moments, path_force, totals
 from ffrobot.mbs.run.context import Context
-from ffrobot.mbs.run.outcome import Motion, Outcome
 from ffrobot.mbs.scene.analysis import IntegratedAnalysis
 
 
@@ -36,32 +38,28 @@ class Seen:
     def __getattr__(self, name):
         return getattr(self.outcome, name)
 
-    @cached_property
+    @property
     def motion(self):
-        run = self.outcome
-        return RobotMotion(
-            run.model, run.time, run.q, run.v, run.a, run.multipliers, run.forces.required, run.motion.is_at_rest,
-            run.forces.applied, run.forces.commanded,
-        )  # fmt: skip
+        return self.outcome
 
     def _of_bodies(self, frame, modes, p):
         found = []
         for body in self.robot.bodies:
-            node = self.motion.node(body.name)
+            node = node_of(self.motion, body.name)
             found += [frame(body.name), modes[:, getattr(node, p)]]
         return np.hstack(found)
 
     @cached_property
     def q(self):
         def frame(name):
-            return np.column_stack([self.motion.body(name).position[:, :2], self.motion.angle(name)])
+            return np.column_stack([body_motion(self.motion, name).position[:, :2], plane_angle(self.motion, name)])
 
         return self._of_bodies(frame, self.outcome.q, "p_q")
 
     @cached_property
     def v(self):
         def frame(name):
-            moving = self.motion.body(name)
+            moving = body_motion(self.motion, name)
             return np.column_stack([moving.velocity[:, :2], moving.angular_velocity[:, 2]])
 
         return self._of_bodies(frame, self.outcome.v, "p_v")
@@ -69,7 +67,7 @@ class Seen:
     @cached_property
     def a(self):
         def frame(name):
-            a, alpha, _ = self.motion.forces.of_body(self.outcome.model.tree.index[name])
+            a, alpha, _ = acting_forces(self.motion).of_body(self.outcome.model.tree.index[name])
             return np.column_stack([a[:, :2], alpha[:, 2]])
 
         return self._of_bodies(frame, self.outcome.a, "p_v")
@@ -88,12 +86,14 @@ class Seen:
     @property
     def tau(self):
         """(T, motors)."""
-        return np.column_stack([self.motion.motor_moments[joint.name][:, 0] for joint in self.robot.scene.motor_joints])
+        return np.column_stack(
+            [motor_moments(self.motion)[joint.name][:, 0] for joint in self.robot.scene.motor_joints]
+        )
 
     @property
     def F_p(self):
         """(T, modes of all bodies), what patches would have to supply."""
-        modal = self.motion.motor_forces.modal
+        modal = actuator_forces(self.motion).modal
         return np.hstack([modal[body.name] @ body.modal_transform for body in self.robot.bodies])
 
     @property
@@ -101,7 +101,7 @@ class Seen:
         """(T, components) multipliers of the trajectories; where there are none, minus the reactions of joints."""
         if not self.robot.scene.trajectory:
             return -np.hstack([wrench[0][:, :2] for wrench in reactions(self.motion).values()])
-        return -np.hstack([self.motion.path_force(path.name) for path in self.robot.scene.trajectory])
+        return -np.hstack([path_force(self.motion, path.name) for path in self.robot.scene.trajectory])
 
 
 def run(robot, analysis, source=None, patches=None, progress=always, earlier=None):
@@ -116,17 +116,17 @@ def run(robot, analysis, source=None, patches=None, progress=always, earlier=Non
 
 def point_motion(seen, point):
     """Position and deflection (T, 2) of "BODY.POINT"."""
-    return seen.motion.point(point).within(seen.motion.space)
+    return motion.point_motion(seen.motion, point).within(seen.motion.space)
 
 
 def trajectory_force(seen, trajectory):
     """(T, components)."""
-    return seen.motion.path_force(trajectory)
+    return path_force(seen.motion, trajectory)
 
 
 def joint_forces(seen, joint):
     wrench = reactions(seen.motion)[joint]
-    moments = seen.motion.motor_moments
+    moments = motor_moments(seen.motion)
     return JointForces(wrench[0][:, :2], wrench[1][:, 2], moments[joint][:, 0] if joint in moments else None)
 
 
@@ -147,8 +147,8 @@ def evaluated(robot, t, q, v):
     system = MultibodySystem(robot.model)
     core, scene, _ = system.integrated
     found = _core.tree_outputs(core, scene, [t], np.concatenate([q, v])[None])
-    motion = Motion(np.array([t]), q[None], v[None], found.accelerations, system.multipliers(found.multipliers))
-    return Seen(robot, Outcome(analysis=Static(name="state", kind="static"), model=robot.model, motion=motion))
+    state = state_of(robot.model, np.array([t]), q[None], v[None], found.accelerations)
+    return Seen(robot, replace(state, multipliers=system.multipliers(found.multipliers)))
 
 
 def random_tree_state(rng, robot, modal=0.1):

@@ -20,12 +20,14 @@ from row_wrenches import spin_of_modes
 from tree_oracle import row_values
 from triad_measures import Along, Dot, Way
 
+from ffrobot.mbs.quantities.motion import constraint_rows
+
 
 def residuals(motion):
     """M v̇ − Q + C_vᵀλ, and C̈ less what targets ask for, the largest, both relative to their largest terms."""
     state, at = accelerated(motion), motion.time
     needed, at_rest = (required_forces(motion.model, state._replace(a=a), at) for a in (state.a, 0 * state.a))
-    of_rows = np.einsum("tji,tj->ti", motion.rows[1], motion.multipliers)
+    of_rows = np.einsum("tji,tj->ti", constraint_rows(motion)[1], motion.multipliers)
     forces = max(np.abs(x).max(initial=0.0) for x in (needed - at_rest, at_rest, of_rows))
     accelerations = max(np.abs(state.a).max(), np.abs(state.v).max() ** 2, 1.0)
     left = row_accelerations(motion.model, state, at)

@@ -13,6 +13,7 @@ from scipy.linalg import eigh, null_space
 import ffrobot
 from ffrobot.mbs.linear.vibration import vibrations_of, without_rows
 from ffrobot.mbs.posture.start import undeformed_posture
+from ffrobot.mbs.quantities.motion import constraint_rows
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 
@@ -34,7 +35,7 @@ def test_vibrations_solve_the_linearised_equations():
     M = state.B.T @ mechanism.mass_matrix(state.q) @ state.B
     for node in robot.model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
-    free = null_space(motion.rows[1][0])
+    free = null_space(constraint_rows(motion)[1][0])
     squares = eigh(free.T @ K @ free, free.T @ M @ free, eigvals_only=True)
     np.testing.assert_allclose(modes.frequency, np.sqrt(squares), rtol=1e-9)
     assert len(modes.frequency) == 6  # three modes a link; the path leaves the frames no freedom

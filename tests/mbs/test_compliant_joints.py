@@ -17,6 +17,7 @@ from ffrobot.mbs.linear.joint_conditions import joint_conditions
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths
+from ffrobot.mbs.quantities.supply import gear_moment, gear_motions, motor_motion
 from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
@@ -120,7 +121,7 @@ def test_patches_help_motors_behind_gears_that_give():
 def test_coarse_outputs_are_told_of():
     model = rigid_arm(GEARED | {"stiffness": 30.0}, RIGID)
     source = run(model, pcid(tolerance=1e-6, output_step=0.05))
-    (line,) = unresolved_gears(source.motion.gears)
+    (line,) = unresolved_gears(gear_motions(source.motion))
     assert "refine output_step" in line
 
 
@@ -128,7 +129,7 @@ def test_dampers_that_hold_a_gear_for_good_are_refused():
     """Moments say nothing of a twist that takes 15 000 analyses to come; splines would have no solution to rounding."""
     model = rigid_arm(GEARED | {"damping": 4.5e7}, RIGID)
     with pytest.raises(InputError, match=r'joint "O": damping: expected .* within 1e\+04 s .*, found 1.5e\+04'):
-        run(model, pcid(tolerance=1e-6)).motion.gears  # noqa: B018
+        gear_motions(run(model, pcid(tolerance=1e-6)).motion)
 
 
 def test_equilibrium_winds_the_gears():
@@ -140,7 +141,7 @@ def test_equilibrium_winds_the_gears():
     mechanism = linearised(model, q, *np.zeros((2, len(q))))
     along = [mechanism.names.index(f"motor/{joint}") for joint in "OA"]
     assert mechanism.force[along].min() > 1.0
-    expected = [about.motion.gears[joint].moment[0] for joint in "OA"]
+    expected = [gear_motions(about.motion)[joint].moment[0] for joint in "OA"]
     np.testing.assert_allclose(mechanism.force[along], expected, rtol=1e-9)
     assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
 
@@ -171,7 +172,7 @@ def test_what_does_not_go_is_refused():
         run(model, forward(actuation="inverse", apply="trajectory", end=0.1), source)
     loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
     with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):
-        run(loaded, pcid(end=0.1)).motion.gears  # noqa: B018
+        gear_motions(run(loaded, pcid(end=0.1)).motion)
 
 
 K1, K2, KNEE = 400.0, 1200.0, 0.4  # N·m/rad up to a torque of 0.4 N·m, N·m/rad beyond
@@ -203,13 +204,13 @@ def test_a_gear_that_stiffens_swings_as_two_sinusoids():
     tau, t = 2.0, np.linspace(0.0, 1.0, 101)
     outcome = run(pendulum(str(tau), stiffness=STEPS), forward(tolerance=1e-10))
     expected, most = swing_beyond_a_knee(tau, t)
-    twist = outcome.motion.motor_motion("O")[0] - outcome.q[:, 2]
+    twist = motor_motion(outcome.motion, "O")[0] - outcome.q[:, 2]
     assert relative(twist, expected) < 1e-6
     assert most > 1.5 * KNEE / K1
-    gear = outcome.motion.gear_moment("O")
+    gear = gear_moment(outcome.motion, "O")
     beyond = np.abs(twist) > KNEE / K1
     np.testing.assert_allclose(gear, np.where(beyond, KNEE + K2 * (twist - KNEE / K1), K1 * twist), atol=1e-12)
-    work = tau * outcome.motion.motor_motion("O")[0]
+    work = tau * motor_motion(outcome.motion, "O")[0]
     energies, _ = energy_and_losses(outcome)
     np.testing.assert_allclose(energies - energies[0], work - work[0], atol=1e-7 * np.abs(work).max())
 
@@ -235,7 +236,7 @@ def test_motors_behind_stepped_gears_carry_out_the_path(damping):
     """Inverse dynamics finds k(δ) + c δ̇ = τ: the replay stays on the path up to the kinks that the spline rounds."""
     steps = {"values": (2e3, 3e3, 4e3), "torques": (2.0, 6.0)}
     error, source, _ = carried_out(rigid_arm(RIGID | {"stiffness": steps, "damping": damping}, RIGID))
-    gear = source.motion.gears["O"]
+    gear = gear_motions(source.motion)["O"]
     spring = TwistSpring.of(StiffnessSteps(**steps))
     assert np.abs(gear.gear_moment).max() > 6.0
     np.testing.assert_allclose(

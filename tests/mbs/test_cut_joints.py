@@ -11,8 +11,8 @@ from tree_oracle import row_values
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.motion import totals
 from ffrobot.mbs.quantities.reactions import reactions
+from ffrobot.mbs.quantities.supply import totals
 
 CHAINS = [
     (("revolute", "universal", "cylindrical", "universal"), ("rigid",)),

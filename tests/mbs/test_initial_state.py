@@ -10,6 +10,7 @@ from rods import rod, slider_crank
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.linear.statics import initial_state
 from ffrobot.mbs.posture.start import undeformed_posture
+from ffrobot.mbs.quantities.motion import section_motion
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
 
@@ -34,7 +35,7 @@ def angle(found, body):
 
 def test_start_meets_constraints_and_rates_undeformed():
     found = started(arm(trajectory=[to("1.2-0.3*t", "0.9+0.5*t")]))
-    tip = found.motion.section("link2.tip")
+    tip = section_motion(found.motion, "link2.tip")
     np.testing.assert_allclose(tip.r[0, :2], [1.2, 0.9], atol=1e-13)
     np.testing.assert_allclose(tip.velocity[0, :2], [-0.3, 0.5], atol=1e-13)
     for name in ANGLES:

@@ -13,15 +13,16 @@ from body_equations import (
     required_forces,
 )
 from checkpoint_scenes import as_scene, tree_model
-from moving_trees import SMALL, moving
+from moving_trees import SMALL, moving, state_of
 from prescribed_oracle import residuals
 from random_mechanisms import TYPES, random_tree
 from tree_reactions import carried, needed
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.gears import with_compliance
-from ffrobot.mbs.quantities.motion import RobotMotion, totals
+from ffrobot.mbs.quantities.motion import acting_forces, system_of
 from ffrobot.mbs.quantities.reactions import reactions
+from ffrobot.mbs.quantities.supply import totals
 
 FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5}
 ROTOR = {"rotor_inertia": 0.02, "gear_ratio": 7.0}
@@ -47,7 +48,7 @@ def anything_moving(rng, joint, turned, gear):
     model = with_compliance(tree_model(plain, tables, load=[load]))
     tree, times = model.tree, np.array([0.0, 0.4])
     q = tree.integrate(np.tile(tree.at_rest({}), (2, 1)), SMALL * rng.standard_normal((2, tree.n_v)))
-    return RobotMotion(model, times, q, *rng.standard_normal((2, 2, tree.n_v)), np.zeros((2, 0)))
+    return state_of(model, times, q, *rng.standard_normal((2, 2, tree.n_v)), np.zeros((2, 0)))
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
@@ -67,12 +68,12 @@ def test_trees_of_every_joint(joint, gear, turned):
 
 def check_equations(motion):
     """Forces that the motion takes; accelerations that the core finds instead leave none."""
-    system, state = motion.system, (motion.q, motion.v)
+    system, state = system_of(motion), (motion.q, motion.v)
     expected = required_forces(motion.model, accelerated(motion), motion.time)
     found = system.core.required_forces(system.scene, motion.time, *state, motion.a)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
     run = _core.tree_outputs(system.core, system.scene, motion.time.tolist(), np.hstack(state))
-    free = RobotMotion(motion.model, motion.time, *state, run.accelerations, run.multipliers)
+    free = state_of(motion.model, motion.time, *state, run.accelerations, run.multipliers)
     assert residuals(free)[0] < 1e-12
 
 
@@ -100,16 +101,16 @@ def check_points(motion):
     of_all = absolute_accelerations(mechanism, state)
     for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
         force, moment = 0.0, 0.0
-        for section, acting in motion.forces.at_points[number]:
+        for section, acting in acting_forces(motion).at_points[number]:
             place = tree_oracle.motion(tree, section, motion.q, tree_oracle.frames(motion.model.tree, motion.q))
             at_frame = acting.seen_from(place.r - tree_oracle.frames(motion.model.tree, motion.q)[number].r)
             force, moment = force + at_frame.force, moment + at_frame.moment
         size = np.abs(expected.force).max() + np.abs(expected.moment).max()
         np.testing.assert_allclose(force, expected.force, rtol=0, atol=1e-11 * size)
         np.testing.assert_allclose(moment, expected.moment, rtol=0, atol=1e-11 * size)
-        modal = motion.forces.found.modal[:, node.p_v]
+        modal = acting_forces(motion).found.modal[:, node.p_v]
         np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
-        of_body = motion.forces.of_body(number)
+        of_body = acting_forces(motion).of_body(number)
         a, alpha, _ = np.split(of_all[:, mechanism.coordinates.columns(node.body.name)], [3, 6], axis=1)
         alpha = np.einsum("tij,tj->ti", tree_oracle.frames(motion.model.tree, motion.q)[number].F, alpha)
         for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):

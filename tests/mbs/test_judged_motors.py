@@ -24,8 +24,8 @@ def arm():
 def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
     """The last ones, by motor: that of the hand is what its motor did, as far as steps show it."""
     run = solve_scene(arm(), Watcher()).outcomes["follow"]
-    q = run.motion.q
-    torques = motor_forces(run.model, q, path_forces(run.model, run.time, q, run.motion.multipliers)).moments
+    q = run.q
+    torques = motor_forces(run.model, q, path_forces(run.model, run.time, q, run.multipliers)).moments
     peaks = run.continuation.checkpoint.force_peaks[-3:]
     largest = np.array([np.abs(torques[f"j{k}"]).max() for k in range(3)])
     assert largest[2] < 1e-3 * largest[0]

@@ -7,6 +7,7 @@ from steel_arms import two_links
 
 import ffrobot as library
 from ffrobot.mbs.quantities.attachment_error import ModesInMotion, Start, mode_error, phase_error, start_jolt
+from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 
@@ -25,7 +26,7 @@ def test_estimate_is_about_the_error_of_moments(payload, rise, state):
         "initial": {"state": state, "angles": {"a": 0.2, "b": -0.3}},
     }
     coarse, fine = (solved(two_links(modes, True, rise=rise, **keys), "swing") for modes in (4, 10))
-    moments = [np.column_stack([of.motor_moments[joint] for joint in "OA"]) for of in (coarse.motion, fine.motion)]
+    moments = [np.column_stack([motor_moments(of.run)[joint] for joint in "OA"]) for of in (coarse, fine)]
     errors = np.abs(moments[0] - moments[1]).max(axis=0) / np.abs(moments[1]).max(axis=0)
     assert 0.2 * errors.max() < coarse.mode_error < 5 * errors.max()
     assert (coarse.mode_error < 1e-5) == (state == "static")
@@ -33,7 +34,7 @@ def test_estimate_is_about_the_error_of_moments(payload, rise, state):
 
 def test_modes_that_ring_count_by_what_they_do():
     """Of a mode at ω, far above ω_k, p̈ = −ω² p says nothing of what modes between them leave out: p does."""
-    body = solved(two_links(2, True), "swing").motion.model.tree.nodes[-1].body
+    body = solved(two_links(2, True), "swing").run.model.tree.nodes[-1].body
     t = np.linspace(0.0, 1.0, 2001)
     p = np.zeros((len(t), body.n_modes))
     p[:, 0], p[:, -1] = 1.0, 1e-3 * np.cos(np.sqrt(body.stiffness[-1]) * t)
@@ -67,7 +68,7 @@ def test_half_of_what_bends_a_link_rings_where_its_acceleration_jumps():
 def test_estimate_where_the_acceleration_jumps(angle, modes, damping):
     """Missing modes ring, and those that are there ring out of step: against eight modes, with and without damping."""
     coarse, fine = (solved(swung(angle, count, damping, attachment_modes=True)) for count in (modes, 8))
-    torques = [of.motion.motor_moments["O"] for of in (coarse, fine)]
+    torques = [motor_moments(of.run)["O"] for of in (coarse, fine)]
     error = np.abs(torques[0] - torques[1]).max() / np.abs(torques[1]).max()
     assert error > 1e-5
     assert 0.2 * error < coarse.mode_error < (10 if modes == 1 else 5) * error
@@ -108,7 +109,7 @@ def test_bending_that_no_motor_feels_is_told_by_reactions():
         )  # fmt: skip
 
     coarse, fine = (solved(upright(modes)) for modes in (4, 12))
-    found = [(of.reactions["O"].moment, of.motion.motor_moments["O"]) for of in (coarse, fine)]
+    found = [(of.reactions["O"].moment, motor_moments(of.run)["O"]) for of in (coarse, fine)]
     reaction, torque = (np.abs(a - b).max() / np.abs(b).max() for a, b in zip(*found, strict=True))
     assert 0.2 * reaction < coarse.mode_error < 5 * reaction
     assert torque < 0.01 * reaction

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
+from moving_trees import state_of
 
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.quantities.supply import actuator_forces
 from ffrobot.run.bodies import load_bodies
 
 CLOSE = 2e-9  # of the peak: the digits in which two step sizes of the numbers agree
@@ -30,7 +31,7 @@ def motion_of(name):
             v[:, node.p_v] = [sample["bodies"][node.body.name]["modal_velocity"] for sample in samples]
     forces = np.array([sample["path_force"] for sample in samples])
     multipliers = -forces[:, : len(model.rows)]
-    return RobotMotion(model, time, q, v, np.zeros_like(v), multipliers), data
+    return state_of(model, time, q, v, np.zeros_like(v), multipliers), data
 
 
 def close(found, expected, scale=None):
@@ -42,7 +43,7 @@ def close(found, expected, scale=None):
 def test_motors_between_frames(name):
     """The same moments, other modal forces: no angle, but a virtual work."""
     motion, data = motion_of(name)
-    close(np.hstack(list(motion.motor_forces.moments.values())), [sample["moments"] for sample in data["samples"]])
-    for body, values in motion.motor_forces.modal.items():
+    close(np.hstack(list(actuator_forces(motion).moments.values())), [sample["moments"] for sample in data["samples"]])
+    for body, values in actuator_forces(motion).modal.items():
         if values.shape[1]:
             close(values, [sample["bodies"][body]["modal_force_frame"] for sample in data["samples"]])

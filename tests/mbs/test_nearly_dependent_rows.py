@@ -25,4 +25,4 @@ def test_all_equations_of_a_path_are_followed(off):
     )
     run = solve_scene(scene, Watcher()).outcomes["follow"]
     assert run.status == "completed"
-    np.testing.assert_allclose(run.motion.q[:, 0], off + run.time**2 - 0.5, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run.q[:, 0], off + run.time**2 - 0.5, rtol=0, atol=1e-9)

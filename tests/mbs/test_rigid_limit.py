@@ -7,6 +7,8 @@ from mechanisms import make_model, pcid, relative, revolute
 from oracle_runs import joint_forces, run, trajectory_force
 from rods import rod, slider_crank
 
+from ffrobot.mbs.quantities.motion import joint_motion
+
 G = 9.81
 
 
@@ -56,7 +58,7 @@ def test_slider_crank_moves_as_its_geometry_says():
     assert np.abs(outcome.v[:, slider][:, 0] - x_dot).max() < 1e-10
     assert np.abs(outcome.q[:, slider][:, 1:]).max() < 1e-10
     assert np.abs(outcome.q[:, rod_][:, 2] - np.arcsin(-r * np.sin(phi) / length)).max() < 1e-10
-    guide, crank = (outcome.motion.joint(name) for name in ("rail", "O"))
+    guide, crank = (joint_motion(outcome.motion, name) for name in ("rail", "O"))
     assert np.abs(guide[0][:, 0] - guide[0][0] - (x - x[0])).max() < 1e-10
     assert np.abs(crank[0][:, 0] - phi).max() < 1e-10  # turns are counted
     assert np.abs(crank[1] - phi_dot).max() < 1e-9

@@ -55,7 +55,7 @@ def test_a_parallelogram_that_falls_flat_stops_and_says_why(space, tolerance):
     assert run.status == "step underflow"
     assert run.statistics.cause.startswith("the configuration is singular or nearly so (ratio of singular values")
     assert 'loops that "head1" close' in run.statistics.cause
-    angle = run.motion.q[-1, run.model.columns("foot0")[0]]
+    angle = run.q[-1, run.model.columns("foot0")[0]]
     assert 0.0 < angle < 0.3
     # of a pendulum: (J_cranks + m l²) ω²/2 = (m_cranks/2 + m) g l (sin 1 − sin θ)
     inertia, weight = 2 * 0.5 * CRANK**2 / 3 + 0.8 * CRANK**2, (0.5 + 0.8) * 9.81 * CRANK
@@ -94,7 +94,7 @@ def bauchau(tilt, *more):
 def test_a_crank_drives_a_loop_that_only_bending_lets_move():
     """In line at 180 degrees branches meet: C comes to 90 degrees of the parallelogram, and then goes back."""
     run = solve_scene(bauchau(np.deg2rad(5.0)), Watcher()).outcomes["turn"]
-    crank, hinge = (run.motion.q[:, run.model.columns(name)[0]] for name in "AC")
+    crank, hinge = (run.q[:, run.model.columns(name)[0]] for name in "AC")
     np.testing.assert_allclose(crank, np.pi / 2 + 4 * run.time, atol=1e-9)
     assert np.abs(hinge - crank + np.pi / 2)[run.time < 0.3].max() < 0.02  # a parallelogram that bends a little
     assert hinge[-1] < hinge.max() - 0.2 < np.pi / 2

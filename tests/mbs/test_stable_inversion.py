@@ -21,6 +21,7 @@ from ffrobot.mbs.inversion.zero_dynamics import (
     linear_dynamics,
     zeros,
 )
+from ffrobot.mbs.quantities.motion import constraint_rows
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 
@@ -95,7 +96,7 @@ def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
     motion, tree = evaluated(model, 0.0, found.q[0], 0 * found.v[0]).motion, model.model.tree
     mechanism, joints = mechanism_of(tree, np.zeros(3)), tree.joint_columns
     (state,) = absolute_states(mechanism, accelerated(motion))
-    M, C_s = state.B.T @ mechanism.mass_matrix(state.q) @ state.B, motion.rows[1][0]
+    M, C_s = state.B.T @ mechanism.mass_matrix(state.q) @ state.B, constraint_rows(motion)[1][0]
     L, Z = np.zeros((2, tree.n_v, np.count_nonzero(~joints)))
     L[~joints] = Z[~joints] = np.eye(L.shape[1])
     Z[joints] = -np.linalg.solve(C_s[:, joints], C_s[:, ~joints])

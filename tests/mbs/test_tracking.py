@@ -21,6 +21,7 @@ from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.stable_inversion import invert
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.model import modal_directions
+from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.tracking.advice import bounds_of_zeros
 from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
 from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
@@ -240,10 +241,10 @@ def test_prescribed_shape_is_feasible(count, by_shape, least):
     (voltages,) = shape.actuation.voltages.values()
     V_max = np.abs(voltages.required).max()
     assert V_max == pytest.approx(by_shape, rel=5e-3)
-    times = shape.run.motion.time
+    times = shape.run.time
     r, tau = servo.forces(times, *sampled(shape.run.prescribed.shape, times))
     assert np.abs(r - voltages.required @ Phi_V.T).max() < 1e-9 * np.abs(r).max()
-    assert np.abs(tau - shape.motion.motor_moments["O"]).max() < 1e-9 * np.abs(tau).max()
+    assert np.abs(tau - motor_moments(shape.run)["O"]).max() < 1e-9 * np.abs(tau).max()
     problem = asked(servo, Phi_V, (0.0, 0.6), "least-voltage", 200.0, is_free=True)
     share = track(problem, graded(0.0, 0.6, 64)).share
     assert 200.0 * share == pytest.approx(least, rel=1e-2)

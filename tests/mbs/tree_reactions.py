@@ -6,6 +6,7 @@ from body_equations import accelerated, along_cut, body_forces, rotor_moments
 from row_wrenches import row_wrenches
 
 from ffrobot.mbs.model.known_motion import Wrench
+from ffrobot.mbs.quantities.motion import cut_motions, section_motion
 
 
 def carried(motion):
@@ -15,7 +16,7 @@ def carried(motion):
     along = [(row, size, True) for row, size in zip(motion.model.rows, -motion.multipliers.T, strict=True)]
     along += [
         (one.row, one.row.sign * (along_cut(one, motion.time) - one.resistance(of.rate)), False)
-        for one, of in motion.cut
+        for one, of in cut_motions(motion)
         if one.is_loaded
     ]
     for row, size, is_constraint in along:
@@ -73,4 +74,4 @@ def of_load(motion, load):
     values = {name: function.sample(motion.time)[0] for name, function in load.components.items()}
     none = np.zeros(len(motion.time))
     force, moment = (np.stack([values.get(key, none) for key in keys], axis=1) for keys in ("xyz", ("mx", "my", "mz")))
-    return Wrench(force, moment).seen_from(motion.section(load.point).r)
+    return Wrench(force, moment).seen_from(section_motion(motion, load.point).r)

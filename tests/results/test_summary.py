@@ -58,7 +58,7 @@ def test_a_replay_ends_with_its_actuation():
 def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
     solution = solve_scene(make_scene(**keys), Watcher())
     results, printed = Results.from_image(results_image(solution), tmp_path / "x.h5"), StringIO()
-    print_details(solution, results, solution.seconds, Console(file=printed, width=200))
+    print_details(solution, results, Console(file=printed, width=200))
     lines = printed.getvalue().splitlines()
     header = next(line for line in lines if line.startswith("analysis"))
     columns = "analysis kind integrator end (s) steps evaluations tolerance violation wall (s)"

@@ -7,7 +7,7 @@ from mechanisms import forward, make_model, pcid, revolute
 from oracle_runs import energies, run
 from rods import CRANK, ROD, rod
 
-from ffrobot.mbs.quantities.motion import totals
+from ffrobot.mbs.quantities.supply import totals
 
 
 def inverse(model, **keys):

@@ -5,13 +5,15 @@ from links import ANGLES, arm, ritz_link
 from mechanisms import relative
 from robots import inverse
 
+from ffrobot.mbs.quantities.motion import constraint_violation
+
 STATIC = {"angles": ANGLES, "state": "static"}
 
 
 def forces(links, **keys):
     outcome = inverse(arm(links, initial=STATIC), **({"end": 0.2, "tolerance": 1e-4} | keys))
     outcome.check_completed()
-    assert outcome.motion.violation.max() < 1e-11
+    assert constraint_violation(outcome.motion).max() < 1e-11
     return outcome.lambda_
 
 

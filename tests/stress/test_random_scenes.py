@@ -12,6 +12,8 @@ from oracle_runs import energies, evaluated, posture_of, random_tree_state, run
 from patch_sets import FULL
 from prescribed_oracle import residuals
 
+from ffrobot.mbs.quantities.motion import constraint_rows
+
 random_scenes = settings.get_profile("scenes")
 T = 0.37
 BOUNDS = {"residual": 1e-10, "power": 1e-5, "round_trip": 1e-6}
@@ -58,7 +60,7 @@ def test_power_is_the_rate_of_energy(system):
     rate = (energy(h)[0] - energy(-h)[0]) / (2 * h)
     motion, power = found.motion, -energy(0.0)[2]
     given = given_forces(motion.model, motion.q, tree_oracle.frames(motion.model.tree, motion.q), motion.time)[0]
-    power += given @ v - motion.multipliers[0] @ motion.rows[1][0] @ v
+    power += given @ v - motion.multipliers[0] @ constraint_rows(motion)[1][0] @ v
     terms = np.abs(v) @ np.abs(required_forces(motion.model, accelerated(motion), motion.time)[0] + given) + abs(power)
     rounding = 1e-15 * energy(0.0)[1] / h  # of the differences; allowed beside the bound on the rest
     assert abs(rate - power) / max(terms + rounding / BOUNDS["power"], 1e-300) < BOUNDS["power"]

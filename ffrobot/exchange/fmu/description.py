@@ -186,7 +186,7 @@ def identifier_of(scene: str, analysis: str) -> str:
 
 
 def zipped(content: Mapping[str, bytes]) -> bytes:
-    """ZIP archive of files by name."""
+    """Files by name in one archive."""
     archive = BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
         for name, data in content.items():

@@ -1,11 +1,10 @@
-"""What an analysis computed: motion, forces, how the run went, and what only its kind finds."""
+"""The record of a run: motion, forces, how it went, and what only its kind of analysis finds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, field, replace
 from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -19,11 +18,14 @@ from .._core import TimeFunction
 from ..model.drives import PointDrive
 from ..model.model import Model
 from ..scene.analysis import Analysis
+from ..scene.space import SPACES, Space
 from .integrators import NOT_INTEGRATED, Choice
-from .samples import in_order, path_times
+from .samples import path_times
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
+
+    from ..model.divided_link import LinkInPieces
 
 ADVICE = {
     "step underflow": "no step is small enough there",
@@ -37,57 +39,6 @@ ADVICE = {
     "diverged": "a link is bent by as much as it is long: a path too fast, loads beyond buckling, a spin that needs"
     " geometric_stiffening = true, or an arm without motors that falls apart",
 }
-
-
-class _Rows:
-    """Base of records of arrays with one row per output time, also by name; anything else is of all times."""
-
-    def at(self, rows: slice | Sequence[int] | Indices) -> Self:
-        """These rows alone."""
-        return self._each(lambda x: x[rows])
-
-    def with_rows_of(self, other: Self, order: Indices) -> Self:
-        """With the rows of another behind these, all in another order."""
-        return self._each(lambda x, y: np.concatenate([x, y])[order], other)
-
-    def followed_by(self, later: Self) -> Self:
-        """With the rows that `later` has beyond those that are here."""
-        return self._each(lambda x, y: np.concatenate([x, y[len(x) :]]), later)
-
-    def _each(self, f: Callable[..., Array], *others: Self) -> Self:
-        def found(values: Sequence[Any]) -> Any:
-            if isinstance(values[0], Mapping):
-                return {name: f(*(value[name] for value in values)) for name in values[0]}
-            return f(*values) if isinstance(values[0], np.ndarray) else values[0]
-
-        of_all = (self, *others)
-        return replace(self, **{name: found([getattr(x, name) for x in of_all]) for name in vars(self)})  # type: ignore[type-var]
-
-
-@struct
-class Motion(_Rows):
-    """One row per output time, SI units."""
-
-    time: Array  # (T,) s
-    # q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree
-    q: Array
-    v: Array
-    a: Array
-    multipliers: Array  # (T, constraint equations)
-    is_at_rest: bool = False  # whether targets stand still, as in an equilibrium
-
-
-@struct
-class Forces(_Rows):
-    """What actuators have to supply, and what acts beside the loads of the scene."""
-
-    # (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all
-    required: Array | None = None
-    applied: tuple[PointDrive, ...] = ()  # on points
-    # (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay applies
-    commanded: Mapping[str, Array] = field(default_factory=dict)
-    # (T, k) V by body, of patches where the analysis itself finds them
-    voltages: Mapping[str, Array] = field(default_factory=dict)
 
 
 @struct
@@ -127,15 +78,6 @@ class Continuation:
 
 
 @struct
-class EarlierRun:
-    """What an earlier run of an analysis has computed, complete or not: it is taken over, or gone on with."""
-
-    motion: Motion
-    statistics: Statistics
-    continuation: Continuation
-
-
-@struct
 class GearMotion:
     """What an elastic gear does in an inverse analysis, one row per output."""
 
@@ -172,25 +114,57 @@ class Prescription(NamedTuple):
 
 
 @struct
-class Outcome:
-    """What an analysis computed."""
+class Run:
+    """One run of an analysis: its motion, one row per output, SI units; the forces in it; how it went.
+
+    Attributes:
+        model: with the constraint equations of the run.
+        time: (T,) s.
+        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree.
+        multipliers: (T, constraint equations).
+        required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all.
+        commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
+            applies.
+        voltages: (T, k) V by body, of patches where the analysis itself finds them.
+        applied: forces on points beside the loads of the scene.
+        is_at_rest: whether targets stand still, as in an equilibrium.
+        twists: of compliant gears by joint, where they are known between outputs.
+        links: the links in pieces by name, as which the pieces are read.
+        details: what only its kind finds.
+        prescribed: what moves it, where that is known without steps.
+        look_closer: makes the same with times between its outputs; None where nothing is between.
+    """
 
     _: KW_ONLY
     analysis: Analysis
-    model: Model  # with the constraint equations of its run
-    motion: Motion
-    forces: Forces = field(default=Forces())
+    model: Model
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    required: Array | None = None
+    commanded: Mapping[str, Array] = field(default_factory=dict)
+    voltages: Mapping[str, Array] = field(default_factory=dict)
+    applied: tuple[PointDrive, ...] = ()
+    is_at_rest: bool = False
+    twists: Mapping[str, BSpline] = field(default_factory=dict)
+    links: Mapping[str, LinkInPieces] = field(default_factory=dict)
     statistics: Statistics = field(default=Statistics())
     details: Details = field(default=Details())
     continuation: Continuation | None = None
-    prescribed: Prescription | None = None  # what moves it, where that is known without steps
-    # the same with times between its outputs; None where nothing is between
-    look_closer: Callable[[], Outcome] | None = None
+    prescribed: Prescription | None = None
+    look_closer: Callable[[], Run] | None = None
 
     @property
-    def path(self) -> Path:
-        """Of the scene."""
-        return self.model.scene.path
+    def space(self) -> Space:
+        """That of the scene."""
+        return SPACES[self.model.scene.space]
+
+    @property
+    def is_prescribed(self) -> bool:
+        """Whether trajectories hold in it, motors their angles, or all is given with the forces that it takes."""
+        return any(row.is_trajectory for row in self.model.rows) or self.required is not None
 
     @property
     def recording(self) -> _core.Recording | None:
@@ -198,45 +172,20 @@ class Outcome:
         return self.continuation.recording if self.continuation else None
 
     @property
-    def closer(self) -> Outcome:
+    def closer(self) -> Run:
         """The run at its outputs and between: see `samples`. Itself where nothing is between."""
         return self if self.look_closer is None else self.look_closer()
 
-    def with_look(self, at: Callable[[Array], Outcome]) -> Self:
+    def with_look(self, at: Callable[[Array], Run]) -> Self:
         """The same that looks closer at a motion along paths, which `at` has at any times (T,), s."""
 
         @cache
-        def look_closer() -> Outcome:
+        def look_closer() -> Run:
             scene, shape = self.model.scene, (function for _, function, _ in self.analysis.prescribed())
             others = (*scene.load_functions, *shape)
             return at(path_times(self.time, scene.trajectory, self.analysis.last_time, others))
 
         return replace(self, look_closer=look_closer)
-
-    @property
-    def time(self) -> Array:
-        """(T,) s."""
-        return self.motion.time
-
-    @property
-    def q(self) -> Array:
-        """(T, n_q) positions."""
-        return self.motion.q
-
-    @property
-    def v(self) -> Array:
-        """(T, n_v) velocities."""
-        return self.motion.v
-
-    @property
-    def a(self) -> Array:
-        """(T, n_v) accelerations."""
-        return self.motion.a
-
-    @property
-    def multipliers(self) -> Array:
-        """(T, constraint equations)."""
-        return self.motion.multipliers
 
     @property
     def status(self) -> str:
@@ -261,16 +210,31 @@ class Outcome:
         if self.failed:
             run = self.statistics
             raise SolveError(
-                f'{self.path}: analysis "{self.analysis.name}" ended at t = {self.time_reached:.9g} s'
+                f'{self.model.scene.path}: analysis "{self.analysis.name}" ended at t = {self.time_reached:.9g} s'
                 f" ({run.status}): {run.cause or ADVICE[run.status]}{how_to_go_on}"
             )
 
-    def at(self, rows: slice | Sequence[int]) -> Self:
+    def at(self, rows: slice | Sequence[int] | Indices) -> Self:
         """These outputs alone."""
-        return replace(self, motion=self.motion.at(rows), forces=self.forces.at(rows))
+        return self._each(lambda x: x[rows])
 
-    def among(self, between: Self) -> Self:
-        """With the rows of the same run at times between its outputs, all in the order of time."""
-        order, motion, forces = in_order(self.time, between.time), self.motion, self.forces
-        motion, forces = motion.with_rows_of(between.motion, order), forces.with_rows_of(between.forces, order)
-        return replace(self, motion=motion, forces=forces)
+    def with_rows_of(self, other: Run, order: Indices) -> Self:
+        """With the rows of the same run at other times behind these, all in another order."""
+        return self._each(lambda x, y: np.concatenate([x, y])[order], other)
+
+    def after(self, earlier: Run) -> Self:
+        """With the rows of an earlier part of the same run before those that are beyond it."""
+        return self._each(lambda x, y: np.concatenate([y, x[len(y) :]]), earlier)
+
+    def _each(self, change: Callable[..., Array], *others: Run) -> Self:
+        def changed(values: Sequence[Any]) -> Any:
+            if isinstance(values[0], Mapping):
+                return {name: change(*(value[name] for value in values)) for name in values[0]}
+            return None if values[0] is None else change(*values)
+
+        runs = (self, *others)
+        return replace(self, **{name: changed([getattr(run, name) for run in runs]) for name in BY_OUTPUT})
+
+
+BY_OUTPUT = ("time", "q", "v", "a", "multipliers", "required", "commanded", "voltages")
+"""Fields of a `Run` with one row per output."""

@@ -1,0 +1,68 @@
+"""One solve from a scene to its results, for Python and the command line: prepared, resumed, kept and checked."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from ..common.errors import SolveError, StoppedError
+from ..common.files import check_output
+from ..common.outputs import protected
+from ..run.inputs import files_of_tables
+from ..run.solution import Solution
+from ..run.solve import solve_scene
+from ..run.watcher import Watcher
+from ..scene.scene import Scene
+from .file import FORMAT
+from .resume import how_to_go_on, left_out, resume_scene
+from .write import write_results
+
+
+def solve_and_keep(
+    scene: Scene, path: Path | None, watcher: Watcher, again: str, *, resume: bool = False
+) -> Solution | None:
+    """Run the analyses of a scene, which go on from the file `path` with `resume`, and write that file where given.
+
+    It is written before an error is raised. `again`: the command that goes on with it. None where there is nothing to
+    go on with. Raises as `solve_scene`, and `StoppedError` where a signal has cut a run short.
+    """
+    inputs, kept = files_of_tables(scene.path, scene.text), list[Solution]()
+    if path is not None:
+        with protected(inputs):
+            check_output(path, FORMAT)
+
+    def keep(solution: Solution) -> None:
+        began = time.perf_counter()
+        if path is not None:
+            with protected(inputs):
+                write_results(solution, path)
+        kept.append(replace(solution, seconds={**solution.seconds, "writing": time.perf_counter() - began}))
+
+    try:
+        if path is not None and resume:
+            solution = resume_scene(scene, path, watcher, keep)
+        else:
+            solution = solve_scene(scene, watcher, keep)
+    except SolveError as error:
+        if not watcher.signal:
+            raise
+        go_on = "".join(how_to_go_on(one, again) for one in kept)
+        raise StoppedError(f"{error}{go_on}", watcher.signal) from error
+    return kept[-1] if kept else solution
+
+
+def check_ended(solution: Solution, watcher: Watcher, again: str = "") -> None:
+    """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end.
+
+    `again`: the command that goes on with the results; empty where they are in no file.
+    """
+    go_on = how_to_go_on(solution, again) if again else ""
+    try:
+        for run in solution.outcomes.values():
+            run.check_completed(go_on)
+    except SolveError as error:
+        raise StoppedError(str(error), watcher.signal) if watcher.signal else error from None
+    if watcher.signal:
+        done = "before all analyses" if left_out(solution) else "when all was computed and written"
+        raise StoppedError(f"{solution.scene.path}: stopped on request {done}{go_on}", watcher.signal)

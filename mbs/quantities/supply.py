@@ -1,0 +1,139 @@
+"""What drives a run: forces along paths, moments of motors, also behind compliant gears; energies and momentum.
+
+All arrays are over the output times (T, …), SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.structs import kept, struct
+from ..model.divided_link import spread_of
+from ..model.gears import compliance, with_compliance
+from ..model.motors import MotorForces
+from ..posture.posture import mobility
+from ..run.gears import Supplied, supplied_through_gears, with_motors
+from ..run.record import GearMotion, Run
+from ..run.replay import supplied_in
+from ..scene.trajectories import Trajectory
+from .motion import system_of
+
+
+def path_force(run: Run, trajectory: str) -> Array:
+    """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""
+    chosen = [k for k, row in enumerate(run.model.rows) if row.is_trajectory and row.owner == trajectory]
+    return -run.multipliers[:, chosen]
+
+
+def followed_trajectories(run: Run) -> list[Trajectory]:
+    """The trajectories that hold in it: all, or none."""
+    holding = {row.owner for row in run.model.rows if row.is_trajectory}
+    return [trajectory for trajectory in run.model.scene.trajectory if trajectory.name in holding]
+
+
+@kept
+def actuator_forces(run: Run) -> MotorForces | None:
+    """What motors and modes supply, behind compliant gears what motors must do there; None where nothing is prescribed.
+
+    Modal forces of links in pieces follow by virtual work from those on their pieces.
+    """
+    supplied = _supplied(run)
+    if supplied is None:
+        return None
+    modal = dict(supplied.forces.modal)
+    for name, link in run.links.items():
+        spread = spread_of(link.modal, list(zip(link.starts, link.pieces, strict=True)))
+        modal[name] = np.hstack([modal.pop(piece) for piece in link.names]) @ spread
+    return replace(supplied.forces, modal=modal)
+
+
+def motor_moments(run: Run) -> Mapping[str, Array]:
+    """By joint (T, k), N·m or N: what motors do, or have to do in place of what is prescribed."""
+    forces = actuator_forces(run)
+    return run.commanded if forces is None else forces.moments
+
+
+@kept
+def _supplied(run: Run) -> Supplied | None:
+    if not run.is_prescribed or (run.space.is_plane and not motors_fit(run)):
+        return None
+    return supplied_through_gears(run.model, run, run.time, supplied_in(run), run.twists or None)
+
+
+@kept
+def motors_fit(run: Run) -> bool:
+    """Whether there are as many as the mechanism has degrees of freedom with rigid links."""
+    count = sum(map(len, run.model.motors.values()))
+    return len(run.time) > 0 and count == mobility(run.model, run.q[0]).freedom
+
+
+def gear_motions(run: Run) -> Mapping[str, GearMotion]:
+    """Motion of compliant gears by joint, of inverse analyses and equilibria."""
+    are_rigid = all(compliance(node) is None for node in run.model.tree.nodes)
+    supplied = None if are_rigid else _supplied(run)
+    return {} if supplied is None else supplied.gears
+
+
+@kept
+def behind_gears(run: Run) -> Run:
+    """The same with motors as far ahead of compliant gears as they have to be; itself where gears give in it."""
+    gears = gear_motions(run)
+    if not gears:
+        return run
+    model = with_compliance(run.model)
+    q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
+    return replace(run, model=model, q=q, v=v, a=a)
+
+
+def gear_moment(run: Run, joint: str) -> Array | None:
+    """What a compliant gear transmits to the second side of its joint (T,), N·m; else None."""
+    if joint in (gears := gear_motions(run)):
+        return gears[joint].gear_moment
+    for gear in run.model.tree.gears:
+        if gear.joint.joint.name == joint:
+            way, rate = gear.twist(run.q, run.v)
+            return gear.spring.moment(way) + gear.damping * rate
+    return None
+
+
+def motor_motion(run: Run, joint: str) -> tuple[Array, Array] | None:
+    """Angle and rate (T,), rad, rad/s, of the motor behind a compliant gear, reduced to its joint; else None."""
+    if joint in (gears := gear_motions(run)):
+        return gears[joint].angle, gears[joint].rate
+    for gear in run.model.tree.gears:
+        if gear.joint.joint.name == joint:
+            return run.q[:, gear.motor.q.start], run.v[:, gear.motor.v.start]
+    return None
+
+
+@struct
+class Energies:
+    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate.
+
+    Compliant gears store energy, too, and their motors turn as they have to.
+    """
+
+    kinetic: Array
+    strain: Array
+    gravitational: Array
+    dissipated_power: Array
+
+
+@struct
+class Momentum:
+    """Linear (T, 3) kg·m/s, and angular about the global origin (T, 3) kg·m²/s."""
+
+    linear: Array
+    angular: Array
+
+
+def totals(run: Run) -> tuple[Energies, Momentum]:
+    """Energies and momentum of all bodies and rotors."""
+    run = behind_gears(run)
+    system = system_of(run)
+    sums = system.core.states_totals(system.scene, run.q, run.v)
+    return Energies(*sums[:, :4].T), Momentum(sums[:, 4:7], sums[:, 7:])
