@@ -6,16 +6,13 @@ It is kept in the repository, so that it can be read there: `python docs/benchma
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from benchmark_columns import COLUMNS
+
 from ffrobot.bench.campaign import as_text
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
-
-from bench.columns import COLUMNS
 
 INTRODUCTION = """# What was measured
 

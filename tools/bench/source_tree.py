@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,11 +16,14 @@ from ffrobot.scene.load import load_scene
 from ffrobot.scene.scene import Scene
 
 from .aims import measure_aims
-from .columns import COLUMNS
 from .evaluations import measure_evaluations
 from .growth import measure_growth
 from .peer import Exudyn, measure_peer
 from .replays import measure_replays
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
+
+from benchmark_columns import COLUMNS
 
 CASES = ("two_link", "slider_crank")  # of the paper
 PARTS = ("growth", "evaluations", "aims", "replays")
