@@ -121,10 +121,10 @@ def drive_robot(
         system.integrated.scene.watch_posture([model.rows[k].is_trajectory for k in rows], robot_size(model))
     watch_limits(system.integrated.scene, model.tree)
     recording = _core.Recording() if is_recorded else None
-    continuation = Continuation(
-        _core.TreeCheckpoint(), recording, new_samples(times, analysis, len(start.q) + len(start.v))
-    )
-    continuation = continuation if earlier is None else earlier.continuation
+    continuation = None if earlier is None else earlier.continuation
+    if continuation is None:
+        samples = new_samples(times, analysis, len(start.q) + len(start.v))
+        continuation = Continuation(_core.TreeCheckpoint(), recording, samples)
     run = _integrated(system, times, start, controls, control, progress, continuation)
     motion = _motion(system, run, times, analysis)
     motion = motion if earlier is None else motion.after(earlier)
@@ -246,8 +246,7 @@ def _telling_motion(
     parts = [thinned(_motion(system, at(rows), times[rows], analysis)) for rows in blocks]
     names = ("time", "q", "v", "a", "multipliers")
     states = {name: np.concatenate([getattr(of, name) for of in parts]) for name in names}
-    whole: Run = replace(parts[0], **states)  # type: ignore[arg-type]
-    return thinned(whole)
+    return thinned(replace(parts[0], **states))
 
 
 def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array, Array, Array]:
