@@ -44,6 +44,7 @@ FLOORS = {
         "sweep",
         "fit",
         "design",
+        "smooth",
         "bench",
         "commands",
         ".",

@@ -64,10 +64,10 @@ def smooth(
     New motions are averaged, slower, shaped for natural frequencies, or inverted: motors lead by the strain of their
     gears. Each is simulated; OUT is the one that settles first.
     """
-    from ..pictures.studies.smooth import draw_smooth
     from ..present.console import Display, summary_console
-    from ..present.smooth import print_smooth
     from ..run.inputs import files_of
+    from ..smooth.drawn import draw_smooth
+    from ..smooth.printed import print_smooth
     from ..smooth.smoothing import smooth_motion
 
     protect([*files_of(scene_file), *([motion] if motion else [])])

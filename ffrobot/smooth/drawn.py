@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...common.files import write_atomically
-from ...smooth.diagnosis import Diagnosis
-from ...smooth.smoothing import Smoothed
-from ..figures.style import SIZE, style
+from ..common.files import write_atomically
+from ..pictures.figures.style import SIZE, style
+from .diagnosis import Diagnosis
+from .smoothing import Smoothed
 
 BAND = "#e8c9a0"
 WIDE = (2 * SIZE[0], 2.2 * SIZE[1])  # inches

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from rich.console import Console
 
-from ..smooth.diagnosis import Diagnosis
-from ..smooth.smoothing import Smoothed
-from .lines import print_table
+from ..present.lines import print_table
+from .diagnosis import Diagnosis
+from .smoothing import Smoothed
 
 MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit")
 COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by it alone (mm)")
