@@ -62,7 +62,7 @@ class MotorFeasibility:
 
     @property
     def has_limits(self) -> bool:
-        """Whether there is anything that it may not exceed."""
+        """Whether the motor has a limit."""
         return bool(np.isfinite((self.moment_limit, self.speed_limit, self.power_limit)).any())
 
     @property

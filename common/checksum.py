@@ -61,7 +61,7 @@ def state(path: Path) -> State:
 
 
 def refuse(path: Path) -> InputError:
-    """What is said of a file whose content and checksum do not fit."""
+    """Message about a file whose content contradicts its checksum."""
     return InputError(
         f"{path}: damaged file: its content is not what its checksum was made of; make it again, or, if it was changed"
         " on purpose, renew the checksum (ffrobot.common.checksum.seal)"

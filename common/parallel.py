@@ -21,7 +21,7 @@ def processes() -> int:
 
 
 def processors() -> int:
-    """How many this process may use."""
+    """Number of processors available to this process."""
     return len(os.sched_getaffinity(0))
 
 

@@ -75,11 +75,11 @@ class LinearModel:
         return -1.0 * A_K, -1.0 * A_D, inputs, outputs
 
     def inputs(self, names: Names) -> list[int]:
-        """Columns of B by name. Raises `InputError` for unknown ones."""
+        """Indices of inputs (columns of B) by name. Raises `InputError` for unknown ones."""
         return _numbers("input", names, self.input_names)
 
     def outputs(self, names: Names) -> list[int]:
-        """Rows of C by name. Raises `InputError` for unknown ones."""
+        """Indices of outputs (rows of C) by name. Raises `InputError` for unknown ones."""
         return _numbers("output", names, self.output_names)
 
     def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:

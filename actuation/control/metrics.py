@@ -71,7 +71,7 @@ class Metrics:
 
 @struct
 class LoopMotion:
-    """What a loop did, at the outputs of its run and between."""
+    """Motion of a closed loop, at outputs and between."""
 
     time: Array  # (T,) s
     error: Array  # (T, d) m, of the tip from its place

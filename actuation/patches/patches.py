@@ -58,7 +58,7 @@ class Reach:
 
     @property
     def serves_all(self) -> bool:
-        """Whether some voltages produce any forces on the modes to be served."""
+        """Whether voltages can produce all forces on the actuated modes."""
         return self.Phi_V.shape[1] >= self.served and not self.unreached_modes.size
 
 

@@ -135,7 +135,7 @@ def bending_row(layout: PztLayout) -> int:
 
 
 def own_row(layout: PztLayout) -> int:
-    """Which of the strains e the layout is there for."""
+    """Index of the strain e that the layout actuates."""
     return TWIST if layout.acts_in == "twist" else bending_row(layout)
 
 

@@ -27,7 +27,7 @@ def interface_load_names(interfaces: Iterable[str]) -> list[str]:
 
 
 def unit_load_names(interfaces: Iterable[str]) -> list[str]:
-    """Names of all loads of a link with these interfaces."""
+    """Names of the unit loads of a link with these interfaces."""
     motions = [f"{kind}_{axis}" for kind in "tr" for axis in "xyz"] + [f"omega_{pair}" for pair in PAIRS]
     return motions + interface_load_names(interfaces)
 

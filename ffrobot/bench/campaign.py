@@ -122,7 +122,7 @@ Swept = tuple[ReferenceRun, list[Point]]
 
 @dataclass(frozen=True)
 class Settings:
-    """What is run: names of integrators, tolerances, repetitions, seconds that one run may take."""
+    """Settings: names of integrators, tolerances, repetitions, time limit of a run (s)."""
 
     integrators: Sequence[str]
     tolerances: Sequence[float]

@@ -157,7 +157,7 @@ class Spread:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Where a scene has to make sense."""
+        """Bounds at which the scene has to be valid."""
         far = self.half if self.kind == "uniform" else WIDE * self.deviation
         return self.mean - far, self.mean + far
 

@@ -108,7 +108,7 @@ class Quantity(NamedTuple):
 
     @property
     def best(self) -> int:
-        """The pose with the best value."""
+        """Index of the pose with the best value."""
         return int(np.nanargmax(self.values) if self.more_is_better else np.nanargmin(self.values))
 
 

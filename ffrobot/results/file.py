@@ -74,7 +74,7 @@ class LinkAccess(Datasets):
         return read_modal(self._file[analysis], body)
 
     def stress_recovery(self, analysis: str, body: str) -> Recovery:
-        """What stresses of a flexible body are computed from, for `mbs.quantities.stress`."""
+        """Data for the stresses of a flexible body, for `mbs.quantities.stress`."""
         from .motion import read_recovery
 
         self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none

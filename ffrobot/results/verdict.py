@@ -74,7 +74,7 @@ class Settled:
 
 @struct
 class PatchNeed:
-    """What patches of a body need, times their limit (0 without), since when (s), and a limit (V) that would do."""
+    """Required voltage of a body's patches over its limit (0: none), time (s), and sufficient limit (V)."""
 
     factor: float
     since: float

@@ -195,7 +195,7 @@ class Motion(NamedTuple):
 
 
 class PostureSearch(NamedTuple):
-    """How postures are sought."""
+    """Settings of the posture search."""
 
     scales: Array  # (n_v,) natural sizes of coordinates; those of size 0 stay
     sizes: Array  # (rows,) natural sizes of C

@@ -186,7 +186,7 @@ def identifier_of(scene: str, analysis: str) -> str:
 
 
 def zipped(content: Mapping[str, bytes]) -> bytes:
-    """Files by name in one archive."""
+    """ZIP archive of files by name."""
     archive = BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
         for name, data in content.items():

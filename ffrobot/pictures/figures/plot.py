@@ -409,7 +409,7 @@ def _check_formats(formats: Sequence[str]) -> None:
 
 
 def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """A picture in all formats."""
+    """Write a picture in all formats."""
     paths = [folder / f"{name}.{extension}" for extension in formats]
     for path, extension in zip(paths, formats, strict=True):
         write_atomically(path, image_of(picture, extension), "figure", make_folder=True)
