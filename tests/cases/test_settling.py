@@ -165,6 +165,30 @@ def test_robots_of_all_kinds_come_to_rest_at_their_final_position():
         assert results.attributes("closed-loop/control")["residual"] < 5e-6
 
 
+@pytest.mark.parametrize("pieces", [1, 2])
+def test_a_turned_beam_rings_as_the_first_mode_of_a_cantilever_whole_or_in_pieces_or_replayed(pieces):
+    """ω = β² √(E I/(ρ A L⁴)); the tip swings by 4 L/β² |∫ θ̇ e^{−iωt} dt|, β = 1.8751: ∫ x φ dx = 2 (L/β)², φ(L) = 2."""
+    tables, way, beta = soft_arm("pcid"), 0.02, 1.8751040687
+    tables["body"][0]["link"] = beam_link(
+        0.6, rectangle(0.004, 0.02), 12, modes={"count": 3, "family": "in-plane-bending"}
+    )  # fmt: skip
+    tables["body"][0]["pieces"] = pieces
+    tables["trajectory"][0] |= {"via": [0.0, way], "profile": "s-curve", "duration": 0.25}
+    replay = {"name": "forward", "kind": "forward", "actuation": "pcid", "apply": "joints"}
+    analyses = [*tables["analysis"], replay]
+    tables["analysis"] = [of | {"tolerance": 1e-6} | ({} if of is replay else {"end": 0.7}) for of in analyses]
+    omega = (beta / 0.6) ** 2 * np.sqrt(70e9 / 2700 / 12) * 0.004
+    expected = 2 * 4 * 0.6 / beta**2 * amplitude("s-curve", 0.25, omega) * way / WAY
+    with program.solve(program.make_scene(**tables | {"gravity": [0.0, 0.0], "payload": []})) as results:
+        for kind in results.analyses:
+            about = results.attributes(f"{kind}/settling/arm.tip")
+            assert about["frequency"] == pytest.approx(omega / (2 * np.pi), rel=1e-4), kind
+            assert about["residual"] == pytest.approx(expected, rel=2e-3), kind
+            assert parse_goal(f"residual {kind}/arm.tip").read(results).value == about["residual"]
+        whole = [results.attributes(f"{kind}/settling/arm.tip")["residual"] for kind in ("pcid", "forward")]
+        assert whole[1] == pytest.approx(whole[0], rel=1e-5)
+
+
 @pytest.mark.parametrize("share", [0.95, 1.05])
 def test_nothing_vibrates_under_more_than_the_load_of_euler(share):
     """An upright link that is held straight: π² E I/(4 L²) at its tip is what it would carry without that."""
