@@ -38,7 +38,7 @@ from .options import POSITIVE, protect
     "--output",
     metavar="OUT.json|.csv|.rosbag2",
     type=FILE,
-    help="New motion, and its picture OUT.png [SCENE.smooth.json next to the input].",
+    help="New motion, with OUT.png and OUT.report.html [SCENE.smooth.json next to the input].",
 )
 @click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
@@ -64,10 +64,11 @@ def smooth(
     New motions are averaged, slower, shaped for natural frequencies, or inverted: motors lead by the strain of their
     gears. Each is simulated; OUT is the one that settles first.
     """
+    from ..common.files import write_atomically
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
-    from ..smooth.drawn import draw_smooth
-    from ..smooth.printed import print_smooth
+    from ..smooth.drawn import picture
+    from ..smooth.printed import print_smooth, write_page
     from ..smooth.smoothing import smooth_motion
 
     protect([*files_of(scene_file), *([motion] if motion else [])])
@@ -83,9 +84,11 @@ def smooth(
     if found.candidates:
         found.write(target, force=force)
         console.print(f"written    {target}", soft_wrap=True)
-    picture = target.with_suffix(".png")
-    draw_smooth(found, picture)
-    console.print(f"figure     {picture}", soft_wrap=True)
+    figure, page = target.with_suffix(".png"), target.with_suffix(".report.html")
+    write_atomically(figure, picture(found, "png"), "picture", ours=True)
+    console.print(f"figure     {figure}", soft_wrap=True)
+    write_page(found, motion, page)
+    console.print(f"report     {page}", soft_wrap=True)
 
 
 def _bandwidth(texts: tuple[str, ...]) -> float | dict[str, float]:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import io
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..common.files import write_atomically
-from ..pictures.figures.style import SIZE, style
+from ..pictures.figures.plot import image_of
+from ..pictures.figures.style import SIZE, literal, style
 from .diagnosis import Diagnosis
 from .smoothing import Smoothed
 
@@ -19,21 +16,15 @@ WIDE = (2 * SIZE[0], 2.2 * SIZE[1])  # inches
 LEAST = 1e-3  # of the tolerance: what is drawn of distances
 
 
-def draw_smooth(found: Smoothed, path: Path) -> None:
-    """Write the picture as PNG."""
-    content = io.BytesIO()
+def picture(found: Smoothed, extension: str) -> bytes:
+    """The file of the picture, "png" or "svg"."""
     with style():
-        _draw(found).savefig(content, format="png")
-    write_atomically(path, content.getvalue(), "picture", ours=True)
-
-
-def _draw(found: Smoothed) -> Figure:
-    figure = Figure(figsize=WIDE, layout="constrained")
-    grid = figure.add_gridspec(2, 5)
-    _accelerations(figure.add_subplot(grid[0, :3]), found.before)
-    _spectrum(figure.add_subplot(grid[0, 3:]), found.before)
-    _distance(figure.add_subplot(grid[1, :]), found)
-    return figure
+        figure = Figure(figsize=WIDE, layout="constrained")
+        grid = figure.add_gridspec(2, 5)
+        _accelerations(figure.add_subplot(grid[0, :3]), found.before)
+        _spectrum(figure.add_subplot(grid[0, 3:]), found.before)
+        _distance(figure.add_subplot(grid[1, :]), found)
+        return image_of(literal(figure), extension)
 
 
 def _accelerations(axes: Axes, of: Diagnosis) -> None:

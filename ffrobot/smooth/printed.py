@@ -1,14 +1,20 @@
-"""What `ffrobot smooth` prints: the stream, its faults, a table of joints, and what it is in words."""
+"""What `ffrobot smooth` prints, and its page: the stream, its faults, a table of joints, and what it is in words."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
+from ..common.files import write_atomically
+from ..pictures.report.page import Table, page_of
 from ..present.lines import print_table
 from .diagnosis import Diagnosis
+from .drawn import picture
 from .smoothing import Smoothed
 
 MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit")
@@ -17,27 +23,59 @@ COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by
 
 def print_smooth(found: Smoothed, console: Console) -> None:
     """Lines on the motion as it is, faults, a table of joints, the verdict."""
+    for name, text in _lines(found):
+        console.print(f"{name:<10} {text}", soft_wrap=True, markup=False)
+    joints, *motions = _tables(found)
+    print_table(console, *joints)
+    console.print(f"verdict    {found.verdict}", soft_wrap=True, markup=False)
+    for table in motions:
+        console.print()
+        print_table(console, *table)
+
+
+def write_page(found: Smoothed, motion: Path | None, path: Path) -> None:
+    """One HTML file: the verdict, faults, tables, the picture."""
+    used = [found.robot.file, *([motion] if motion else [])]
+    part = {
+        "title": f"{found.robot.file.name}: {motion.name if motion else 'trajectories of the scene'}",
+        "mood": "bad" if found.before.residual > found.robot.tolerance else "good",
+        "study": {
+            "headline": found.verdict,
+            "facts": [f"{name}: {text}" for name, text in sorted(_lines(found), key=lambda line: line[0] != "fault")],
+            "tables": _tables(found),
+        },
+        "pictures": [("the motion before and after", b64encode(picture(found, "svg")).decode())],
+    }
+    origins = [(str(file), sha256(file.read_bytes()).hexdigest() if file.is_file() else "") for file in used]
+    content = {
+        "title": "Residual vibration", "heading": "Vibration", "solved": False, "charts": "{}", "studies": [part],
+        "origins": Table(("file", "SHA-256"), origins),
+        "scenes": [(used[0].name, used[0].read_text(encoding="utf-8"))],
+    }  # fmt: skip
+    write_atomically(path, page_of(content).encode(), "report")
+
+
+def _tables(found: Smoothed) -> list[Table]:
+    """Of joints, and of motions where there are new ones."""
+    joints = Table(COLUMNS, list(_rows(found.before)))
+    return [joints, *([Table(MOTIONS, list(_motions(found)))] if found.candidates else [])]
+
+
+def _lines(found: Smoothed) -> list[tuple[str, str]]:
     before, servo = found.before, found.robot.servo
     bandwidth = " ".join(dict.fromkeys(f"{omega / (2 * np.pi):.3g}" for omega in servo.omega))
-    lines = [
+    return [
         ("motion", f"{len(before.recording.times)} set points of {len(before.recording.joints)} joints over"
          f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
         ("servo", f"{bandwidth} Hz, damping ratio {servo.ratio:.3g}"),
         *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),
         *(("note", remark) for remark in before.recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
-        ("settling", settling_in_words(before)),
+        ("settling", _settling_in_words(before)),
     ]  # fmt: skip
-    for name, text in lines:
-        console.print(f"{name:<10} {text}", soft_wrap=True, markup=False)
-    print_table(console, COLUMNS, _rows(before))
-    console.print(f"verdict    {found.verdict}", soft_wrap=True, markup=False)
-    if found.candidates:
-        console.print()
-        print_table(console, MOTIONS, _motions(found))
 
 
-def settling_in_words(of: Diagnosis) -> str:
+def _settling_in_words(of: Diagnosis) -> str:
     """How far the point swings, and when it stays within the tolerance."""
     settling = of.ride.settling
     if settling is None:

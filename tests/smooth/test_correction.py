@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from test_diagnosis import LAWS, RATIO, SERVO, TIMES, WAY, arm, axis, motion, table
+from beam_links import beam_link, rectangle
+from test_diagnosis import LAWS, RATIO, SERVO, TIMES, WAY, T, arm, axis, motion, table, written
 
 from ffrobot import InputError, smooth_motion
 from ffrobot.mbs.fields.paths import averaged_step
@@ -64,3 +65,31 @@ def test_what_is_written_is_a_stream_without_faults(tmp_path, found, name):
 def test_other_endings_are_rejected(tmp_path, found):
     with pytest.raises(InputError, match=r'expected a name that ends in .*found "new\.txt"'):
         found.write(tmp_path / "new.txt")
+
+
+def test_a_flexible_link_vibrates_by_the_closed_form_and_inversion_says_that_it_leaves_that(tmp_path):
+    """The first mode of a cantilever, see tests/cases/test_settling.py; gears alone are inverted, links are not."""
+    length, way, beta = 0.6, 0.1, 1.8751040687
+    link = beam_link(length, rectangle(0.004, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"})
+    joint = {"name": "hub", "type": "revolute", "between": ["ground", "b.root"], "motor": True}
+    tables = {"name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "b", "link": link}], "joint": [joint]}
+    times = np.arange(501) * 0.001
+    path = table(tmp_path / "path.csv", times, hub=way * LAWS["trapezoid"].sample(times)[:, 0])
+    found = smooth_motion(written(tmp_path, tables), path, bandwidth=SERVO, damping_ratio=RATIO)
+    omega, servo = (beta / length) ** 2 * np.sqrt(70e9 / 2700 / 12) * 0.004, 2 * np.pi * SERVO
+    step = way * np.prod(np.abs(np.sinc(omega * T * np.array([0.75, 0.25]) / (2 * np.pi))))
+    gain = abs(servo**2 / (servo**2 - omega**2 + 2j * RATIO * servo * omega))
+    assert found.before.residual == pytest.approx(2 * 4 * length / beta**2 * step * gain, rel=5e-4)
+    shaped = next(one for one in found.candidates if one.name.startswith("shaped"))
+    assert shaped.residual < 0.01 * found.before.residual
+    assert not any(one.name.startswith("inverted") for one in found.candidates)
+
+    joint |= {"stiffness": 100.0, "gear_ratio": 100.0, "rotor_inertia": 1e-4}
+    found = smooth_motion(written(tmp_path, tables), path, bandwidth=SERVO, damping_ratio=RATIO)
+    inverted = next(one for one in found.candidates if one.name.startswith("inverted"))
+    again = smooth_motion(found.robot.file, table(tmp_path / "new.csv", inverted.times, hub=inverted.command[:, 0]))
+    assert again.before.residual == pytest.approx(inverted.residual, rel=1e-3)
+    assert inverted.residual > 1e-3
+    assert inverted.settled == np.inf
+    assert found.best is not inverted
+    assert found.best.residual < 0.1 * found.before.residual

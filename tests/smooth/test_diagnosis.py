@@ -178,6 +178,12 @@ def test_joints_go_by_name_in_any_order_and_file(tmp_path, ffrobot):
     assert "jump of acceleration: knee: acceleration jumps by" in printed
     assert "vibration of the robot: b.tip swings by" in printed
     assert (tmp_path / "scene.smooth.png").exists()
+    page = (tmp_path / "scene.smooth.report.html").read_text(encoding="utf-8")
+    assert f"<b>{found.verdict}</b>" in page
+    for text in (*(fault.text for fault in found.before.faults), *(one.name for one in found.candidates)):
+        assert text in page
+    assert '<img src="data:image/svg+xml;base64,' in page
+    assert len(page) < 1e6  # without Plotly
 
 
 TWO = "0,0,0\n0.1,0.1,0.1\n0.2,0.2,0.2\n0.3,0.3,0.3\n"

@@ -211,6 +211,11 @@ def write_report(paths: Sequence[Path], path: Path) -> None:
 
 def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ()) -> str:
     """The page as text."""
+    return page_of(_content(files, studies))
+
+
+def page_of(content: Mapping[str, Any]) -> str:
+    """The template with its content; with Plotly where there are charts."""
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
         from plotly.offline import get_plotlyjs, get_plotlyjs_version
@@ -222,7 +227,7 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
     own = {name.replace(".", "_"): (HERE / name).read_text(encoding="utf-8") for name in OWN}
     versions = {"plotly_version": get_plotlyjs_version(), "ffrobot_version": VERSION}
     page = environment.get_template("page.html")
-    return page.render(_content(files, studies), plotly_js=get_plotlyjs(), **own, **versions)
+    return page.render(content, plotly_js=get_plotlyjs(), **own, **versions)
 
 
 def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> dict[str, Any]:
@@ -230,6 +235,7 @@ def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) ->
     names = [*(results.name for results in files), *(study.scene_name for _, study in studies)]
     return {
         "title": ", ".join(dict.fromkeys(names)),
+        "heading": "Design",
         "solved": bool(files),
         "studies": [_study_part(study) for _, study in studies],
         "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
