@@ -77,11 +77,9 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     if several := [joint.name for joint in joints if len(joint.units) != 1]:
         raise InputError(f"{scene.path}: expected joints of one coordinate each, found {quoted(several)}")
     columns = _columns(path, record, names)
-    values = record.values[:, columns]
-    turning = np.array([joint.units[0] == "rad" for joint in joints])
-    if is_in_degrees:
-        values = np.where(turning, values / TURN, values)
-    else:
+    scale = np.array([1 / TURN if is_in_degrees and joint.units[0] == "rad" else 1.0 for joint in joints])
+    values = record.values[:, columns] * scale
+    if not is_in_degrees:
         _check_unit(path, joints, values)
     others = [name for k, name in enumerate(record.columns) if k not in columns]
     left = (f"columns left out: {quoted(others)}",) if others else ()
@@ -92,7 +90,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
         raise InputError(f"{path}: expected at least 4 set points with times that increase, found {len(times)}")
     if np.ptp(values, axis=0).max() <= STILL:
         raise InputError(f"{path}: expected joints that move, found none")
-    rates = None if record.rates is None else record.rates[good][:, columns] / (TURN if is_in_degrees else 1.0)
+    rates = None if record.rates is None else record.rates[good][:, columns] * scale
     found = Recording(tuple(names), times - times[0], values, record.times - times[0], rates, (*record.remarks, *left))
     return without_rest(found)
 

@@ -10,6 +10,8 @@ from tables_3d import DOWN, ORIGIN, Y, revolute, rigid, scene
 
 from ffrobot import InputError, smooth_motion
 from ffrobot.mbs.fields.paths import averaged_step, law_in
+from ffrobot.scene.load import load_robot
+from ffrobot.smooth.recording import read_recording
 from ffrobot.smooth.servo import Servo
 
 J, OMEGA, WAY, T, SERVO, RATIO = 5.0, 2 * np.pi * 7.3, 0.6, 0.5, 20.0, 0.8
@@ -207,3 +209,17 @@ def test_wrong_input(tmp_path, text, keys, expected):
     with pytest.raises(InputError) as error:
         smooth_motion(arm(tmp_path), tmp_path / "path.csv", **keys)
     assert expected in str(error.value)
+
+
+def test_degrees_are_those_of_turning_joints_and_their_rates_alone(tmp_path):
+    slide = {"name": "slide", "type": "prismatic", "between": ["a.tip", "b.root"], "axis": Y}
+    bodies = [rigid(name, 1.0, [0.1] * 3, ORIGIN, tip=ORIGIN) for name in ("a", "b")]
+    file = written(tmp_path, scene(bodies, [revolute("hip", "ground", "a.root", Y), slide]))
+    points = [
+        {"positions": [90.0 * t, 0.2 * t], "velocities": [90.0, 0.2], "time_from_start": {"sec": t, "nanosec": 0}}
+        for t in range(5)
+    ]
+    (tmp_path / "path.yaml").write_text(json.dumps({"joint_names": ["hip", "slide"], "points": points}))
+    found = read_recording(tmp_path / "path.yaml", load_robot(file), is_in_degrees=True)
+    np.testing.assert_allclose(found.values[-1], [2 * np.pi, 0.8])
+    np.testing.assert_allclose(found.rates, [[np.pi / 2, 0.2]] * 5)
