@@ -20,7 +20,7 @@ from ..mbs.fields.paths import Kind, impulses, polynomial_law
 from ..mbs.fields.waypoints import interpolated
 from .diagnosis import Diagnosis, modes_along
 from .recording import Limits, evened, peaks
-from .robot import Modes, Ride, Robot
+from .robot import Ride, Robot, accelerations
 
 SMOOTHNESS = 5  # of the law that averages: inversion differentiates four times
 LEAST = 8  # set points over which are averaged at least
@@ -30,7 +30,6 @@ TRIALS = 5  # durations of inverted motions
 SHARE = 0.5  # of the tolerance that the linear models may leave
 WRONG = 0.1  # of the stiffness of gears, by which it may be off: so much of the vibration without inversion is left
 SHAPERS: tuple[Kind, ...] = ("zv", "zvd", "ei")
-FINE = 2000  # instants of motors' accelerations
 
 T = TypeVar("T")
 
@@ -74,7 +73,7 @@ def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float) -> 
     That is the one which settles first of those that keep the limits; where none settles, that which vibrates least.
     """
     search = _Search(robot, before, limits, step)
-    found = [search.simulated(name, values, smooth, moments) for name, values, smooth, moments in search.motions()]
+    found = [search.simulated(*motion) for motion in search.motions()]
     return sorted(found, key=lambda one: (one.excess > 1.0, one.settled, one.residual))
 
 
@@ -85,35 +84,36 @@ Motion = tuple[str, Array, Array, Array | None]
 class _Search:
     def __init__(self, robot: Robot, before: Diagnosis, limits: Limits, step: float) -> None:
         self.robot, self.limits, self.step, self.tolerance = robot, limits, step, robot.tolerance
-        self.path, self.modes = evened(before.recording), modes_along(robot, before.ride)
+        self.modes, (self.times, self.values) = (
+            modes_along(robot, before.ride),
+            evened(before.recording).dense(step / 2),
+        )
         self.periods = [1 / f for f in before.frequencies.mean(axis=0)]
 
     def motions(self) -> Iterator[Motion]:
         """The shortest of each kind that the linear models find good enough."""
-        fast = self._along(max(1.0, self._excess(self._along(1.0), only_speed=True)))
+        fast = self._along(max(1.0, self._excess(self._along(1.0), orders=1)))
         durations = self.step * LEAST * LONGER ** np.arange(MOST)
         averaged = [(float(span), self._averaged(fast, span)) for span in durations]
         kept = [(span, values) for span, values in averaged if self._excess(values) <= 1.0] or averaged[-1:]
-        shortest = kept[0][1]
         span, values = self._first(kept)
         yield f"averaged over {1e3 * span:.3g} ms", values, values, None
         factors = LONGER ** (np.arange(MOST) / 2)
         factor, values = self._first([(float(c), self._averaged(self._along(c), kept[0][0])) for c in factors])
         yield f"slower by {100 * (factor - 1):.3g} %", values, values, None
-        if self.periods:
-            name, values = self._first(sorted(self._shaped(shortest), key=lambda one: len(one[1])))
-            yield f"shaped by {name}", values, values, None
+        name, values = self._first(sorted(self._shaped(kept[0][1]), key=lambda one: len(one[1])))
+        yield f"shaped by {name}", values, values, None
         if self.robot.has_gears:
             yield self._inverted(kept)
 
     def _inverted(self, averaged: Sequence[tuple[float, Array]]) -> Motion:
         """Of the shortest that would leave little with a wrong stiffness; of a longer one while limits are exceeded."""
         least, _ = self._first(averaged, 1 / WRONG)
-        longer = [motion for motion in averaged if motion[0] >= least]
-        tried = [self._inverse(*longer[0])]
-        while self._excess(tried[-1][1]) > 1.0 and len(tried) < min(TRIALS, len(longer)):
-            tried.append(self._inverse(*longer[len(tried)]))
-        return tried[-1]
+        for motion in [motion for motion in averaged if motion[0] >= least][:TRIALS]:
+            inverse = self._inverse(*motion)
+            if self._excess(inverse[1]) <= 1.0:
+                break
+        return inverse
 
     def _inverse(self, span: float, values: Array) -> Motion:
         """Links sag at its ends as they do under its own set points, with which it begins and ends."""
@@ -132,20 +132,14 @@ class _Search:
         from scipy.spatial import cKDTree
 
         times = self.step * np.arange(len(values))
-        fine = np.linspace(0.0, self.path.times[-1], 4 * len(self.path.times))
-        path = np.column_stack([np.interp(fine, *self._known(k)) for k in range(smooth.shape[1])])
-        off = float(cKDTree(path).query(smooth)[0].max())
+        fine = np.linspace(0.0, self.times[-1], 4 * len(self.times))
+        off = float(cKDTree(_between(fine, self.times, self.values)).query(smooth)[0].max())
         return Candidate(name, times, values, moments, self.robot.ride(times, values), off, self._excess(values))
-
-    def _known(self, k: int) -> tuple[Array, Array]:
-        times, values = self.path.dense(self.step / 2)
-        return times, values[:, k]
 
     def _along(self, factor: float) -> Array:
         """Set points of the record, in `factor` times the time."""
-        count = int(np.ceil(factor * self.path.times[-1] / self.step - 1e-9)) + 1
-        at = np.minimum(self.step * np.arange(count) / factor, self.path.times[-1])
-        return np.column_stack([np.interp(at, *self._known(k)) for k in range(self.path.values.shape[1])])
+        count = int(np.ceil(factor * self.times[-1] / self.step - 1e-9)) + 1
+        return _between(self.step * np.arange(count) / factor, self.times, self.values)
 
     def _averaged(self, values: Array, duration: float) -> Array:
         n = int(np.ceil(duration / self.step - 1e-9))
@@ -161,17 +155,10 @@ class _Search:
             for period in self.periods[:count]:
                 sequence = impulses(kind, 1 / period, min(ratio, 0.9))
                 last = int(np.ceil(sequence[-1].delay / self.step))
-                at = np.arange(len(shaped) + last, dtype=float)
-                shaped = sum(
-                    (one.share * self._delayed(shaped, at - one.delay / self.step) for one in sequence),
-                    np.zeros((len(at), values.shape[1])),
-                )
+                rows = np.arange(len(shaped) + last, dtype=float)
+                before = [_between(rows - one.delay / self.step, rows[: len(shaped)], shaped) for one in sequence]
+                shaped = np.tensordot([one.share for one in sequence], before, 1)
             yield f"{kind} for {', '.join(f'{1 / period:.3g} Hz' for period in self.periods[:count])}", shaped
-
-    @staticmethod
-    def _delayed(values: Array, at: Array) -> Array:
-        rows = np.arange(len(values))
-        return np.column_stack([np.interp(at, rows, column) for column in values.T])
 
     def _first(self, motions: Sequence[tuple[T, Array]], times: float = 1.0) -> tuple[T, Array]:
         """The first that the linear models find good enough, `times` the tolerance; else the best of all."""
@@ -185,14 +172,15 @@ class _Search:
     def _left(self, values: Array) -> float:
         """Residual vibration (m, peak to peak) by the linear models of all postures, the worst of them."""
         path = self.robot.servo.motors(self.step * np.arange(len(values)), values)
-        fine = np.linspace(0.0, path.end, FINE)
-        accelerations = path.sample(fine, 2)
-        return max((_residual(one, fine, accelerations, path.end) for one in self.modes), default=0.0)
+        driving = accelerations(path)
+        return max(float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in self.modes)
 
-    def _excess(self, values: Array, *, only_speed: bool = False) -> float:
-        found = peaks(self.step * np.arange(len(values)), values) / self.limits.by_order
-        return float(found[:1].max() if only_speed else found.max())
+    def _excess(self, values: Array, orders: int = 3) -> float:
+        """The largest part of a limit that the first so many derivatives take."""
+        shares = peaks(self.step * np.arange(len(values)), values) / self.limits.by_order
+        return float(shares[:orders].max())
 
 
-def _residual(modes: Modes, times: Array, accelerations: Array, until: float) -> float:
-    return float(2 * np.abs(modes.left(times, accelerations, until).sum(axis=1)).sum())
+def _between(at: Array, times: Array, values: Array) -> Array:
+    """(len(at), n) on the lines through values (T, n) at `times` (T,)."""
+    return np.column_stack([np.interp(at, times, column) for column in values.T])

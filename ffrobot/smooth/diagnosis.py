@@ -10,14 +10,13 @@ from ..common.arrays import Array, as_floats
 from ..common.structs import struct
 from ..mbs.fields.paths import Piecewise
 from .recording import Fault, Limits, Recording, evened, faults_of_motion, faults_of_stamps, peaks
-from .robot import Modes, Ride, Robot
+from .robot import Modes, Ride, Robot, accelerations
 
 INSTANTS = 9  # postures along the motion whose frequencies are found
 KEPT = 3  # frequencies
 POINTS = 10  # set points in a period of the lowest frequency: fewer are coarse
 NEAR, PEAK = 0.1, 3.0  # of a frequency, and times the usual of the spectrum about it: the command oscillates there
 ABOUT, GRID = (0.3, 3.0), 400  # times the lowest frequency: the spectrum that is usual, and in how many points
-FINE = 4000  # instants of motors' accelerations
 CAUSES = ("jitter", "jump", "noise", "gap", "coarse", "resonance")
 """Kinds of faults by which a stream excites vibrations, by their beginnings."""
 
@@ -51,24 +50,19 @@ class Diagnosis:
         settling = self.ride.settling
         return 0.0 if settling is None or not self.frequencies.size else settling.residual
 
-    def is_vibration(self, tolerance: float) -> bool:
-        """Whether it exceeds the tolerance, m."""
-        return self.residual > tolerance
-
     def verdict(self, robot: Robot) -> str:
         """In words what it is, and what causes it."""
-        causes = list(dict.fromkeys(fault.kind for fault in self.faults if fault.kind.startswith(CAUSES)))
-        others = list(dict.fromkeys(fault.kind for fault in self.faults))
+        kinds = list(dict.fromkeys(fault.kind for fault in self.faults))
+        causes = [kind for kind in kinds if kind.startswith(CAUSES)]
         settling = self.ride.settling
         if not self.frequencies.size:
             return "nothing vibrates in the model: its links and gears are rigid. Gears with stiffness do"
         if settling is None:
             return "the robot has no place of rest at the end of the motion: joints without motors are free"
-        if not self.is_vibration(robot.tolerance):
+        if self.residual <= robot.tolerance:
             what = f"{robot.point} vibrates by {1e3 * self.residual:.2g} mm at most"
-            if others:
-                return f"not vibration of the robot: {what}. Faults of the stream: {', '.join(others)}"
-            return f"not vibration of the robot: {what}, and the stream has no fault"
+            stream = f". Faults of the stream: {', '.join(kinds)}" if kinds else ", and the stream has no fault"
+            return f"not vibration of the robot: {what}{stream}"
         worst = int(self.alone.argmax())
         share = self.alone[worst] / self.alone.sum()
         frequency = self.frequencies[-1, int(self.by_mode.argmax())]
@@ -86,8 +80,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     path, modes = robot.servo.motors(times, command), modes_along(robot, ride)
     kept = min(KEPT, *(len(one.omega) for one in modes))
     frequencies = np.array([one.omega[:kept] for one in modes]) / (2 * np.pi)
-    fine = np.linspace(0.0, path.end, FINE)
-    left = modes[-1].left(fine, path.sample(fine, 2), path.end)
+    left = modes[-1].left(*accelerations(path))
     grid = np.linspace(0.0, ABOUT[1] * (frequencies[:, 0].max() if kept else 10.0), GRID)
     spectrum = _spectrum(path, grid)
     faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits)]
@@ -109,9 +102,9 @@ def modes_along(robot: Robot, ride: Ride) -> list[Modes]:
 
 def _spectrum(path: Piecewise, frequencies: Array) -> Array:
     """(F, n) |∫ θ̈ e^(−iωt) dt| of motors, rad/s."""
-    fine = np.linspace(0.0, path.end, FINE)
+    fine, of_motors = accelerations(path)
     kernel = np.exp(-2j * np.pi * np.outer(frequencies, fine))
-    return as_floats(np.abs(kernel @ path.sample(fine, 2)) * (fine[1] - fine[0]))
+    return as_floats(np.abs(kernel @ of_motors) * (fine[1] - fine[0]))
 
 
 def _coarse(recording: Recording, frequencies: Array) -> Iterator[Fault]:

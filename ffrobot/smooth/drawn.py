@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..mbs.fields.waypoints import difference_quotients
 from ..pictures.figures.plot import image_of
 from ..pictures.figures.style import SIZE, literal, style
 from .diagnosis import Diagnosis
@@ -29,12 +30,9 @@ def picture(found: Smoothed, extension: str) -> bytes:
 
 def _accelerations(axes: Axes, of: Diagnosis) -> None:
     """Second differences of set points."""
-    times, values = of.recording.dense(of.recording.step)
-    rates = np.diff(values, axis=0) / np.diff(times)[:, None]
-    middles = (times[1:] + times[:-1]) / 2
-    bends = np.diff(rates, axis=0) / np.diff(middles)[:, None]
-    for joint, column in zip(of.recording.joints, bends.T, strict=True):
-        axes.plot(times[1:-1], column, label=joint)
+    times, values = difference_quotients(*difference_quotients(*of.recording.dense(of.recording.step)))
+    for joint, column in zip(of.recording.joints, values.T, strict=True):
+        axes.plot(times, column, label=joint)
     axes.set_title("acceleration of set points (rad/s²)")
     axes.set_xlabel("t (s)")
     axes.legend(fontsize=7)

@@ -13,6 +13,7 @@ from rich.console import Console
 from ..common.files import write_atomically
 from ..pictures.report.page import Table, page_of
 from ..present.lines import print_table
+from ..results.verdict import Settled
 from .diagnosis import Diagnosis
 from .drawn import picture
 from .smoothing import Smoothed
@@ -71,21 +72,14 @@ def _lines(found: Smoothed) -> list[tuple[str, str]]:
         *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),
         *(("note", remark) for remark in before.recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
-        ("settling", _settling_in_words(before)),
+        ("settling", _settling(found)),
     ]  # fmt: skip
 
 
-def _settling_in_words(of: Diagnosis) -> str:
-    """How far the point swings, and when it stays within the tolerance."""
-    settling = of.ride.settling
-    if settling is None:
+def _settling(found: Smoothed) -> str:
+    if (of := found.before.ride.settling) is None:
         return "no place of rest"
-    limit, whole = 1e3 * settling.tolerance, of.ride.times[-1] - settling.path_end
-    until = f"never within {whole:.2g} s" if np.isnan(settling.time_to) else f"{settling.time_to:.3g} s"
-    return (
-        f"within {limit:.3g} mm: {until} after the last set point; residual vibration {1e3 * of.residual:.3g} mm peak"
-        " to peak"
-    )
+    return Settled(found.robot.point, found.before.residual, of.frequency, of.time_to, of.tolerance).in_words
 
 
 def _motions(found: Smoothed) -> Iterator[tuple[str, ...]]:

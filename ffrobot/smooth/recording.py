@@ -13,7 +13,7 @@ from ..common.errors import InputError, did_you_mean, quoted
 from ..common.structs import struct
 from ..exchange.motion.read_motion import read_record
 from ..mbs.analysis.pcid import Pcid
-from ..mbs.fields.waypoints import Record, column_of, load_record
+from ..mbs.fields.waypoints import Record, column_of, difference_quotients, load_record
 from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.motion import joint_motion
 from ..mbs.scene.analysis import TimedAnalysis
@@ -83,8 +83,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
         _check_unit(path, joints, values)
     others = [name for k, name in enumerate(record.columns) if k not in columns]
     left = (f"columns left out: {quoted(others)}",) if others else ()
-    ahead = np.append(-np.inf, np.maximum.accumulate(record.times)[:-1])
-    good = record.times > ahead
+    good = record.times > np.append(-np.inf, np.maximum.accumulate(record.times)[:-1])
     times, values = record.times[good], values[good]
     if len(times) < 4:
         raise InputError(f"{path}: expected at least 4 set points with times that increase, found {len(times)}")
@@ -124,14 +123,12 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
 def _columns(path: Path, record: Record, names: Sequence[str]) -> list[int]:
     """Which column each joint has."""
     try:
-        found = {name: column_of(record.columns, name) for name in names}
+        found = [column_of(record.columns, name) for name in names]
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
-    columns = [k for k in found.values() if k is not None]
-    missing = [name for name, k in found.items() if k is None]
-    if not missing and len(set(columns)) < len(columns):  # one column is no joint's
-        missing = list(names)
-    if missing:
+    columns = list(dict.fromkeys(k for k in found if k is not None))
+    if len(columns) < len(names):
+        missing = [name for name, k in zip(names, found, strict=True) if k is None] or names  # one column is no joint's
         raise InputError(
             f"{path}: expected a column of every joint with a motor (constant where it rests), found none of"
             f" {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}"
@@ -188,10 +185,8 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
 def is_even(recording: Recording) -> bool:
     """Whether rows make a smoother motion at even times than at those of their stamps."""
     even = np.arange(len(recording.times)) * recording.step
-    by_even, by_stamps = (
-        np.mean(np.diff(np.diff(recording.values, axis=0) / np.diff(times)[:, None], axis=0) ** 2)
-        for times in (even, recording.times)
-    )
+    rates = (difference_quotients(times, recording.values)[1] for times in (even, recording.times))
+    by_even, by_stamps = (np.mean(np.diff(of, axis=0) ** 2) for of in rates)
     return bool(by_even < EVEN**2 * by_stamps)
 
 
@@ -236,16 +231,12 @@ def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
 def peaks(times: Array, values: Array) -> Array:
     """(3, n) largest speed, acceleration and jerk of a motion (T, n) that rests before and after, by differences."""
     found, usual = [], float(np.median(np.diff(times)))
-    at, values = np.concatenate([[times[0] - usual], times, [times[-1] + usual]]), _at_rest(values)
+    times = np.concatenate([[times[0] - usual], times, [times[-1] + usual]])
+    values = np.vstack([values[:1], values, values[-1:]])
     for _ in range(3):
-        values = np.diff(values, axis=0) / np.diff(at)[:, None]
-        at = (at[1:] + at[:-1]) / 2
+        times, values = difference_quotients(times, values)
         found.append(np.abs(values).max(axis=0))
     return np.array(found)
-
-
-def _at_rest(values: Array) -> Array:
-    return np.vstack([values[:1], values, values[-1:]])
 
 
 def _jumps(name: str, times: Array, values: Array) -> Iterator[Fault]:
@@ -263,18 +254,17 @@ def _jumps(name: str, times: Array, values: Array) -> Iterator[Fault]:
     bridged = late[1:] | late[:-1]
     abrupt = _stands_out(bends, NOTABLE * np.abs(rates).max(), bridged)
     if abrupt.any():
-        k = int(np.where(abrupt, np.abs(bends), 0.0).argmax())
-        beside = bends[max(k - 1, 0) : k + 2].sum() - bends[k]
-        kind, size = ("speed", f"{abs(bends[k]):.3g} per s")
-        if abs(bends[k] + beside) < BACK * abs(bends[k]):  # there and back again
-            kind, size = "position", f"{usual * abs(bends[k]):.3g}"
+        k = int(abrupt.argmax())
+        kind, size = "speed", f"{abrupt[k]:.3g} per s"
+        if abs(bends[max(k - 1, 0) : k + 2].sum()) < BACK * abrupt[k]:  # there and back again
+            kind, size = "position", f"{usual * abrupt[k]:.3g}"
         yield Fault(f"jump of {kind}", f"{name}: {kind} jumps by {size} at t = {times[k]:.4g} s")
         return
     thirds = np.diff(bends)
     abrupt = _stands_out(thirds, ABOVE * np.abs(bends).max(), bridged[1:] | bridged[:-1])
     if abrupt.any():
-        k = int(np.where(abrupt, np.abs(thirds), 0.0).argmax())
-        others = int(np.count_nonzero(abrupt & ~np.append(False, abrupt[:-1]))) - 1
+        k = int(abrupt.argmax())
+        others = int(np.count_nonzero(np.diff(abrupt > 0.0, prepend=False) & (abrupt > 0.0))) - 1
         more = f", and {others} times more" if others else ""
         size = f"{abs(thirds[max(k - 1, 0) : k + 2].sum()) / usual:.3g} per s²"  # between two rows it is in two of them
         yield Fault("jump of acceleration", f"{name}: acceleration jumps by {size} at t = {times[k]:.4g} s{more}")
@@ -288,9 +278,9 @@ def _is_noise(bends: Array) -> bool:
     return bool(pairs.sum() > max(len(bends) / 4, MANY) and (turns & pairs).sum() > TURNS * pairs.sum())
 
 
-def _stands_out(sizes: Array, least: float, bridged: Booleans) -> Booleans:
-    """Which are larger than `ABRUPT` times all near them, but for those next to them, and no lines over gaps."""
+def _stands_out(sizes: Array, least: float, bridged: Booleans) -> Array:
+    """Sizes above `ABRUPT` times all near them, but for those next to them, and not of lines over gaps; else 0."""
     sizes = np.where(bridged, 0.0, np.abs(sizes))
     near = np.lib.stride_tricks.sliding_window_view(np.pad(sizes, BESIDE), 2 * BESIDE + 1).copy()
     near[:, BESIDE - 1 : BESIDE + 2] = 0.0
-    return np.asarray(sizes > np.maximum(ABRUPT * near.max(axis=1), least))
+    return np.where(sizes > np.maximum(ABRUPT * near.max(axis=1), least), sizes, 0.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -16,13 +15,10 @@ from ..mbs.fields.paths import Piecewise
 from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, free_coordinates
 from ..mbs.linear.linearisation import LinearEquations
 from ..mbs.model.gears import with_compliance
-from ..mbs.model.known_motion import State
 from ..mbs.model.model import without_paths
-from ..mbs.posture.start import relaxed_gears, undeformed_posture
-from ..mbs.quantities.motion import point_motion, section_motion
+from ..mbs.quantities.motion import section_motion
 from ..mbs.quantities.settling import Settling, commanded_rest, settling
 from ..mbs.quantities.supply import gear_motions, motor_moments
-from ..mbs.run.record import GearMotion
 from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
 from ..run.prepare import with_scene
@@ -39,6 +35,14 @@ LAST, LONGEST = 20.0, 2.0  # periods of the lowest vibration after the motion, a
 ROUNDING = 1e-9  # of the number of outputs
 SLACK = 1e-9  # of the largest stiffness: less is none
 UNKNOWN = 5.0  # Hz, where nothing vibrates
+FIRST = 1e-3  # s, of a run that finds the posture at the start
+FINE = 4000  # instants of motors' accelerations
+
+
+def accelerations(path: Piecewise) -> tuple[Array, Array]:
+    """Times (T,), s, to the end of motors' paths, and their accelerations (T, n)."""
+    fine = np.linspace(0.0, path.end, FINE)
+    return fine, path.sample(fine, 2)
 
 
 @struct
@@ -47,21 +51,19 @@ class Modes:
 
     Attributes:
         omega, ratio: (m,) rad/s, and damping ratios.
-        at_point: (m,) m, that the point moves by a unit of each.
-        driven: (m, n) what a unit of acceleration of each motor drives.
+        driven: (m, n) at the point, what a unit of acceleration of each motor drives.
     """
 
     omega: Array
     ratio: Array
-    at_point: Array
     driven: Array
 
-    def left(self, times: Array, accelerations: Array, until: float) -> ComplexArray:
-        """(m, n) amplitudes (m) at the point when `until` (s), by `accelerations` (T, n) of each motor."""
+    def left(self, times: Array, accelerations: Array) -> ComplexArray:
+        """(m, n) amplitudes (m) at the point at the last of the times (T,), s, by `accelerations` (T, n) of motors."""
         poles = self.omega * (-self.ratio + 1j * np.sqrt(1.0 - self.ratio**2))
         widths = (np.append(0.0, np.diff(times)) + np.append(np.diff(times), 0.0)) / 2
-        integral = (np.exp(np.outer(poles, until - times)) * widths) @ accelerations
-        return np.asarray((self.at_point / poles.imag)[:, None] * self.driven * integral)
+        integral = (np.exp(np.outer(poles, times[-1] - times)) * widths) @ accelerations
+        return np.asarray(self.driven / poles.imag[:, None] * integral)
 
 
 @struct
@@ -72,16 +74,12 @@ class Ride:
         settling: of the point, by its distance from its final place since the last set point; its residual is that of
             the first period of the lowest vibration once the controllers have settled. None without a place of rest.
         times, off: (T,) s, and m between the point and its final place.
-        place: (T, d) m, of the point.
-        moments: the largest torque of each motor by joint, N·m.
         q: (T, n_q) states.
     """
 
     settling: Settling | None
     times: Array
     off: Array
-    place: Array
-    moments: Mapping[str, float]
     q: Array
 
 
@@ -97,13 +95,8 @@ class Robot:
         self.point = point or default_point(scene)
         check_point(self._prepared, self.point)
         self._gears = with_compliance(without_paths(self._prepared.model))
-        self._still, self._axes = np.zeros(self._gears.tree.n_v), SPACES[scene.space].translations
+        self.has_gears, self._still = bool(self._gears.tree.gears), np.zeros(self._gears.tree.n_v)
         self._frequency: float | None = None
-
-    @property
-    def has_gears(self) -> bool:
-        """Whether a gear is compliant."""
-        return bool(self._gears.tree.gears)
 
     def modes(self, q: Array) -> Modes:
         """At the posture q (n_q,) of a run; of motions in which nothing vibrates none."""
@@ -116,9 +109,9 @@ class Robot:
         follow = np.linalg.pinv(np.array(held))
         slack = shape @ ((shape.T @ free.N.T @ mechanism.K @ follow) / squares[stiff, None])
         driven = -shape.T @ free.N.T @ mechanism.M @ (follow - free.N @ slack)
-        J = mechanism.points[self.point][: len(self._axes)] @ free.N @ shape
+        J = mechanism.points[self.point][: len(SPACES[self._scene.space].translations)] @ free.N @ shape
         ratio = np.einsum("in,ij,jn->n", shape, free.D, shape) / (2 * omega)
-        return Modes(omega, ratio, np.linalg.norm(J, axis=0), driven)
+        return Modes(omega, ratio, np.linalg.norm(J, axis=0)[:, None] * driven)
 
     def ride(self, times: Array, command: Array) -> Ride:
         """Under set points (T, n) at `times` (T,), s, from rest; joints without a motor move as they can.
@@ -130,17 +123,16 @@ class Robot:
         until = path.end + period
         found = self._solved(path, "motor", until + min(LAST * period, LONGEST), period / PER_PERIOD)
         run, rest = found.run, commanded_rest(found.run)
-        place = point_motion(run, self.point).position
-        moments = {joint: float(np.abs(of).max()) for joint, of in motor_moments(run).items()}
         if rest is None:
-            return Ride(None, run.time, np.full(len(place), np.nan), place, moments, run.q)
+            return Ride(None, run.time, np.full(len(run.time), np.nan), run.q)
         rest = rest._replace(since=last)
-        (whole,) = settling(run, rest, [self.point], self.tolerance, rest.frequency).values()
-        soon = run.at(np.flatnonzero(run.time <= until).tolist())
-        (after,) = settling(soon, rest, [self.point], self.tolerance, rest.frequency).values()
+        whole, soon = (
+            settling(one, rest, [self.point], self.tolerance, rest.frequency)[self.point]
+            for one in (run, run.at(np.flatnonzero(run.time <= until).tolist()))
+        )
         final = section_motion(replace(run, model=rest.model, q=rest.q[None], v=0 * run.v[:1]), self.point).r[0]
-        off = np.linalg.norm(place - final, axis=1)
-        return Ride(replace(whole, residual=after.residual), run.time, off, place, moments, run.q)
+        off = np.linalg.norm(section_motion(run, self.point).r - final, axis=1)
+        return Ride(replace(whole, residual=soon.residual), run.time, off, run.q)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
         """Set points (T, n) at even `times` from 0 that make links follow `motion`, and the torques (T, n) of motors.
@@ -149,12 +141,9 @@ class Robot:
         """
         found = self._solved(motion, "joint", float(times[-1]), float(times[1]))
         own = np.array([motion.sample(times, order) for order in range(3)])
-        moments = np.zeros(own.shape[1:])
-        for k, joint in enumerate(self.joints):
-            gear: GearMotion | None = gear_motions(found.run).get(joint)
-            if gear is not None:
-                own[:, :, k] = gear.angle, gear.rate, gear.acceleration
-            moments[:, k] = motor_moments(found.run)[joint].reshape(len(times))
+        for joint, gear in gear_motions(found.run).items():
+            own[:, :, self.joints.index(joint)] = gear.angle, gear.rate, gear.acceleration
+        moments = np.column_stack([motor_moments(found.run)[joint] for joint in self.joints])
         command = self.servo.command(own)
         command[[0, -1]] = own[0, [0, -1]]  # at rest, whatever derivatives jump there
         return command, moments
@@ -162,9 +151,7 @@ class Robot:
     def _lowest(self, path: Piecewise) -> float:
         """Hz, of the posture in which the robot starts."""
         if self._frequency is None:
-            start = undeformed_posture(with_scene(self._prepared, self._following(path, "motor")).model)
-            more = np.zeros(self._gears.tree.n_q - len(start.q))
-            q = relaxed_gears(self._gears, State(np.append(start.q, more), self._still)).q
+            q = self._solved(path, "motor", FIRST, FIRST).run.q[0]
             self._linear = LinearEquations(self._gears, q, {self.point: self.point})
             omega = self.modes(q).omega
             self._frequency = float(omega[0]) / (2 * np.pi) if len(omega) else UNKNOWN

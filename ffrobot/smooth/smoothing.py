@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +62,10 @@ class Smoothed:
             SolveError: nothing vibrates, or `rosbags` is not installed.
         """
         path, best = Path(output), self.best
-        motion = JointMotions("smooth", best.times, tuple(self._joints(best)), ())
+        rates = np.gradient(best.command, best.times, axis=0)
+        moments = [None] * len(self.robot.joints) if best.moments is None else best.moments.T
+        joints = map(JointMotion, self.robot.joints, best.command.T, rates.T, moments)
+        motion = JointMotions("smooth", best.times, tuple(joints), ())
         makers: dict[str, Callable[[JointMotions], Content]] = {
             ".json": lambda motion: joint_trajectory_text(motion)[0],
             ".csv": csv_text,
@@ -71,12 +74,6 @@ class Smoothed:
         if path.suffix not in makers:
             raise InputError(f'{path}: expected a name that ends in {either(makers)}, found "{path.name}"')
         write_content(path, makers[path.suffix](motion), force=force)
-
-    def _joints(self, best: Candidate) -> Iterator[JointMotion]:
-        rates = np.gradient(best.command, best.times, axis=0)
-        for k, name in enumerate(self.robot.joints):
-            moment = None if best.moments is None else best.moments[:, k]
-            yield JointMotion(name, best.command[:, k], rates[:, k], moment)
 
 
 def smooth_motion(

@@ -278,8 +278,12 @@ def _moving_ends(times: Array, values: Array) -> Iterator[str]:
 
 def _accelerations(times: Array, values: Array) -> Array:
     """(T − 2, columns) sizes by second differences of rows (T, columns)."""
-    steps = np.diff(times)[:, None]
-    return np.abs(np.diff(np.diff(values, axis=0) / steps, axis=0) / (0.5 * (steps[1:] + steps[:-1])))
+    return np.abs(difference_quotients(*difference_quotients(times, values))[1])
+
+
+def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
+    """Times half-way between rows (T, columns), and the rates (T − 1, columns) there."""
+    return (times[1:] + times[:-1]) / 2, np.diff(values, axis=0) / np.diff(times)[:, None]
 
 
 def _from_zero(part: Piecewise, first: Array) -> Array:
