@@ -21,7 +21,6 @@ from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
-from ..results.linear import read_metrics
 
 
 def describe(path: Path) -> str:
@@ -116,6 +115,7 @@ def _results(file: h5py.File) -> str:
     tables = [analyses, datasets]
     closed = {name: group["control"].attrs for name, group in file.items() if "control/commands" in group}
     if closed:
+        from ..results.linear import read_metrics  # loads the core
         from ..results.tables import loop_cells  # loads the records of scenes
 
         cells = {name: loop_cells(read_metrics(attributes)) for name, attributes in closed.items()}
