@@ -56,7 +56,7 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, robust: bool, 
     _tell(solution, path, len(remarked))
     check_ended(solution, display, again)
     if strict:
-        _check_warnings(solution)
+        _check_warnings(solution, scene_file)
 
 
 def _tell(solution: Solution, path: Path, remarked: int) -> None:
@@ -85,9 +85,9 @@ def _tell(solution: Solution, path: Path, remarked: int) -> None:
             summary_console().print(table)
 
 
-def _check_warnings(solution: Solution) -> None:
+def _check_warnings(solution: Solution, scene_file: Path) -> None:
     from ..common.errors import SolveError
 
     for name, result in solution.analyses.items():
         for text in result.warnings:
-            raise SolveError(f'{solution.scene.path}: analysis "{name}": {text} (a warning, and --strict)')
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
