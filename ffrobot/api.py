@@ -57,13 +57,13 @@ def solve(
     from .scene.load import load_scene
     from .scene.scene import Scene
 
+    if output is None and resume:
+        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
     if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
     elif not isinstance(scene, Scene):
         wrong = type(scene).__name__
         raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {wrong}")
-    if output is None and resume:
-        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
     path, again, watcher = None if output is None else Path(output), "solve(…, resume=True)", watcher or Watcher()
     solution = solve_and_keep(scene, path, watcher, again, resume=resume)
     if solution is not None:
