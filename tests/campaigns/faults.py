@@ -49,7 +49,7 @@ FAULTS = [
     Fault(LOADS, "force = -payload.mass * (of_point.a",
           "force = payload.mass * (of_point.a", "tests/test_mode_acceleration.py"),
     Fault(LOADS, "left -= wrench @", "left += wrench @", MBS + "test_link_loads.py"),
-    Fault(RESULTS + "peaks.py", "motion.space.along(acting.force)", "motion.space.along(-acting.force)", ARM),
+    Fault(RESULTS + "peaks.py", "run.space.along(acting.force)", "run.space.along(-acting.force)", ARM),
     Fault(RESULTS + "motion.py", "function.sample(inside)[0]", "function.sample(inside)[1]", ARM),
     Fault(RESULTS + "peaks.py", "largest(time, column) for column in columns.T",
           "largest(time, column) for column in columns.T[::-1]", ARM),
