@@ -1,6 +1,7 @@
 """What design commands leave for the report: axes of parallel coordinates, states of designs, bands, files."""
 
 import csv
+import html
 
 import numpy as np
 import pytest
@@ -86,7 +87,9 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
         masses = [float(row["mass"]) for row in csv.DictReader(table)]
     np.testing.assert_allclose(axes[1].values, masses, rtol=1e-12)
     ffrobot.ok("report", folder)
-    assert (tmp_path / "found.html").stat().st_size > 1_000_000
+    page = (tmp_path / "found.html").read_text(encoding="utf-8")
+    assert page.count("data:image/svg+xml;base64,") == len(study.diagrams) == 2
+    assert all(html.escape(fact) in page for fact in study.facts)
 
 
 def test_tornado_and_bands(scene, tmp_path):
