@@ -13,13 +13,14 @@ from checkpoint_mechanisms import load as checkpoint
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.scene.load import load_scene, make_scene
+from ffrobot.scene.load import load_robot, load_scene, make_scene
 from ffrobot.schema import schema
 
 CASES = Path(__file__).parents[1] / "cases"
 FILES = {path: path.read_text(encoding="utf-8") for path in sorted(CASES.glob("*/*.toml"))}
 SCENES = [path for path, text in FILES.items() if "[[analysis]]" in text]
-LINKS = [path for path in FILES if path not in SCENES and path.name != "figures.toml"]
+ROBOTS = [path for path, text in FILES.items() if "[[body]]" in text and path not in SCENES]
+LINKS = [path for path in FILES if path not in (*SCENES, *ROBOTS) and path.name != "figures.toml"]
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +47,14 @@ def test_scenes_of_the_cases_pass(validator, path):
     scene = load_scene(path)
     validator["scene"].validate(parsed(path))
     assert validator["spatial"].is_valid(parsed(path)) is not scene.is_planar
+
+
+@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_robots_of_the_cases_pass(validator, path):
+    """Scenes without analyses, as `ffrobot smooth` takes them."""
+    assert not load_robot(path).is_planar
+    rest = {"name": "rest", "kind": "static"}
+    validator["spatial"].validate({**parsed(path), "analysis": [rest]})
 
 
 @pytest.mark.parametrize("name", CHECKPOINTS)
