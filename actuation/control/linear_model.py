@@ -415,9 +415,9 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     s = scale * (0.1 + 0.1j)  # any that is no pole
     passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)
     weakest = np.linalg.svd(passed, compute_uv=False).min(initial=np.inf)
-    kinds = {name.partition("/")[0] for name in outputs}
+    kinds = {model.output_names[k].partition("/")[0] for k in model.outputs(outputs)}
     peers = [k for k, name in enumerate(model.output_names) if name.partition("/")[0] in kinds]
-    if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max() * np.linalg.norm(b):
+    if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max(initial=0.0) * np.linalg.norm(b):
         return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
     N, N_B = _null_space(c), _null_space(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
