@@ -151,7 +151,7 @@ def test_margin_is_where_the_simulated_loop_begins_to_grow(delay):
     for part in (0.93, 1.07):
         scaled = {what: {"J0": part * factor * of["J0"]} for what, of in gains.items()}
         for run in (simulated(3, scaled, sample_time, delay), simulated(3, gains, sample_time, delay + part * later)):
-            assert grows(run.records["loop"].details, record) == (part > 1.0)
+            assert grows(run.outcomes["loop"].details, record) == (part > 1.0)
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -170,7 +170,7 @@ def test_constraints_that_do_not_hold_are_told(what, unit):
     for off, is_told in ((3e-6, False), (1e-4, True), (1e20, True), (np.nan, True)):
         q = result.run.q.copy()
         q[7, column] += off * (1.0 if what == "angle" else unit)
-        broken = replace(result, motion=replace(result.run, q=q))
+        broken = replace(result, run=replace(result.run, q=q))
         assert any('trajectory "t" is violated by' in text for text in broken.warnings) == is_told
 
 

@@ -11,6 +11,7 @@ from tree_oracle import row_values
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.quantities.motion import joint_motion
 from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.quantities.supply import totals
 
@@ -85,7 +86,7 @@ def check_cuts(chain):
         size = max(np.abs(known[joint]).max() for joint in joints)
         for joint in joints:
             np.testing.assert_allclose(carried[joint], known[joint], rtol=0, atol=1e-7 * size, err_msg=joint)
-            for found, wanted in zip(other.joint(joint), one.joint(joint), strict=True):
+            for found, wanted in zip(joint_motion(other, joint), joint_motion(one, joint), strict=True):
                 np.testing.assert_allclose(found, wanted, atol=1e-9, err_msg=joint)
 
 
