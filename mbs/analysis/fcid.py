@@ -17,7 +17,7 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.waypoints import spline
-from ..linear.statics import static_shapes
+from ..linear.statics import modal_sizes, static_shapes
 from ..model.body import Body
 from ..model.divided_link import DividedLink
 from ..model.gears import refuse_prescribed_motors
@@ -192,7 +192,8 @@ def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMoti
     def stiffness(p: Array, at: Indices) -> Array:
         return left_slopes(model, motion, (p, 0 * p, 0 * p), nodes[at], near[at])[2][:, : p.shape[1]]
 
-    p, is_met = static_shapes(bodies, forces, stiffness, len(nodes))
+    omega = np.sqrt(np.concatenate([body.stiffness for body in bodies]))
+    p, is_met = static_shapes(omega, modal_sizes(bodies), forces, stiffness, len(nodes))
     if not is_met.all():
         raise SolveError(
             f'{model.scene.path}: analysis "{analysis.name}": no static shape was found at'

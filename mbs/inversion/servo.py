@@ -14,6 +14,7 @@ from ...common.errors import InputError
 from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
+from ..linear.statics import modal_sizes
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.nodes import ConstraintRow
@@ -64,6 +65,11 @@ class Servo:
     def scale(self) -> Array:
         """Frequencies ω of all modes (n,), rad/s."""
         return np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
+
+    @cached_property
+    def mode_sizes(self) -> Array:
+        """(n,) p of all modes that bend a link by about its length."""
+        return modal_sizes(node.body for node in self.model.tree.nodes)
 
     @property
     def mode_counts(self) -> list[int]:

@@ -63,7 +63,8 @@ def equilibrium(servo: Servo, t: float) -> Array:
 def _shapes(servo: Servo, times: Array) -> tuple[Array, Booleans]:
     """Shapes p (N, n) at `times` (N,) with which motors alone bear the loads: r(t, p, 0, 0) = 0; which are met (N,)."""
     return static_shapes(
-        [node.body for node in servo.model.tree.nodes],
+        servo.scale,
+        servo.mode_sizes,
         lambda p, at: servo.residuals(times[at], p, 0 * p, 0 * p),
         lambda p, at: servo.slopes(times[at], p, 0 * p, 0 * p)[2][:, : p.shape[1]],
         len(times),

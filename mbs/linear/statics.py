@@ -11,7 +11,7 @@ Optimization, 2006, sec. 18.3), so that nothing adds up in them; of equations th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -311,19 +311,19 @@ def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
 
 
 def static_shapes(
-    bodies: Sequence[Body],
+    omega: Array,
+    sizes: Array,
     forces: Callable[[Array, Indices], Array],
     stiffness: Callable[[Array, Indices], Array],
     count: int,
 ) -> tuple[Array, Booleans]:
     """Shapes p (T, n) of all bodies on which `forces` leave nothing, at T = `count` times, and which are met (T,).
 
+    `omega`, `sizes` (n,): frequencies of the modes, rad/s, and p that bends a link by about its length.
     Joints follow the shapes: `forces`(p, numbers of times) are those on modes (k, n), `stiffness` is their derivative
     (k, n, n): of one of `NEIGHBORS` times at first, and of each where steps shrink slowly. Shapes that bend a link by
     more than about its length are not met.
     """
-    omega = np.sqrt(np.concatenate([body.stiffness for body in bodies]))
-    sizes = np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
     K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, SLOW), np.full(count, np.inf)
     least = STRAIGHT * float((omega * sizes).min(initial=np.inf))
 
@@ -345,6 +345,11 @@ def static_shapes(
 
     p, is_met = newton(correct, lambda p, step: p + step * sizes, np.zeros((count, len(omega))))
     return p, is_met & (np.abs(p) <= sizes).all(axis=1)
+
+
+def modal_sizes(bodies: Iterable[Body]) -> Array:
+    """(n,) √J of the modes of all bodies, bent by about their length."""
+    return np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
 
 
 def natural_sizes(model: Model) -> Array:

@@ -65,7 +65,7 @@ class OneMode:
     """m p̈ + d ṗ + k p = f ÿ + b V for y = 1e-5 σ(t/0.1), σ of seventh degree."""
 
     m, d, k, f, b = -0.13765154622696, 0.20672227218342, 427.34097816676604, 0.26436631797, -0.0012390036504
-    scale = np.array([np.sqrt(k / -m)])
+    scale, mode_sizes = np.array([np.sqrt(k / -m)]), np.ones(1)
     where = doubt = ""
 
     def residuals(self, times, p, v, a):
