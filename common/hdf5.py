@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import h5py
@@ -17,6 +18,9 @@ from . import checksum
 from .arrays import NDArray
 from .errors import FfrobotError, InputError, is_own_fault
 from .outputs import check_regular, protected
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 MOST_COMPRESSED = 1100  # gzip makes 1032 bytes of one at best
 
@@ -94,6 +98,15 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
     return np.asarray(read(item), dtype=np.float64)
 
 
+def fields_in(found: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
+    """What a group, or attributes, have of the fields of a `record`. Raises `KeyError` for those that are missing.
+
+    Those with a default may be missing, as they are in files of earlier versions; what is no field is left out.
+    """
+    needed = {one.name: one.default is one.default_factory is MISSING for one in fields(record)}
+    return {name: found[name] for name, is_needed in needed.items() if is_needed or name in found}
+
+
 @contextmanager
 def blaming(*paths: Path) -> Iterator[None]:
     """Turn what reading these files raises into `InputError`, where one is not known to be as ffrobot wrote it.
@@ -122,10 +135,10 @@ def reading(*paths: Path) -> Iterator[None]:
 
 def _in_words(error: Exception) -> str:
     """What h5py and others say of what they do not find, or find otherwise."""
-    lacking = re.search(r"(object|attribute:) '(.+)'", str(error)) if isinstance(error, KeyError) else None
+    lacking = re.search(r"(object |attribute: |^)'(.+?)'", str(error)) if isinstance(error, KeyError) else None
     if lacking is not None:
-        kind = "attribute" if lacking[1] == "attribute:" else "dataset or group"
-        return f'expected the {kind} "{lacking[2]}", found none'
+        kind = {"object ": "dataset or group ", "attribute: ": "attribute "}.get(lacking[1], "")
+        return f'expected the {kind}"{lacking[2]}", found none'
     return f"{type(error).__name__}: {error}".splitlines()[0]
 
 

@@ -14,7 +14,7 @@ from ..common.arrays import Array, Integers, NDArray
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import AnyPath, write_atomically
-from ..common.hdf5 import image_of, in_memory, numbers, open_checked, read
+from ..common.hdf5 import fields_in, image_of, in_memory, numbers, open_checked, read
 from ..common.meanings import write_record
 from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
@@ -162,8 +162,7 @@ def _interface(group: h5py.Group) -> Interface:
 
 def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
     """The datasets of `group` that are fields of `record`; those without default must be there."""
-    required = {item.name: item.default is MISSING for item in fields(record)}
-    return {name: _numbers(group[name]) for name, needed in required.items() if needed or name in group}
+    return {name: _numbers(item) for name, item in fields_in(group, record).items()}
 
 
 def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:

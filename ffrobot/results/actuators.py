@@ -9,7 +9,8 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.meanings import names_of, write_record
+from ..common.hdf5 import fields_in
+from ..common.meanings import write_record
 from ..mbs.quantities.motion import body_motion, joint_motion
 from ..mbs.quantities.supply import actuator_forces
 from ..mbs.run.record import Run
@@ -88,9 +89,8 @@ def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeas
     """Of the feasibility of an analysis: what every motor has to do, in the order of `joints`."""
     from ..actuation.motors import MotorFeasibility
 
-    known = {name[1:] for name in names_of("MotorFeasibility")} - {"factor"}
     about = {name: group["joints"][name].attrs for name in joints if f"joints/{name}" in group}
-    return {name: MotorFeasibility(**{key: of[key] for key in known & of.keys()}) for name, of in about.items()}
+    return {name: MotorFeasibility(**fields_in(of, MotorFeasibility)) for name, of in about.items()}
 
 
 def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
@@ -99,7 +99,7 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
         return None
     from ..actuation.feasibility import Unsupplied
 
-    attributes = group["unsupplied"].attrs.items()
+    attributes = fields_in(group["unsupplied"].attrs, Unsupplied).items()
     about: dict[str, Any] = {key: tuple(value) if np.ndim(value) else value for key, value in attributes}
     return Unsupplied(**about)
 

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array, ComplexArray
+from ..common.hdf5 import fields_in
 from ..common.meanings import names_of, write_record
 from ..mbs.quantities.motion import body_motion, modal_rates, reported_points
 
@@ -236,4 +237,4 @@ def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
     """The metrics among the attributes of control/."""
     from ..actuation.control.metrics import Metrics
 
-    return Metrics(**{key: attributes[key] for key in Metrics.__dataclass_fields__ if key in attributes})
+    return Metrics(**fields_in(attributes, Metrics))

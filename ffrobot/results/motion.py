@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.hdf5 import fields_in
 from ..common.meanings import write_record
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
@@ -83,8 +84,10 @@ def read_recovery(group: h5py.Group, body: str) -> Recovery:
         return mode_displacement(read_modal(group, body))
     entry = group[f"stress/{body}"]
     names = tuple(str(name) for name in entry["loads"].attrs["columns"])
-    layers = {key: values[()] for key, values in entry["layers"].items()} if "layers" in entry else None
-    sections = None if layers is None else SectionLoads(**layers)
+    sections = None
+    if "layers" in entry:
+        layers = fields_in(entry["layers"], SectionLoads)
+        sections = SectionLoads(**{key: values[()] for key, values in layers.items()})
     return Recovery(str(entry.attrs["method"]), entry["modal"][()], names, entry["loads"][()], sections)
 
 
