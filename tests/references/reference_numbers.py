@@ -63,6 +63,7 @@ and modal forces of an inversion are what its iteration leaves."""
 
 
 NEW = "not in the reference"
+COINCIDE = 1e-3  # of their size: zeros that are no farther apart
 
 
 class Entry(NamedTuple):
@@ -84,7 +85,7 @@ def reduced(file):
 
     def visit(name, item):
         if isinstance(item, h5py.Dataset) and item.dtype.kind == "f":
-            found[name] = _entry(item[()])
+            found[name] = _entry(_apart(item[()]) if "/zeros/" in name else item[()])
         for key, value in item.attrs.items():
             if key not in OF_THE_RUN and (np.asarray(value).dtype.kind in "fib" or key in TEXTS):
                 found[f"{name}@{key}"] = _entry(value)
@@ -111,6 +112,17 @@ def _entry(value):
     samples = flat[np.linspace(0, flat.size - 1, SAMPLES).astype(int)]
     rms = np.sqrt(np.mean(finite**2)) if finite.size else np.nan
     return Entry(values.shape, np.array([np.abs(finite).max(initial=0.0), rms, *samples]))
+
+
+def _apart(zeros):
+    """(…, n, 2) zeros, those that nearly coincide by their mean: round-off ε moves a double one by √ε, means by ε."""
+    z = zeros.reshape(-1, *zeros.shape[-2:]) @ [1.0, 1.0j]
+    known = np.isfinite(z)
+    with np.errstate(invalid="ignore"):
+        near = np.abs(z[:, :, None] - z[:, None]) <= COINCIDE * np.abs(z[:, None])
+    near &= known[:, :, None] & known[:, None]
+    means = np.einsum("tij,tj->ti", near, np.where(known, z, 0.0)) / np.maximum(near.sum(axis=2), 1)
+    return np.where(known[..., None], np.stack([means.real, means.imag], axis=-1), zeros.reshape(*z.shape, 2))
 
 
 def write(entries, path):
