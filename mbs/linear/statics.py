@@ -259,12 +259,12 @@ class Statics:
         return at, as_floats((self.system.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes)
 
     def _natural(self, q: Array) -> Array:
-        """|q| (n_v,) in natural sizes, 1 of orientations."""
+        """|q| (n_v,) in natural sizes, 1 of orientations; of links without loads, not 0 but round-off."""
         sizes = np.ones(self.model.tree.n_v)
         for node in self.model.tree.nodes:
             if node.joint.q_count == node.joint.freedoms:
                 sizes[node.v] = np.abs(q[node.q]) / self.sizes[node.v]
-            sizes[node.p_v] = np.abs(q[node.p_q]) / self.sizes[node.p_v]
+            sizes[node.p_v] = np.abs(q[node.p_q]) / self.sizes[node.p_v] + np.finfo(float).eps
         return sizes
 
     def _cause(self, at: Balance, worst: int) -> str:
