@@ -64,13 +64,14 @@ def solve(
     elif not isinstance(scene, Scene):
         wrong = type(scene).__name__
         raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {wrong}")
-    path, again, watcher = None if output is None else Path(output), "solve(…, resume=True)", watcher or Watcher()
+    path, watcher = None if output is None else Path(output), watcher or Watcher()
+    again = "" if path is None else "solve(…, resume=True)"
     solution = solve_and_keep(scene, path, watcher, again, resume=resume)
     if solution is not None:
         for name, result in solution.analyses.items():
             for text in result.warnings:
                 warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
-        check_ended(solution, watcher, "" if path is None else again)
+        check_ended(solution, watcher, again, scene.path)
         if path is None:
             return Results.from_image(results_image(solution), scene.path)
     assert path is not None  # results that are complete are those of a file

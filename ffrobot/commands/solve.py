@@ -54,7 +54,7 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, robust: bool, 
         click.echo(f"{path}: complete, nothing to go on with")
         return
     _tell(solution, path, len(remarked))
-    check_ended(solution, display, again)
+    check_ended(solution, display, again, scene_file)
     if strict:
         _check_warnings(solution, scene_file)
 

@@ -42,7 +42,9 @@ STOPPED = ("interrupted", "too many steps", "not evaluated")
 
 
 def how_to_go_on(solution: Solution, command: str) -> str:
-    """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
+    """What a message about a run that was stopped adds; empty where it cannot be resumed, or by no `command`."""
+    if not command:
+        return ""
     outcome = stopped(solution)
     if outcome is None:
         return "".join(f'; {command} resumes with "{name}"' for name in left_out(solution)[:1])

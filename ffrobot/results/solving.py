@@ -24,8 +24,8 @@ def solve_and_keep(
 ) -> Solution | None:
     """Run the analyses of a scene, which go on from the file `path` with `resume`, and write that file where given.
 
-    It is written before an error is raised. `again`: the command that goes on with it. None where there is nothing to
-    go on with. Raises as `solve_scene`, and `StoppedError` where a signal has cut a run short.
+    It is written before an error is raised. `again`: the command that resumes the run; empty without a file. None where
+    nothing is left to run. Raises as `solve_scene`, and `StoppedError` where a signal has cut a run short.
     """
     inputs, kept = files_of_tables(scene.path, scene.text), list[Solution]()
     if path is not None:
@@ -52,12 +52,12 @@ def solve_and_keep(
     return kept[-1] if kept else solution
 
 
-def check_ended(solution: Solution, watcher: Watcher, again: str = "") -> None:
+def check_ended(solution: Solution, watcher: Watcher, again: str, scene_file: Path) -> None:
     """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end.
 
-    `again`: the command that goes on with the results; empty where they are in no file.
+    `again`: the command that resumes the run; empty without a file. `scene_file`: the scene, as it was named.
     """
-    go_on = how_to_go_on(solution, again) if again else ""
+    go_on = how_to_go_on(solution, again)
     try:
         for run in solution.outcomes.values():
             run.check_completed(go_on)
@@ -65,4 +65,4 @@ def check_ended(solution: Solution, watcher: Watcher, again: str = "") -> None:
         raise StoppedError(str(error), watcher.signal) if watcher.signal else error from None
     if watcher.signal:
         done = "before all analyses" if left_out(solution) else "when all was computed and written"
-        raise StoppedError(f"{solution.scene.path}: stopped on request {done}{go_on}", watcher.signal)
+        raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", watcher.signal)
