@@ -69,9 +69,11 @@ def smooth(
     from ..run.inputs import files_of
     from ..smooth.drawn import picture
     from ..smooth.printed import print_smooth, write_page
-    from ..smooth.smoothing import smooth_motion
+    from ..smooth.smoothing import maker_of, smooth_motion
 
     protect([*files_of(scene_file), *([motion] if motion else [])])
+    target = output or scene_file.with_suffix(".smooth.json")
+    maker_of(target)  # its ending is known to be wrong before a robot is simulated
     with Display() as display:
         found = smooth_motion(
             scene_file, motion, bandwidth=_bandwidth(bandwidth), damping_ratio=damping_ratio, point=point,
@@ -80,7 +82,6 @@ def smooth(
         )  # fmt: skip
     console = summary_console()
     print_smooth(found, console)
-    target = output or scene_file.with_suffix(".smooth.json")
     if found.candidates:
         found.write(target, force=force)
         console.print(f"written    {target}", soft_wrap=True)
@@ -100,4 +101,4 @@ def _bandwidth(texts: tuple[str, ...]) -> float | dict[str, float]:
         values = {}
     if len(values) < len(pairs) or ("" in values and len(values) > 1):
         raise InputError(f"--bandwidth: expected HZ, or JOINT=HZ for each joint, found {', '.join(texts)}")
-    return values.get("", values) if "" in values else values
+    return values.get("", values)

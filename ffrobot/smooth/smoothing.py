@@ -62,18 +62,26 @@ class Smoothed:
             SolveError: nothing vibrates, or `rosbags` is not installed.
         """
         path, best = Path(output), self.best
+        make = maker_of(path)
         rates = np.gradient(best.command, best.times, axis=0)
         moments = [None] * len(self.robot.joints) if best.moments is None else best.moments.T
         joints = map(JointMotion, self.robot.joints, best.command.T, rates.T, moments)
         motion = JointMotions("smooth", best.times, tuple(joints), ())
-        makers: dict[str, Callable[[JointMotions], Content]] = {
-            ".json": lambda motion: joint_trajectory_text(motion)[0],
-            ".csv": csv_text,
-            ".rosbag2": lambda motion: joint_trajectory_bag(motion)[0],
-        }
-        if path.suffix not in makers:
-            raise InputError(f'{path}: expected a name that ends in {either(makers)}, found "{path.name}"')
-        write_content(path, makers[path.suffix](motion), force=force)
+        write_content(path, make(motion), force=force)
+
+
+MAKERS: Mapping[str, Callable[[JointMotions], Content]] = {
+    ".json": lambda motion: joint_trajectory_text(motion)[0],
+    ".csv": csv_text,
+    ".rosbag2": lambda motion: joint_trajectory_bag(motion)[0],
+}
+
+
+def maker_of(path: Path) -> Callable[[JointMotions], Content]:
+    """What makes the content of a file of motions. Raises `InputError` where its ending is not one of `MAKERS`."""
+    if path.suffix not in MAKERS:
+        raise InputError(f'{path}: expected a name that ends in {either(MAKERS)}, found "{path.name}"')
+    return MAKERS[path.suffix]
 
 
 def smooth_motion(
