@@ -45,7 +45,7 @@ def _spectrum(axes: Axes, of: Diagnosis) -> None:
     for values in each:
         axes.plot(grid, values)
     axes.set_yscale("log")
-    axes.set_title("spectrum of it (rad/s), natural frequencies")
+    axes.set_title("its spectrum (rad/s), natural frequencies")
     axes.set_xlabel("frequency (Hz)")
 
 
