@@ -120,9 +120,9 @@ def drive_robot(
     if loop_rank is None:
         system.integrated.scene.watch_posture([model.rows[k].is_trajectory for k in rows], robot_size(model))
     watch_limits(system.integrated.scene, model.tree)
-    recording = _core.Recording() if is_recorded else None
     continuation = None if earlier is None else earlier.continuation
     if continuation is None:
+        recording = _core.Recording() if is_recorded else None
         samples = new_samples(times, analysis, len(start.q) + len(start.v))
         continuation = Continuation(_core.TreeCheckpoint(), recording, samples)
     run = _integrated(system, times, start, controls, control, progress, continuation)

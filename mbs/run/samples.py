@@ -41,9 +41,8 @@ DENSE, HUMP, FEW = 8, 0.02, 0.1  # times within an interval, of the range, of th
 def new_samples(times: Array, analysis: IntegratedAnalysis, size: int) -> _core.Samples | None:
     """Samples for an integration over the output `times` (T,), s; None where there is nothing to integrate.
 
-    `size`: numbers of a state, 0 of a robot that cannot move.
-
-    Runs whose differences count have more: peaks of theirs are to be known as well as their derivatives.
+    `size`: numbers of a state, 0 of a robot that cannot move. Runs whose differences count have more samples: their
+    peaks have to be known as well as their derivatives.
     """
     duration, parts = float(times[-1] - times[0]), PARTS_OF_STEP if analysis.keep_steps or analysis.is_repeated else 1
     return _core.Samples(duration / FEWEST, max(KEPT // size, FEWEST), parts) if size and duration > 0.0 else None
