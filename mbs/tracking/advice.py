@@ -16,7 +16,7 @@ from ..inversion.servo import Servo
 from ..inversion.stable_inversion import invert
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from ..run.context import Context
-from .intervals import settled, start_breaks
+from .intervals import OUT_OF_REACH, settled, start_breaks
 from .problem import Transition
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
@@ -100,6 +100,36 @@ def enough_path_time(
 
     orders = [order for order in path_orders(servo.functions, servo.end) if order > 1]
     return float(servo.end * np.exp(_enough(share_with, share, min(orders, default=4.0))))
+
+
+def check_within_reach(servo: Servo, linear: Linearisation, bounds: Bounds | None, share: float) -> None:
+    """Raise `SolveError` where a zero, or what is sure of a least voltage, is a `share` far beyond the limits.
+
+    What would do follows from how the bound of the zero falls: as e^{−s t}, and as T^−m.
+    """
+    if share <= OUT_OF_REACH:
+        return
+    zeros = linear.zeros[[0, -1]]
+    rate, found = slowest(zeros), f"at least {share:.3g} times the limits"
+    if bounds is not None and len(bounds.voltages):
+        rate = abs(float(bounds.zeros[0].real))
+        found += f"; the zero at {bounds.zeros[0].real:.4g} 1/s alone requires {bounds.voltages[0]:.4g} V"
+    order = min((order for order in path_orders(servo.functions, servo.end) if order > 1), default=4.0)
+    would = [f"{1e3 * np.log(share) / rate:.3g} ms more of pre_actuation and post_actuation"] if rate else []
+    would += [
+        f"the same path in {servo.end * share ** (1 / order):.3g} s instead of {servo.end:g} s",
+        f"patches that bend the links {share:.3g} times as much per volt",
+    ]
+    raise SolveError(
+        f"{servo.where}: patches cannot carry the robot: they would need {found}. Any of these comes near:"
+        f" {'; '.join(would)}"
+    )
+
+
+def slowest(zeros: ComplexArray) -> float:
+    """1/s, of the slowest of the zeros; 0 without any but vibrations."""
+    sizes = np.abs(zeros.real)[np.abs(zeros.real) > LIGHT * np.abs(zeros)]
+    return float(sizes.min()) if sizes.size else 0.0
 
 
 def _share(servo: Servo, asked: Transition, breaks: Array) -> float:

@@ -16,6 +16,7 @@ MOST_INTERVALS = 1500
 SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
 CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
 LOST = 0.5  # of the largest elastic force: where more is left over between Gauss points, no motion is near
+OUT_OF_REACH = 5.0  # times the limits: more than so much voltage is not found to the end
 TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
@@ -66,11 +67,12 @@ def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tr
 
     V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
     more of the effort joins it, on intervals that are all halved. All that converge count, and the least one is taken;
-    where much is `LOST` between Gauss points it is no motion and did not converge.
+    where much is `LOST` between Gauss points it is no motion and did not converge. Surely far beyond the limits it is
+    not refined.
     """
     best, is_settled = _descend(asked, breaks, CALM[0], goes_on)
     for calm in CALM[1:]:
-        if is_settled:
+        if is_settled or (best.converged and asked.is_limited and best.surely > OUT_OF_REACH):
             break
         calmer, is_settled = _descend(asked, halved(breaks), calm, goes_on)
         best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
@@ -83,6 +85,8 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
     """The least voltage with a share `calm` of the effort on finer and finer intervals, and whether it settled."""
     tracked, change = track(asked, breaks, None, calm), np.inf
     while tracked.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
+        if asked.is_limited and tracked.surely > OUT_OF_REACH:
+            break
         steps = np.abs(np.diff(tracked.voltage(breaks) / asked.units, axis=0)).max(axis=1)
         breaks = halved(breaks, steps > TURNING * tracked.share)
         finer = track(asked, breaks, tracked, calm)

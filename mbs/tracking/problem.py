@@ -80,6 +80,11 @@ class Transition:
     rate: float = 0.0
 
     @property
+    def is_limited(self) -> bool:
+        """Whether patches have limits of voltages."""
+        return bool(np.isfinite(self.limits.patches.range).any())
+
+    @property
     def units(self) -> Array:
         """V by which shares count (m,): the larger of the two limits of a patch."""
         return np.abs(self.ranges["voltage"]).max(axis=0)
@@ -121,6 +126,11 @@ class Tracked:
     added: float = 0.0  # what the effort adds to the objective "least-…"
     # of the share, relative: twice its change by the last finer intervals, and what the effort may add
     doubt: float = np.inf
+
+    @property
+    def surely(self) -> float:
+        """What the share is at least by its doubt; 0 where nothing is known of that."""
+        return max(0.0, self.share * (1.0 - self.doubt)) if np.isfinite(self.doubt) else 0.0
 
 
 def track(

@@ -24,7 +24,7 @@ from ..fields.field_types import NotNegative, Positive
 from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along, where
 from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
-from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
+from ..inversion.zero_dynamics import Linearisation, equilibrium, linearise
 from ..model.amplifiers import joined
 from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors
@@ -33,7 +33,17 @@ from ..run.integrators import Choice
 from ..run.record import Run, Statistics
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..scene.robustness import Robustness
-from .advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends, singular_times
+from .advice import (
+    Bounds,
+    bounds_of_zeros,
+    check_within_reach,
+    enough_path_time,
+    enough_time,
+    far_patches,
+    rough_ends,
+    singular_times,
+    slowest,
+)
 from .intervals import SETTLED, refined, settled, start_breaks
 from .problem import RATE, Limits, Objective, Tracked, Transition, Weights, track
 
@@ -121,8 +131,11 @@ class Tracking(TimedAnalysis):
 
         try:
             posed = _pose(model, context.patches, self, progress)
+            bounds = _bounds(posed)
+            _check_reach(posed, bounds, None)
             least = settled(posed.asked, posed.coarse, progress)
             _check_found(context, posed, least)
+            _check_reach(posed, bounds, least)
             tracked, objective = _solve(context, posed, self, least)
             if objective == "least-voltage":  # without the effort's share
                 least = replace(tracked, doubt=least.doubt)
@@ -132,18 +145,17 @@ class Tracking(TimedAnalysis):
                     f"between Gauss points modal forces up to {tracked.unmet:.2g} of the largest elastic one are left"
                     f" over, more than the tolerance, {self.tolerance:g}: raise intervals, or loosen the tolerance"
                 )
-            bounds = _bounds(posed)
         except Stopped:
             place = where(model.scene.path, self)
             raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
         (pre, post), servo = posed.around, posed.servo
-        has_limits, most = np.isfinite(posed.asked.limits.patches.range).any(), float(posed.asked.units.max())
+        most = float(posed.asked.units.max())
         around = TrackedPath(
             pre_actuation=pre,
             post_actuation=post,
             least_voltage=least.share * most,
             least_voltage_doubt=least.doubt * least.share * most,
-            least_share=least.share if has_limits else float("nan"),
+            least_share=least.share if posed.asked.is_limited else float("nan"),
             objective=objective,
             cost=tracked.cost,
             held=servo.model,
@@ -227,21 +239,13 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     around = durations(linear, (pre, post), analysis.output_step, needs_future=needs_future)
     first, last = -around[0], end + around[1]
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
-    asked = Transition(
-        servo, Phi_V, limits, _weights(servo, analysis, limits), rest, "least-voltage", rate=_rate(linear)
-    )
+    rate, weights = slowest(linear.zeros[[0, -1]]), _weights(servo, analysis, limits)
+    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage", rate=rate)
     meshes = (
         with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
         for k in (1, 2)
     )
     return _Posed(servo, linear, around, asked, *meshes)
-
-
-def _rate(linear: Linearisation) -> float:
-    """1/s, of the slowest zero where the path begins and ends; 0 without any but vibrations."""
-    zeros = linear.zeros[[0, -1]]
-    sizes = np.abs(zeros.real)[np.abs(zeros.real) > LIGHT * np.abs(zeros)]
-    return float(sizes.min(initial=np.inf)) if sizes.size else 0.0
 
 
 def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
@@ -282,7 +286,15 @@ def _causes(context: Context, posed: _Posed) -> str:
 
 
 def _is_beyond(posed: _Posed, least: Tracked) -> bool:
-    return least.share > 1.0 + ENOUGH and bool(np.isfinite(posed.asked.limits.patches.range).any())
+    return least.share > 1.0 + ENOUGH and posed.asked.is_limited
+
+
+def _check_reach(posed: _Posed, bounds: Bounds | None, least: Tracked | None) -> None:
+    """Raise `SolveError` where a zero, or the least voltage, surely needs far more than the limits."""
+    shares = [] if bounds is None else (bounds.voltages / posed.asked.units.max()).tolist()
+    shares += [] if least is None else [least.surely]
+    if posed.asked.is_limited:
+        check_within_reach(posed.servo, posed.linear, bounds, max(shares, default=0.0))
 
 
 def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
