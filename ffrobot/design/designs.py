@@ -96,7 +96,7 @@ Point = tuple[float, ...]
 
 
 def number(value: object) -> str:
-    """Of a key, in words."""
+    """Return the value of a key as text, floats with six digits."""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -107,7 +107,7 @@ def in_words(keys: Iterable[Key], point: Point) -> str:
 
 @dataclass(frozen=True)
 class Runs:
-    """How designs are run: of which scene file, in which folder, whether they are `kept` there, so many in parallel.
+    """Settings of the runs of designs: scene file, folder (`kept` or temporary), number of parallel processes.
 
     `retry`: whether what failed in an earlier command is run again.
     """
@@ -158,7 +158,7 @@ class Design:
         return "" if self.completed else f"{self.row.status}: {self.row.message}"
 
     def results(self) -> Results:
-        """To be read, in a `with`."""
+        """Open the results file of the run, for use in a `with`."""
         return Results(self.folder / RESULTS)
 
     def read(self, goals: Iterable[Goal]) -> tuple[Reading, ...]:
@@ -175,7 +175,7 @@ class Design:
 
 
 class SpentError(Exception):
-    """As many designs have been run as may be."""
+    """The allowed number of designs has been run."""
 
 
 class Designs:
@@ -202,7 +202,7 @@ class Designs:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of designs run so far."""
         return len(self._designs)
 
     @property
@@ -211,7 +211,7 @@ class Designs:
         return {one.point: one.failure for one in self._designs.values() if not one.completed}
 
     def problem(self, *points: Point) -> str:
-        """What is wrong with the scene or a link file at all of the points, before any run; empty where nothing is."""
+        """Return the error of the scene or a link file if it exists at all of `points`, before any run; else ""."""
         found = ""
         for point in points:
             try:

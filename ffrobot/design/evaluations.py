@@ -58,7 +58,7 @@ class Evaluated:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Of the goals."""
+        """Values of all responses, in SI units."""
         return tuple(reading.value for reading in self.readings)
 
 
@@ -72,7 +72,7 @@ class Evaluations:
 
     @property
     def searched(self) -> list[Evaluated]:
-        """Those that may be the best, in the order of the search: not those that gradients took beside them."""
+        """Designs of the search in their order, without those run for gradients alone."""
         return list(self._searched.values())
 
     @property
@@ -147,7 +147,7 @@ DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 
 @dataclass(frozen=True)
 class Slopes:
-    """At one design: `gradient` (r, n) of goals by coordinates of the unit cube; its `error`, estimated.
+    """Gradients at one design: `gradient` (r, n) of r responses by n unit-cube coordinates, and its estimated `error`.
 
     Coordinates of catalogs have NaN, and those without a design beside that completes. `kinks`: peaks that others
     overtake beside the design, in words.
@@ -177,7 +177,7 @@ class Differentiation:
         self._tried = False
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
-        """At a design that completed; `judged`: with an estimate of the error by further runs."""
+        """Return gradients at a completed design; `judged`: with an error estimate from further runs."""
         wanted = [j for j, variable in enumerate(self.evaluations.space.variables) if not variable.is_catalogue]
         if self.repeats and base.again is not None and wanted:
             found = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
@@ -188,19 +188,16 @@ class Differentiation:
 
     def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], *, judged: bool) -> Slopes:
         """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
-        step = {j: self._step(base, j, ROUNDING) for j in wanted}
-        samples = self._samples(base, {j: [_side(base, j, h) * h] for j, h in step.items()}, base.again)
-        own = np.array(base.values)
-        gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
-        for j, beside in samples.items():
-            _differentiate(own, j, beside, gradient, error, ROUNDING)
+        offsets = {j: self._offsets(base, j, ROUNDING, pairs=False) for j in wanted}
+        samples = self._samples(base, offsets, base.again)
+        found = self._slopes(base, samples, ROUNDING, np.zeros_like(self.curvature))
         if judged and all(samples.values()):
             left = self._left_of_sum(base, samples)
-            moved = sum(np.abs(gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
-            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(own)))
+            moved = sum(np.abs(found.gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
+            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(base.values)))
             for j, beside in samples.items():
-                error[:, j] += left / abs(next(iter(beside)))
-        return Slopes(gradient, error, self._kinks(samples))
+                found.error[:, j] += left / abs(next(iter(beside)))
+        return found
 
     def _left_of_sum(self, base: Evaluated, samples: Mapping[int, Beside]) -> Array:
         """(r) |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h; 0 if there is no run."""
@@ -218,15 +215,8 @@ class Differentiation:
 
     def _by_own_steps(self, base: Evaluated, wanted: Sequence[int], *, pairs: bool) -> Slopes:
         """With central `pairs`, or one design beside where curvatures are known."""
-        offsets = {j: self._offsets(base, j, pairs=pairs) for j in wanted}
-        samples = self._samples(base, offsets, None)
-        own = np.array(base.values)
-        gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
-        for j, beside in samples.items():
-            bent = np.nan_to_num(self.curvature[:, j])
-            curvature = _differentiate(own, j, beside, gradient, error, self.tolerance, bent)
-            self.curvature[:, j] = self.curvature[:, j] if curvature is None else curvature
-        return Slopes(gradient, error, self._kinks(samples))
+        offsets = {j: self._offsets(base, j, self.tolerance, pairs=pairs) for j in wanted}
+        return self._slopes(base, self._samples(base, offsets, None), self.tolerance, self.curvature)
 
     def _samples(
         self, base: Evaluated, offsets: Mapping[int, list[float]], again: Mapping[Key, Any] | None
@@ -239,62 +229,47 @@ class Differentiation:
             for (j, offset), values in zip(moved, goals, strict=True):
                 if values and all(np.isfinite(one.value) for one in values):
                     found[j][offset] = values
-            offsets = {j: [] if found[j] else _other_side(base, j, tried) for j, tried in offsets.items()}
+            left = {j: [-x for x in tried if -x not in tried] for j, tried in offsets.items() if not found[j]}
+            offsets = {j: [x for x in others if 0.0 <= base.place[j] + x <= 1.0] for j, others in left.items()}
         return found
 
-    def _offsets(self, base: Evaluated, j: int, *, pairs: bool) -> list[float]:
+    def _offsets(self, base: Evaluated, j: int, noise: float, *, pairs: bool) -> list[float]:
         """Within the bounds: forward where there is room, with the other of a pair on the far side or twice as far."""
-        u, h = base.place[j], self._step(base, j, self.tolerance)
-        x = _side(base, j, h) * h
-        if not pairs:
-            return [x]
-        return [h, -h] if u - h >= 0.0 and u + h <= 1.0 else [x, 2.0 * x]
+        u = base.place[j]
+        h = self.evaluations.space.variables[j].step(u, 2.0 * float(np.sqrt(noise)))
+        if pairs and u - h >= 0.0 and u + h <= 1.0:
+            return [h, -h]
+        x = h if u + h <= 1.0 else -h
+        return [x, 2.0 * x] if pairs else [x]
 
-    def _step(self, base: Evaluated, j: int, noise: float) -> float:
-        return self.evaluations.space.variables[j].step(base.place[j], 2.0 * float(np.sqrt(noise)))
+    def _slopes(self, base: Evaluated, samples: Mapping[int, Beside], noise: float, curvature: Array) -> Slopes:
+        """Differences of values that have a relative `noise`; NaN where no design beside completed.
 
-    def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:
+        `curvature` (r, n), where known, is taken out of one-sided differences, and replaced where there are pairs.
+        """
+        gradient, error = np.full((2, *curvature.shape), np.nan)
+        for j, beside in samples.items():
+            if not beside:
+                continue
+            x = np.array([0.0, *beside])
+            f = np.array([base.values, *([one.value for one in values] for values in beside.values())])  # (x, goals)
+            h = float(np.abs(x).min(where=x != 0.0, initial=np.inf))
+            slope, uncertain = weights(x) @ (f - f[0]), noise * np.abs(f).max(axis=0) / h
+            if x.size == 3:
+                curvature[:, j] = 2.0 * ((f[1] - f[0]) / x[1] - (f[2] - f[0]) / x[2]) / (x[1] - x[2])
+            else:
+                bent = 0.5 * np.nan_to_num(curvature[:, j]) * x[1]
+                slope, uncertain = slope - bent, uncertain + np.abs(bent)
+            gradient[:, j], error[:, j] = slope, uncertain
         goals = self.evaluations.problem.goals
-        found = [
+        kinks = dict.fromkeys(
             f"{goal.text}: close to this design another peak is the largest, {one.elsewhere}"
             for beside in samples.values()
             for values in beside.values()
             for goal, one in zip(goals, values, strict=True)
             if one.elsewhere
-        ]
-        return tuple(dict.fromkeys(found))
-
-
-def _differentiate(
-    own: Array, j: int, beside: Beside, gradient: Array, error: Array, noise: float, bent: Array | float = 0.0
-) -> Array | None:
-    """Fill column j; NaN stays where no design beside completed. The curvature (r), by pairs.
-
-    `own` (r): values at the design itself.
-    `bent`: the curvature that is known before, of which one-sided differences are freed.
-    """
-    if not beside:
-        return None
-    x = np.array([0.0, *beside])
-    f = np.array([own, *([one.value for one in values] for values in beside.values())])  # (x, goals)
-    h = float(np.abs(x).min(where=x != 0.0, initial=np.inf))
-    slope, uncertain = weights(x) @ (f - f[0]), noise * np.abs(f).max(axis=0) / h
-    curvature = None
-    if x.size == 3:
-        curvature = 2.0 * ((f[1] - f[0]) / x[1] - (f[2] - f[0]) / x[2]) / (x[1] - x[2])
-    else:
-        slope, uncertain = slope - 0.5 * bent * x[1], uncertain + np.abs(0.5 * bent * x[1])
-    gradient[:, j], error[:, j] = slope, uncertain
-    return curvature
-
-
-def _side(base: Evaluated, j: int, h: float) -> float:
-    return 1.0 if base.place[j] + h <= 1.0 else -1.0
-
-
-def _other_side(base: Evaluated, j: int, tried: Sequence[float]) -> list[float]:
-    u = base.place[j]
-    return [-offset for offset in tried if 0.0 <= u - offset <= 1.0 and -offset not in tried]
+        )
+        return Slopes(gradient, error, tuple(kinks))
 
 
 def _moved(place: Place, j: int, offset: float) -> Place:
@@ -307,7 +282,7 @@ CLOSED = 1e-2  # of the gradient that an optimum may have: room that limits may 
 
 @dataclass(frozen=True)
 class Optimality:
-    """At one design, in the scaled problem.
+    """Conditions of optimality (Karush, Kuhn, Tucker) at one design, in the scaled problem.
 
     Attributes:
         limits: (m) multipliers λ of limits; NaN of those that are not reached.
@@ -334,7 +309,7 @@ class Optimality:
 
 
 def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> Optimality:
-    """Of a completed design, by the gradients there."""
+    """Return the conditions of optimality at a completed design, from the gradients there."""
     problem, variables = evaluations.problem, evaluations.space.variables
     factors = problem.factors(design.values)[:, None]
     scaled, excess = slopes.gradient * factors, problem.scaled(design.values)[1:]

@@ -30,7 +30,7 @@ class TextTable(NamedTuple):
     of: str = ""
 
     def for_report(self) -> StudyTable:
-        """As the file of a study has it."""
+        """Return the table as study files contain it."""
         first, *others = self.heading
         heading = (f"{self.of}: {first}" if self.of else first, *others)
         return StudyTable(heading=heading, rows=tuple(map(tuple, self.rows)))
@@ -46,7 +46,7 @@ class CsvFile(NamedTuple):
 
 
 class Finding(ABC):
-    """What one command has found of the scene file `scene`."""
+    """Base of the results of design commands for the scene file `scene`: printing, tables, figures."""
 
     scene: Path
     name: ClassVar[StudyName]
@@ -63,7 +63,7 @@ class Finding(ABC):
 
     @abstractmethod
     def sections(self) -> Iterator[TextTable]:
-        """Tables of text."""
+        """Yield the tables of text."""
 
     @abstractmethod
     def remarks(self) -> Iterator[str]:
@@ -103,7 +103,8 @@ class Finding(ABC):
 
     def study(self) -> Study:
         """Content of the study for JSON and reports: texts, tables and diagrams."""
-        facts = tuple(_fact(line) for line in self.remarks() if line)
+        parts = (line.strip().partition("  ") for line in self.remarks() if line)
+        facts = tuple(f"{word}: {text.strip()}" if blanks else word for word, blanks, text in parts)
         return Study(
             ffrobot_version=VERSION, name=self.name, title=self.title, scene=str(self.scene),
             scene_name=str(load_toml(self.scene, "scene").get("name", self.scene.stem)), headline=self.headline(),
@@ -122,7 +123,7 @@ class Finding(ABC):
 
 
 def numbers(values: Iterable[float]) -> Numbers:
-    """None for what is not finite."""
+    """Convert values to Python floats, with None for NaN and infinity."""
     return tuple(float(value) if np.isfinite(value) else None for value in values)
 
 
@@ -132,12 +133,12 @@ def floats(values: Iterable[float]) -> tuple[float, ...]:
 
 
 def with_unit(text: str, unit: str) -> str:
-    """`mass (kg)`."""
+    """Append a unit in parentheses: `mass (kg)`."""
     return f"{text} ({unit})" if unit else text
 
 
 def file_name(text: str) -> str:
-    """Of a goal or a history, without what file names do not take."""
+    """Return `text` with characters that file names should not contain replaced by "_"."""
     return re.sub(r"\W+", "_", text).strip("_")
 
 
@@ -146,8 +147,3 @@ def failed_runs(failures: Sequence[str], runs: int) -> Iterator[str]:
     if failures:
         more = f", and {len(failures) - 1} more in the table of runs" if len(failures) > 1 else ""
         yield f"failed     {len(failures)} of {runs} runs, left out: {failures[0]}{more}"
-
-
-def _fact(line: str) -> str:
-    word, blanks, text = line.strip().partition("  ")
-    return f"{word}: {text.strip()}" if blanks else word

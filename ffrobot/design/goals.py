@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,13 +18,13 @@ from ..fe_models.modal_body import ModalBody
 from ..present.feasibility import joint_tasks
 from ..results.file import Results
 from ..sweep.files import value_of
-from .readings import MISSED, POWER, UNCERTAIN, Followed, Goal, History, Peak, Reading, read_history
+from .readings import MISSED, POWER, UNCERTAIN, Followed, Goal, History, Peak, Reading, read_column
 from .variables import DesignSpace, DesignVariable
 
 
 @dataclass(frozen=True)
 class OfMotors(Goal):
-    """Of the motors of the variables `chosen`: the sum of `what`, "mass" or "cost"; or the largest "share".
+    """Response of chosen motors: total "mass" (kg) or "cost", or the largest "share" of a limit.
 
     The share is that of rated torque (by the RMS), of peak torque, or of speed.
     """
@@ -33,7 +34,7 @@ class OfMotors(Goal):
     chosen: tuple[DesignVariable, ...] = ()
 
     def read(self, results: Results) -> Reading:
-        """By the scene that the results have, and of shares by its motion."""
+        """Return the response for the motors in the scene of `results`; shares also depend on the motion there."""
         if not self.chosen:
             raise InputError(f'"{self.text}": expected `optimise` with --vary "motor JOINT in CATALOG", found none')
         motors = {variable.keys[0][1]: _of_scene(results, variable) for variable in self.chosen}
@@ -79,7 +80,7 @@ class OfHistory(Goal):
     times: str = ""  # what its unit is that of the history times
 
     def read(self, results: Results) -> Reading:
-        """Of the history's only column."""
+        """Return the response of the single column of the history."""
         history = self._history(results)
         joined = "·".join(part for part in (history.unit, self.times) if part) if history.unit else ""
         unit = {"W·s": "J"}.get(joined, joined)
@@ -89,16 +90,11 @@ class OfHistory(Goal):
         return Reading(value, unit, doubt=UNCERTAIN if history.is_in_doubt else "")
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
-        """Its value by results of a changed scene."""
+        """Return the value in the results of a changed scene."""
         return Followed(self.reduce(self._history(results), nominal.is_between))
 
     def _history(self, results: Results) -> History:
-        history = read_history(results, self.name, f'"{self.text}"')
-        if history.values.shape[1] > 1:
-            raise InputError(
-                f'"{self.text}": expected one column, such as "{self.name}[0]", found {history.values.shape[1]}'
-            )
-        return history
+        return read_column(results, self.name, f'"{self.text}"')
 
 
 @dataclass(frozen=True)
@@ -112,7 +108,7 @@ class OfSettling(Goal):
 
     @property
     def analysis(self) -> str:
-        """In front of the point."""
+        """Name of the analysis in front of the point; empty without one."""
         return self.point.rpartition("/")[0]
 
     def read(self, results: Results) -> Reading:
@@ -128,7 +124,7 @@ class OfSettling(Goal):
 
 @dataclass(frozen=True)
 class OfFrequency(Goal):
-    """Of an eigenmode of a link, Hz, by its number from 1 in the order of the modal body."""
+    """Natural frequency of a link, Hz; `number` counts eigenmodes from 1 in the order of the modal body."""
 
     text: str
     number: int
@@ -136,7 +132,7 @@ class OfFrequency(Goal):
     needs_motion = False
 
     def read(self, results: Results) -> Reading:
-        """Of the modal body that the results rest on."""
+        """Return the frequency (Hz) from the modal body of the results."""
         body = self._body(results)
         if not 1 <= self.number <= body.eigenmode_count:
             raise InputError(
@@ -146,7 +142,7 @@ class OfFrequency(Goal):
         return Reading(float(body.frequency[self.number - 1]), "Hz", mode=_modes(body)[self.number - 1])
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
-        """Of the same mode of its family, whatever its number now."""
+        """Return the frequency (Hz) of the same mode of its family, even if its number has changed."""
         body = self._body(results)
         modes = _modes(body)
         if nominal.mode not in modes:
@@ -164,14 +160,14 @@ class OfFrequency(Goal):
 
 @dataclass(frozen=True)
 class OfMass(Goal):
-    """Of a body, or of all bodies, kg: payloads and patches are not counted."""
+    """Mass of one body, or of all bodies, kg, without payloads and patches."""
 
     text: str
     body: str = ""
     needs_motion = False
 
     def read(self, results: Results) -> Reading:
-        """By modal bodies, and what the scene says of rigid ones."""
+        """Return the mass (kg) from modal bodies and `rigid` tables."""
         bodies = {str(body["name"]): body for body in results.scene["body"]}
         if self.body and self.body not in bodies:
             raise InputError(
@@ -191,7 +187,7 @@ class OfValue(Goal):
     needs_motion = False
 
     def read(self, results: Results) -> Reading:
-        """By the scene that the results have."""
+        """Return the number in the scene of the results."""
         parts = tuple(self.key.split("."))
         found = value_of(results.scene, parts, option=f'"{self.text}"')
         if isinstance(found, bool) or not isinstance(found, int | float):
@@ -201,17 +197,17 @@ class OfValue(Goal):
 
 
 def parse_goal(text: str, option: str = "--of") -> Goal:
-    """What `text` asks for, one of `FORMS`. Raises `InputError` where it is none of them."""
+    """Return the response that `text`, one of `FORMS`, names. Raises `InputError` if it is none of them."""
     word, *rest = text.split() or [""]
     match word, rest:
         case "peak", [name]:
             return Peak(text, name)
         case "at", [time, name] if (t := _number(time)) is not None:
-            return OfHistory(text, lambda history, _: _value_at(history, t, text), name)
+            return OfHistory(text, partial(_value_at, t, text), name)
         case "energy", [joint]:
-            return OfHistory(text, _integral, f"{joint}.{POWER}", "s")
+            return OfHistory(text, partial(_reduced, "integral"), f"{joint}.{POWER}", "s")
         case (("rms" | "mean" | "integral"), [name]):
-            return OfHistory(text, REDUCTIONS[word], name, "s" if word == "integral" else "")
+            return OfHistory(text, partial(_reduced, word), name, "s" if word == "integral" else "")
         case (("residual" | "settling"), [point]):
             return OfSettling(text, word, point)
         case "frequency", [number, body] if number.isdecimal():
@@ -227,24 +223,18 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
     raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
 
 
-def _integral(history: History, by_all: bool) -> float:
-    return _mean(history, by_all) * float(np.ptp(history.time))
+def _reduced(word: str, history: History, by_all: bool) -> float:
+    time, values = history.time, history.values[:, 0]
+    if word == "rms":
+        return history.rms if by_all else root_mean_square(time, values)
+    mean = history.mean if by_all else float(shares(time) @ values)
+    return mean * float(np.ptp(time)) if word == "integral" else mean
 
 
-def _mean(history: History, by_all: bool) -> float:
-    return history.mean if by_all else float(shares(history.time) @ history.values[:, 0])
-
-
-def _rms(history: History, by_all: bool) -> float:
-    return history.rms if by_all else root_mean_square(history.time, history.values[:, 0])
-
-
-REDUCTIONS: Mapping[str, Callable[[History, bool], float]] = {"rms": _rms, "mean": _mean, "integral": _integral}
-
-
-def _value_at(history: History, t: float, text: str) -> float:
-    if not history.time[0] <= t <= history.time[-1]:
-        raise InputError(f'"{text}": expected a time from {history.time[0]:g} to {history.time[-1]:g} s, found {t:g}')
+def _value_at(t: float, text: str, history: History, _: bool) -> float:
+    first, last = history.time[[0, -1]]
+    if not first <= t <= last:
+        raise InputError(f'"{text}": expected a time from {first:g} to {last:g} s, found {t:g}')
     return history.at(t, 0)
 
 
@@ -285,7 +275,7 @@ class Limit:
 
     @property
     def text(self) -> str:
-        """As the user wrote it, more or less."""
+        """The limit as text: `peak joints.elbow.moment <= 20`."""
         return f"{self.goal.text} {'<=' if self.sense > 0 else '>='} {self.bound:g}"
 
     @property
@@ -309,7 +299,7 @@ class DesignProblem:
         return (self.objective, *(limit.goal for limit in self.limits))
 
     def scaled(self, values: Sequence[float]) -> Array:
-        """(1 + m) F to be least, and g ≤ 0, of the goals' values: logarithms of their ratios to size and bounds.
+        """Return (1 + m,) scaled objective F, to be minimized, and constraints g ≤ 0: logarithms of value over scale.
 
         Powers of lengths, as masses and deflections are, become linear in the logarithms of these.
         """
@@ -317,12 +307,12 @@ class DesignProblem:
         return as_floats(logarithms * self._senses)
 
     def factors(self, values: Sequence[float]) -> Array:
-        """(1 + m) what turns slopes of goals with these values into those of `scaled`."""
+        """Return (1 + m,) derivatives of `scaled` with respect to the unscaled responses."""
         _, slopes = self._logarithms(values)
         return as_floats(slopes * self._senses / self._sizes)
 
     def excess(self, values: Sequence[float]) -> Array:
-        """(m) how far goals are beyond their limits, of these; below 0 within."""
+        """Return (m,) relative excess of responses over their limits; negative within the limits."""
         bounds, senses = (np.array([getattr(limit, of) for limit in self.limits]) for of in ("bound", "sense"))
         return as_floats(senses * (np.array(values[1:]) - bounds) / np.abs(self._sizes[1:]))
 
@@ -350,7 +340,7 @@ class DesignProblem:
 
 
 def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> DesignProblem:
-    """By what the command line says. Raises `InputError`."""
+    """Return the problem of the command line's objective and limits. Raises `InputError` without one objective."""
     if (minimise is None) == (maximise is None):
         found = "both" if minimise is not None else "none"
         raise InputError(f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {found}")

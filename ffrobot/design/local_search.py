@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
 from ..common.arrays import Array, as_floats
+from ..run.watcher import Watcher
 from .designs import SpentError
 from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, optimality
 from .goals import KEPT
@@ -48,7 +49,7 @@ class StalledError(Exception):
 
 
 def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
-    """In which completed designs are sorted: those within limits first, by the objective, then by their violation."""
+    """Return a sort key of designs: feasible ones first, by objective; then by violation; failed ones last."""
     if not one.completed:
         return 2, 0.0
     violation = evaluations.problem.violation(one.readings)
@@ -85,13 +86,13 @@ class SearchFunctions:
 
     @property
     def start(self) -> Array:
-        """Coordinates x."""
+        """Initial coordinates x (n,)."""
         x = as_floats(self._place[self._free])
         return as_floats(np.append(x, self._rows(x)[self._tops].max())) if self.has_level else x
 
     @property
     def bounds(self) -> Array:
-        """(n, 2) of x."""
+        """Lower and upper bounds (n, 2) of x."""
         sides = [(0.0, 1.0)] * len(self._free) + [(-np.inf, np.inf)] * self.has_level
         return np.array(sides)
 
@@ -101,21 +102,21 @@ class SearchFunctions:
         return bool(self._limits) or self.has_level
 
     def objective(self, x: Array) -> float:
-        """F."""
+        """Return the objective F at x, scaled."""
         return float(x[-1]) if self.has_level else float(self._rows(x)[self._tops[0]])
 
     def objective_gradient(self, x: Array) -> Array:
-        """(n,) of F."""
+        """Return ∂F/∂x (n,)."""
         return np.eye(x.size)[-1] if self.has_level else as_floats(self._row_gradients(x)[self._tops[0]])
 
     def excesses(self, x: Array) -> Array:
-        """(m) to be 0 or less."""
+        """Return constraints g (m,) at x; g ≤ 0 is feasible."""
         rows = self._rows(x)
         over = rows[self._tops] - x[-1] if self.has_level else np.zeros(0)
         return as_floats(np.concatenate([rows[self._limits], over]))
 
     def excess_gradients(self, x: Array) -> Array:
-        """(m, n) of them."""
+        """Return ∂g/∂x (m, n)."""
         rows = self._row_gradients(x)
         if not self.has_level:
             return as_floats(rows[self._limits])
@@ -230,8 +231,10 @@ class Local:
     spent: bool = False
 
 
-def search_from(start: Place, method: str, differentiation: Differentiation, tell: Callable[[str], None]) -> Local:
-    """With a design at each step, and one beside it for each number; with judged gradients where these do not do.
+def search_from(
+    start: Place, method: str, differentiation: Differentiation, watcher: Watcher, title: str = ""
+) -> Local:
+    """Search along gradients from one start, at first with unjudged gradients, then with judged ones.
 
     What SLSQP then leaves, whose line search may come to nothing where a limit trades for the goal almost linearly,
     trust-constr goes on with. Where one ends beyond limits, the largest excess is made less until they are kept; where
@@ -239,6 +242,10 @@ def search_from(start: Place, method: str, differentiation: Differentiation, tel
     """
     evaluations = differentiation.evaluations
     begun = len(evaluations.searched)
+
+    def tell(text: str) -> None:
+        watcher.stage(title + text)
+
     (first,) = evaluations.at([start])
     if not first.completed:
         return Local(first, first, None, first.failure)
@@ -291,7 +298,7 @@ SPREAD = 1e-3  # of the objective in the last generation
 
 
 def combinations(space: DesignSpace) -> int:
-    """How many designs there are; 0 where numbers are between bounds."""
+    """Return the number of combinations of discrete values; 0 if a variable is continuous."""
     return prod(len(variable.rows) for variable in space.variables)
 
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from ..run.watcher import Watcher
 from ..sweep.files import run_files
 from .designs import Designs, Runs, SpentError, changes_for, may_repeat, number
 from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
-from .finding import CsvFile, Finding, TextTable, floats, numbers, with_unit
+from .finding import CsvFile, Finding, TextTable, floats, with_unit
 from .goals import KEPT, DesignProblem, Limit, parse_goal, read_problem, with_motors
 from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
 from .optimum_record import Optimum, parallel, states_of
@@ -43,7 +42,7 @@ def find_optimum(
     runner: Runs, vary: Sequence[str], minimise: str | None, maximise: str | None, subject_to: Sequence[str],
     method: str, starts: int, seed: int, runs: int, tolerance: float,
 ) -> Optimum:  # fmt: skip
-    """See `ffrobot.optimise`."""
+    """Optimize a scene: see `ffrobot.optimise`."""
     path, problem = runner.path, read_problem(minimise, maximise, subject_to)
     space = read_space(path, vary)
     problem = with_motors(problem, space)
@@ -129,7 +128,7 @@ def _search(
     first, best = evaluations.searched[0], best_of(evaluations, evaluations.searched)
     if not best.completed or all(variable.is_catalogue for variable in evaluations.space.variables):
         return [Local(first, best, None, message)]
-    found = search_from(best.place, "slsqp", differentiation, watcher.stage)
+    found = search_from(best.place, "slsqp", differentiation, watcher)
     words = "; ".join(text for text in (message, found.message) if text)
     return [Local(first, found.best, found.optimality, words)]
 
@@ -141,12 +140,8 @@ def _from_starts(
     for k, place in enumerate(starts):
         title = f"start {k + 1} of {len(starts)}: " if len(starts) > 1 else ""
         with suppress(SpentError):
-            found.append(search_from(place, method, differentiation, partial(_tell, watcher, title)))
+            found.append(search_from(place, method, differentiation, watcher, title))
     return found
-
-
-def _tell(watcher: Watcher, title: str, text: str) -> None:
-    watcher.stage(title + text)
 
 
 def _optimum(
@@ -226,7 +221,7 @@ class Front(Finding):
 
     @property
     def values(self) -> Array:
-        """(N, 2) values of both responses."""
+        """Values (N, 2) of both responses."""
         return np.array([(one.goal, one.against) for one in self.points])
 
     @property
@@ -278,11 +273,10 @@ class Front(Finding):
 
     def _curve(self) -> Points:
         goal, against = self.values.T
-        price = [f"price {-p:.4g}" if p is not None else "" for p in numbers(one.price for one in self.points)]
         return Points(
             name="front", title=f"{self.goals[0]} against {self.goals[1]}",
             x_label=with_unit(self.goals[1], self.units[1]), y_label=with_unit(self.goals[0], self.units[0]),
-            labels=tuple(price), x=floats(against), y=floats(goal), joined=True,
+            x=floats(against), y=floats(goal),
             sure=tuple(bool(one.converged and one.feasible) for one in self.points),
         )  # fmt: skip
 
@@ -298,7 +292,7 @@ def find_front(
     runner: Runs, vary: Sequence[str], minimise: str, against: str, points: int, subject_to: Sequence[str], runs: int,
     tolerance: float,
 ) -> Front:  # fmt: skip
-    """See `ffrobot.trade_off`."""
+    """Compute a Pareto front: see `ffrobot.trade_off`."""
     path, problem = runner.path, read_problem(minimise, None, subject_to)
     space, other = read_space(path, vary), parse_goal(against, "--against")
     if other.text == problem.objective.text:
@@ -345,7 +339,7 @@ class _Searches:
         evaluations, runner = Evaluations(self.designs, self.space, problem), self.runner
         differentiation, found = Differentiation(evaluations, self.tolerance), None
         with suppress(SpentError):
-            found = search_from(start, "slsqp", differentiation, partial(_tell, runner.watcher, f"{title}: "))
+            found = search_from(start, "slsqp", differentiation, runner.watcher, f"{title}: ")
         if found is None or found.spent:
             most = self.designs.most
             raise SolveError(f"{runner.path}: ended before {title} points after {most} runs, as many as allowed")

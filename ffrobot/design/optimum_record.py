@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from .variables import DesignSpace, DesignVariable
 
 
 def states_of(problem: DesignProblem, designs: Sequence[Evaluated], best: Sequence[Evaluated]) -> tuple[State, ...]:
-    """Of each design, whose readings begin with those of the responses of `problem`."""
+    """Return the state of each design; its readings begin with the responses of `problem`."""
     chosen = {one.design.folder for one in best}
 
     def state(one: Evaluated) -> State:
@@ -52,10 +53,8 @@ def parallel(
         values = numbers(one.values[g] if one.completed else np.nan for one in designs)
         bound, sense = (limit.bound, limit.sense) if limit is not None else (None, 1.0)
         axes.append(axis_of_goal(with_unit(text, unit), values, bound, 1 if sense > 0 else -1))
-    return Parallel(
-        name="designs", title=f"{len(designs)} designs", axes=tuple(axes), states=states,
-        designs=tuple(f"design {k}" for k in range(len(designs))), best_label=best_label,
-    )  # fmt: skip
+    title = f"{len(designs)} designs"
+    return Parallel(name="designs", title=title, axes=tuple(axes), states=states, best_label=best_label)
 
 
 def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple[State, ...]) -> Progress:
@@ -78,15 +77,13 @@ def _best_so_far(problem: DesignProblem, designs: Sequence[Evaluated], values: S
     return numbers(problem.sense * np.minimum.accumulate(kept))
 
 
-def _axis(variable: DesignVariable, k: int, values: Sequence[object]) -> Axis:
+def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> Axis:
     if not variable.is_catalogue:
-        low, high = variable.low, variable.high
-        numbers_of = tuple(float(value) for value in values)  # type: ignore[arg-type]
-        return Axis(label=variable.name, values=numbers_of, low=low, high=high, logarithmic=variable.logarithmic)
+        keys: dict[str, Any] = {"low": variable.low, "high": variable.high, "logarithmic": variable.logarithmic}
+        return Axis(label=variable.name, values=tuple(map(float, values)), **keys)
     name, column = ".".join(variable.keys[k]), list(dict.fromkeys(row[k] for row in variable.rows))
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in column):
-        axis = axis_of_goal(name, tuple(float(value) for value in column))
-        return axis.model_copy(update={"values": tuple(float(value) for value in values)})  # type: ignore[arg-type]
+        return axis_of_goal(name, tuple(map(float, column))).model_copy(update={"values": tuple(map(float, values))})
     numbered = tuple(float(column.index(value)) for value in values)
     return Axis(label=name, values=numbered, low=-0.5, high=len(column) - 0.5, names=tuple(map(str, column)))
 
@@ -135,7 +132,7 @@ class Optimum(Finding):
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys with dots."""
+        """Names of the keys, with dots."""
         return tuple(map(".".join, self.space.keys))
 
     @property
@@ -150,7 +147,7 @@ class Optimum(Finding):
 
     @property
     def limits(self) -> Array:
-        """(m,) values of the limited responses."""
+        """Values (m,) of the limited responses."""
         return np.array([reading.value for reading in self.best.readings[1:]])
 
     @property
@@ -170,7 +167,7 @@ class Optimum(Finding):
 
     @property
     def prices(self) -> Array:
-        """(m,) ∂response/∂limit, shadow prices of the limits, SI units; NaN if not active."""
+        """Shadow prices (m,) ∂response/∂limit, SI units; NaN for inactive limits."""
         if self.optimality is None:
             return np.full(len(self.problem.limits), np.nan)
         room = np.array([limit.sense / limit.scale for limit in self.problem.limits])
@@ -178,7 +175,7 @@ class Optimum(Finding):
 
     @property
     def bound_prices(self) -> Array:
-        """(n,) ∂response/∂bound, shadow prices of the bounds, SI units; NaN if not active."""
+        """Shadow prices (n,) ∂response/∂bound, SI units; NaN for inactive bounds."""
         if self.optimality is None:
             return np.full(len(self.space.variables), np.nan)
         found = -self.optimality.bounds / self.problem.factors(self.best.values)[0]

@@ -63,7 +63,7 @@ class Reading:
 
     @property
     def remark(self) -> str:
-        """What outputs miss; empty where that is nothing."""
+        """Note on a value between outputs, or on its uncertainty; empty without either."""
         if not self.is_between:
             return self.doubt
         found = f"found {self.missed_by:.6g} near outputs, {self.value:.6g} between them, which counts"
@@ -95,15 +95,15 @@ class Goal:
 
     @property
     def analysis(self) -> str:
-        """What its history begins with, which may be the name of an analysis."""
+        """First part of the name of the history, which may be an analysis."""
         return self.name.replace("/", ".").partition(".")[0]
 
     def read(self, results: Results) -> Reading:
-        """Its value. Raises `InputError` where the results do not have it."""
+        """Return the response in `results`. Raises `InputError` if they do not contain it."""
         raise NotImplementedError
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
-        """Its value by results of a changed scene."""
+        """Return the response in results of a changed scene."""
         return Followed(self.read(results).value)
 
 
@@ -191,6 +191,14 @@ def read_history(results: Results, name: str, option: str) -> History:
     return History(name, _unit(results, found).replace(" ", "·"), time, as_floats(values), largest, rms, mean, in_doubt)
 
 
+def read_column(results: Results, name: str, option: str) -> History:
+    """The history `name` as in `read_history`. Raises `InputError` also where it has several columns."""
+    history = read_history(results, name, option)
+    if (count := history.values.shape[1]) > 1:
+        raise InputError(f'{option}: expected one column, such as "{name}[0]", found {count} of "{name}"')
+    return history
+
+
 def _known(results: Results) -> dict[str, str]:
     """Datasets over time by the names they go by."""
     found = [f"{analysis}/{name}" for analysis in results.analyses for name in _histories(results, analysis)]
@@ -255,7 +263,7 @@ class Peak(Goal):
         return Reading(value, history.unit, time, edge, column, sign, coarse=coarse, doubt=doubt)
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
-        """At the time, in the column and with the sign of the `nominal` peak; of one between outputs the largest."""
+        """Return the value at time, column and sign of the `nominal` peak; of one between outputs the largest value."""
         history = self._history(results)
         if nominal.is_between:
             return Followed(float(np.fmax(history.largest, np.abs(history.values).max())))

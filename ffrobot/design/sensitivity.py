@@ -45,7 +45,7 @@ class Derivative(NamedTuple):
 
 
 def weights(offsets: Array) -> Array:
-    """Of values (n,): w with f'(0) ≈ Σ w_i f(x_i): Σ w_i x_iᵏ = 1 for k = 1 and 0 for all other k < n."""
+    """Return weights w (n,) of f'(0) ≈ Σ w_i f(x_i): Σ w_i x_iᵏ is 1 for k = 1 and 0 for other k < n."""
     size = np.abs(offsets).max()
     powers = np.vander(offsets / size, increasing=True).T
     first = np.zeros(len(offsets))
@@ -54,7 +54,7 @@ def weights(offsets: Array) -> Array:
 
 
 def derivative(offsets: Array, values: Array) -> Derivative:
-    """At 0, from `values` (n,) at `offsets` (n,); those that are NaN are left out.
+    """Return the derivative at 0 from `values` (n,) at `offsets` (n,); NaN values are omitted.
 
     Steps are taken two and three sizes at a time; those whose estimate of the error is least make the derivative
     (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
@@ -153,7 +153,7 @@ class Entry:
 
 
 def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], ...]:
-    """[goal][key]."""
+    """Return derivatives as rows by response and columns by key."""
     return tuple(tuple(_entry(base, g, k, samples) for k in range(len(base.keys))) for g in range(len(base.goals)))
 
 
@@ -261,22 +261,22 @@ class Sensitivity(Finding):
 
     @property
     def value(self) -> Array:
-        """(g,) the responses."""
+        """Responses (g,) of the scene, SI units."""
         return np.array([reading.value for reading in self.readings])
 
     @property
     def derivative(self) -> Array:
-        """(g, k) ∂response/∂key, SI units; NaN if unknown."""
+        """Derivatives (g, k) ∂response/∂key, SI units; NaN if unknown."""
         return np.array([[entry.derivative for entry in row] for row in self.entries])
 
     @property
     def error(self) -> Array:
-        """(g, k) estimated error of the derivatives."""
+        """Estimated errors (g, k) of the derivatives, SI units."""
         return np.array([[entry.error for entry in row] for row in self.entries])
 
     @property
     def logarithmic(self) -> Array:
-        """(g, k) percent of the response per percent of the key, θ/F ∂F/∂θ; NaN where F is 0."""
+        """Relative sensitivities (g, k), percent of response per percent of key, θ/F ∂F/∂θ; NaN where F is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return as_floats(
                 np.where(self.value[:, None] == 0.0, np.nan, self.derivative * (self.values / self.value[:, None]))
@@ -366,7 +366,7 @@ TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is n
 def find_sensitivity(
     runs: Runs, of: Sequence[str], to: Sequence[str], step: float, tolerance: float | None
 ) -> Sensitivity:
-    """See `ffrobot.sensitivity`."""
+    """Compute derivatives of responses: see `ffrobot.sensitivity`."""
     goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
     keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
     if not goals or not keys:

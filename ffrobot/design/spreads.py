@@ -32,7 +32,7 @@ RESAMPLES = 200  # of a bootstrap
 
 @dataclass(frozen=True)
 class SpreadStatistics:
-    """Of quantities of any shape (…): `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
+    """Statistics of quantities (…): `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
 
     Beside each its standard error: `mean_error`, `deviation_error`, `quantile_errors`. `lowest` and `highest` (…) are
     the worst case: of samples the least and the largest one.
@@ -49,13 +49,13 @@ class SpreadStatistics:
 
     @property
     def named(self) -> dict[str, tuple[Array, Array]]:
-        """What has an error (…), with it, by name."""
+        """Mean, deviation and quantiles by name, each with its standard error."""
         quantiles = dict(zip(NAMES, zip(self.quantiles, self.quantile_errors, strict=True), strict=True))
         return {"mean": (self.mean, self.mean_error), "deviation": (self.deviation, self.deviation_error), **quantiles}
 
     @property
     def columns(self) -> list[str]:
-        """Names of `numbers`."""
+        """Column names of `numbers`."""
         return [*(f"{name}{error}" for name in self.named for error in ("", "_error")), "lowest", "highest"]
 
     def numbers(self, k: int) -> list[float]:
@@ -65,7 +65,7 @@ class SpreadStatistics:
 
 
 def statistics(values: Array) -> SpreadStatistics:
-    """Of samples (n, …), n > 1.
+    """Return statistics of samples (n, …), n > 1.
 
     The error of s is √((m₄ − s⁴ (n − 3)/(n − 1))/n)/2s with the fourth central moment m₄; that of a quantile half the
     distance between the order statistics one standard deviation of the binomial distribution below and above it.
@@ -109,7 +109,7 @@ class Indices:
 
 
 def sobol_indices(a: Array, b: Array, ab: Array, seed: int = 0) -> Indices:
-    """Of goals at points A (n, g), B (n, g), and A with column i from B (k, n, g).
+    """Return Sobol indices from responses at points A (n, g), B (n, g), and A with column i of B (k, n, g).
 
     First order after Saltelli et al. (Computer Physics Communications 181, 2010, table 2b), total after Jansen
     (Computer Physics Communications 117, 1999).
@@ -152,7 +152,7 @@ class Spread:
 
     @property
     def half(self) -> float:
-        """Of a uniform key: from the mean to an end, √3 standard deviations."""
+        """Half width of a uniform distribution: √3 standard deviations."""
         return math.sqrt(3.0) * self.deviation
 
     @property
@@ -162,14 +162,14 @@ class Spread:
         return self.mean - far, self.mean + far
 
     def values(self, u: Array) -> Array:
-        """Of probabilities u (n,) in (0, 1)."""
+        """Return values of the key at probabilities u (n,) in (0, 1)."""
         if self.kind == "uniform":
             return as_floats(self.mean + self.half * (2.0 * u - 1.0))
         return as_floats(self.mean + self.deviation * ndtri(u))
 
 
 def parse_spread(text: str, path: Path) -> Spread:
-    """What `text` says of a key of the scene file at `path`. Raises `InputError` where that is nothing."""
+    """Return the distribution that `text` gives a key of the scene file at `path`. Raises `InputError`."""
     name, equals, values = text.partition("=")
     key = parse_key(name, "--spread")
     own = number_at(path, key, "--spread")
@@ -228,19 +228,19 @@ class LinearSpread:
 
     @staticmethod
     def through(spreads: Sequence[Spread], middle: Array, sides: Array) -> LinearSpread:
-        """By values `sides` (k, 2, …) one standard deviation above and below the middle."""
+        """Fit the model to values `sides` (k, 2, …) one standard deviation above and below the middle."""
         above, below = sides[:, 0], sides[:, 1]
         return LinearSpread(tuple(spreads), middle, 0.5 * (above - below), above - 2.0 * middle + below)
 
     @property
     def shares(self) -> Array:
-        """(…, k) of the variance."""
+        """Shares (…, k) of the variance by key."""
         squares = self.slopes**2
         whole = squares.sum(axis=0)
         return as_floats(np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T)
 
     def statistics(self) -> SpreadStatistics:
-        """Of the linear part; errors are the differences that the curvatures make.
+        """Return statistics of the linear part; curvatures give the errors.
 
         The worst case has every key at the end of its spread that makes it worst, a normal one two deviations off.
         """
@@ -265,7 +265,7 @@ class LinearSpread:
 
 
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:
-    """What `--spread` says of the scene file at `path`, every key once. Raises `InputError`."""
+    """Return distributions of keys of the scene file at `path`. Raises `InputError` also for repeated keys."""
     spreads = tuple(parse_spread(text, path) for text in texts)
     check_once([one.key for one in spreads], "--spread")
     return spreads

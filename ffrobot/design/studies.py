@@ -31,7 +31,7 @@ class FiniteRange(FloatRange):
     """Numbers from one bound to another, or beyond one; no NaN, no infinity."""
 
     def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> Any:
-        """The number."""
+        """Return the number within the range; other input fails."""
         found = super().convert(value, param, ctx)
         if not isfinite(found):
             self.fail(f"{found} is not a finite number.", param, ctx)
@@ -42,7 +42,7 @@ class FiniteRange(FloatRange):
 
 
 class RunOptions(TypedDict, total=False):
-    """What all studies take besides."""
+    """Options of all studies."""
 
     processes: Annotated[int, IntRange(1, 1000)]
     retry: bool

@@ -20,7 +20,7 @@ from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
 from .designs import Design, Designs, Point, Runs, changes_for, in_words
 from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
 from .goals import parse_goal
-from .readings import Goal, History, Reading, read_history
+from .readings import Goal, History, Reading, read_column
 from .spreads import (
     NAMES,
     Indices,
@@ -252,19 +252,15 @@ class WholeHistory(Goal):
     name: str
 
     def history(self, results_of: Design) -> History:
-        """Of one column."""
+        """Return the history of a completed design. Raises `InputError` for several columns."""
         with results_of.results() as results:
-            found = read_history(results, self.text, "--of")
-        if found.values.shape[1] > 1:
-            count = found.values.shape[1]
-            raise InputError(f'--of: expected one column, such as "{self.text}[0]", found {count} of "{self.text}"')
-        return found
+            return read_column(results, self.text, "--of")
 
 
 def find_uncertainty(
     runs: Runs, of: Sequence[str], spread: Sequence[str], samples: int, seed: int, by: LinearOrSampled, *, indices: bool
 ) -> Uncertainty:
-    """See `ffrobot.uncertainty`."""
+    """Propagate distributions of keys: see `ffrobot.uncertainty`."""
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples, found {samples}")
     if by == "gradients" and indices:

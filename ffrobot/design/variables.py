@@ -49,7 +49,7 @@ class DesignVariable:
 
     @property
     def name(self) -> str:
-        """As the user writes it."""
+        """Keys as the user writes them, joined by commas."""
         return ",".join(".".join(key) for key in self.keys)
 
     @property
@@ -63,7 +63,7 @@ class DesignVariable:
         return len(self.rows) - 1.0 if self.rows else 1.0
 
     def values(self, u: float) -> tuple[Any, ...]:
-        """Of the keys."""
+        """Return the values of all keys at coordinate u."""
         if self.rows:
             return self.rows[round(u)]
         a, b = self.low, self.high
@@ -71,7 +71,7 @@ class DesignVariable:
         return (float(np.clip(value, a, b)),) * len(self.keys)  # rounding goes past no bound
 
     def coordinate(self, values: tuple[Any, ...]) -> float | None:
-        """Of the keys' values; None where they are out of bounds, not all the same, or no row of the catalog."""
+        """Return u of given values; None if they are out of bounds, differ, or are no row of the catalog."""
         if self.rows:
             return float(self.rows.index(values)) if values in self.rows else None
         x, (a, b) = values[0], (self.low, self.high)
@@ -104,7 +104,7 @@ class DesignSpace:
 
     @property
     def keys(self) -> tuple[Key, ...]:
-        """Of all variables."""
+        """Keys of all variables, in order."""
         return tuple(key for variable in self.variables for key in variable.keys)
 
     def point(self, place: Place) -> Point:
@@ -121,13 +121,13 @@ class DesignSpace:
 
     @property
     def start_place(self) -> Place | None:
-        """Where the scene itself is; None where it is out of bounds or in no catalog."""
+        """Coordinates of the scene itself; None if it is out of bounds or in no catalog."""
         own = [u for u in self.start() if u is not None]
         return tuple(own) if len(own) == len(self.variables) else None
 
 
 def read_space(path: Path, vary: Sequence[str]) -> DesignSpace:
-    """What `--vary` says of the scene file at `path`. Raises `InputError`."""
+    """Return the variables that `--vary` names, for the scene file at `path`. Raises `InputError`."""
     variables = tuple(parse_variable(text) for text in vary)
     if not variables:
         raise InputError(f"optimise: expected at least one --vary, {FORMS}")

@@ -47,9 +47,7 @@ def folder(tmp_path_factory):
         Axis(label="link", values=(0.0, 1.0, 1.0, 0.0), low=-0.5, high=1.5, names=("<thin>", "thick")),
         axis_of_goal("mass (kg)", MASSES, limit=2.8),
     )
-    designs = Parallel(
-        name="designs", title="4 designs", axes=axes, states=STATES, designs=tuple(f"design {k}" for k in range(4))
-    )
+    designs = Parallel(name="designs", title="4 designs", axes=axes, states=STATES)
     progress = Progress(
         name="convergence", title="mass", y_label="mass (kg)", values=MASSES, states=STATES, best=(None, None, 2.5, 2.0)
     )
@@ -76,7 +74,7 @@ def folder(tmp_path_factory):
     write_study(study("uncertainty", indices, band), folder)
     curve = Points(
         name="front", title="mass against deflection", x_label="deflection (m)", y_label="mass (kg)",
-        labels=("", "price 2"), x=(1e-3, 2e-3), y=(2.0, 1.5), joined=True, sure=(True, False),
+        x=(1e-3, 2e-3), y=(2.0, 1.5), sure=(True, False),
     )  # fmt: skip
     write_study(study("front", curve), folder)
     return folder

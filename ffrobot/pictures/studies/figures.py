@@ -32,7 +32,7 @@ def svg_of(diagram: Diagram) -> bytes:
 
 
 def draw(diagram: Diagram) -> Figure:
-    """Draw a diagram."""
+    """Return the figure of a diagram."""
     match diagram:
         case Bars():
             return _draw_bars(diagram)
@@ -129,9 +129,8 @@ def _draw_progress(diagram: Progress) -> Figure:
 def _draw_points(diagram: Points) -> Figure:
     figure, axes = new_axes(diagram.title)
     x, y = np.array(diagram.x), np.array(diagram.y)
-    sure = np.array(diagram.sure or (True,) * len(x), dtype=bool)
-    if diagram.joined:
-        axes.plot(x, y, color=COLORS[0])
+    sure = np.array(diagram.sure, dtype=bool)
+    axes.plot(x, y, color=COLORS[0])
     axes.plot(x[sure], y[sure], "o", color=COLORS[0])
     axes.plot(x[~sure], y[~sure], "o", color=COLORS[0], markerfacecolor="white")
     axes.set_xlabel(diagram.x_label)

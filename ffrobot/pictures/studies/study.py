@@ -19,7 +19,7 @@ from ..projection import COLORS
 
 
 class Look(NamedTuple):
-    """Of the lines and points of designs; the last of `LOOKS` are drawn last."""
+    """Style of the lines and points of designs; the last of `LOOKS` are drawn on top."""
 
     label: str
     color: str
@@ -47,7 +47,7 @@ TICKS = 5  # about so many
 
 
 class Drawing(Record):
-    """What all diagrams have: the name of their files, without suffix, and a title."""
+    """Base of all diagrams: `name` of their files without suffix, and a title."""
 
     name: str
     title: str
@@ -88,14 +88,14 @@ class Axis(Record):
     names: tuple[str, ...] = ()
 
     def place(self, values: Array) -> Array:
-        """Where values are on the axis, 0 at `low` and 1 at `high`."""
+        """Return positions of values on the axis, 0 at `low` and 1 at `high`."""
         scaled = np.log if self.logarithmic else np.asarray
         low, high = scaled(np.array([self.low, self.high]))
         return as_floats((scaled(values) - low) / (high - low))
 
     @property
     def places(self) -> Array:
-        """(n) of all designs, NaN where they failed."""
+        """Positions (n,) of all designs on the axis; NaN for failed ones."""
         return self.place(floats(self.values))
 
     @property
@@ -109,7 +109,7 @@ class Axis(Record):
 
 
 def floats(values: Numbers) -> Array:
-    """(n,) with NaN where there is no number."""
+    """Convert numbers to an array (n,), None to NaN."""
     return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
@@ -133,7 +133,6 @@ class Parallel(Drawing):
     kind: Literal["parallel"] = "parallel"
     axes: tuple[Axis, ...]
     states: tuple[State, ...]
-    designs: tuple[str, ...]  # what each is called
     best_label: str = "best"
 
 
@@ -165,16 +164,14 @@ class Band(Drawing):
 
 
 class Points(Drawing):
-    """Named points; `joined` along a curve, hollow where not `sure`."""
+    """Points joined by a curve, hollow where not `sure`."""
 
     kind: Literal["points"] = "points"
     x_label: str
     y_label: str
-    labels: tuple[str, ...]
     x: tuple[float, ...]
     y: tuple[float, ...]
-    sure: tuple[bool, ...] = ()
-    joined: bool = False
+    sure: tuple[bool, ...]
 
 
 Diagram = Annotated[Bars | Parallel | Progress | Band | Points, Field(discriminator="kind")]
@@ -216,7 +213,7 @@ class StudyTable(Record):
 
 
 class Study(Record):
-    """What one command has found.
+    """Result of a design command, as its JSON file contains it.
 
     Attributes:
         scene: path of its file, as the command had it; `scene_name` in it.
@@ -239,7 +236,7 @@ class Study(Record):
 
 
 def write_study(study: Study, folder: Path) -> Path:
-    """Beside the tables of the command; the file written."""
+    """Write the JSON file of a study into `folder`; returns its path."""
     path = folder / f"{study.name}.json"
     text = json.dumps(study.model_dump(), ensure_ascii=False, separators=(",", ":"))
     write_atomically(path, text.encode(), "study", make_folder=True, ours=True)
@@ -247,7 +244,7 @@ def write_study(study: Study, folder: Path) -> Path:
 
 
 def study_files(path: Path) -> list[Path]:
-    """Those of a folder of a design command, which has to have one, or `path` itself where it is one."""
+    """Return study files in the folder of a design command, or `path` itself if it is one."""
     if not path.is_dir():
         return [path] if path.suffix == ".json" else []
     names = [f"{name}.json" for name in get_args(StudyName)]
