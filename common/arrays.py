@@ -22,12 +22,12 @@ def as_floats(values: NDArray[np.floating[Any]]) -> Array:
 
 
 def as_list(values: Array) -> list[float]:
-    """Of a vector (n,), Python's own numbers."""
+    """Convert a vector (n,) to Python floats."""
     return cast(list[float], values.tolist())
 
 
 def as_rows(values: NDArray[Any]) -> list[list[Any]]:
-    """Of a matrix (m, n), Python's own numbers by row."""
+    """Convert a matrix (m, n) to rows of Python numbers."""
     return cast(list[list[Any]], values.tolist())
 
 

@@ -99,7 +99,7 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
 
 
 def fields_in(found: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
-    """What a group, or attributes, have of the fields of a `record`. Raises `KeyError` for those that are missing.
+    """Return the fields of a `record` from a group or attributes. Raises `KeyError` for missing ones.
 
     Those with a default may be missing, as they are in files of earlier versions; what is no field is left out.
     """
@@ -128,7 +128,7 @@ def blaming(*paths: Path) -> Iterator[None]:
 
 @contextmanager
 def reading(*paths: Path) -> Iterator[None]:
-    """For a command that reads these files: none of them is lost to an output, errors are put down to damage."""
+    """Protect files that a command reads from being overwritten; errors in reading mean damage."""
     with protected(paths), blaming(*paths):
         yield
 

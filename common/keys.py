@@ -31,7 +31,7 @@ def check_title(value: str, most: int = LONGEST_NAME) -> str:
 
 
 def check_name(value: str) -> str:
-    """As `check_title`, for what becomes a group of the results file and a part of "BODY.POINT"."""
+    """Check a name as `check_title`, for groups of the results file and "BODY.POINT"."""
     if not value or value != value.strip() or "/" in value or "." in value:
         raise ValueError(f'expected a name without "/", "." and blanks around it, found "{shown(value)}"')
     return check_title(value)

@@ -340,7 +340,7 @@ remarks | | what the part's file holds and the body does not
 
 
 def meaning(name: str, table: Mapping[str, Meaning] = RESULTS) -> Meaning | None:
-    """Of a dataset by its name below its analysis, or in its file; None of one that is not known."""
+    """Return unit and meaning of a dataset by its name below its analysis, or in its file; None if unknown."""
     if name in table:
         return table[name]
     return next((found for pattern, found in table.items() if matches(name, pattern)), None)

@@ -16,7 +16,7 @@ _RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
 
 
 def processes() -> int:
-    """How many processes run this program together; 1 without mpirun."""
+    """Return the number of processes of this program; 1 without mpirun."""
     return _environment(_SIZES, 1)
 
 
@@ -31,7 +31,7 @@ def is_first() -> bool:
 
 
 def on_first(work: Callable[[], T]) -> T:
-    """What `work` returns, done by the first process alone; its `FfrobotError` is raised on all. Collective."""
+    """Return the result of `work`, done by the first process; its `FfrobotError` is raised on all. Collective."""
     if processes() == 1:
         return work()
     from mpi4py import MPI

@@ -34,12 +34,12 @@ def python_allowed(paths: Iterable[Path]) -> Iterator[None]:
 
 
 def allow_python(paths: Iterable[Path]) -> None:
-    """As `python_allowed`, for good."""
+    """Allow Python files in these folders until the program ends; see `python_allowed`."""
     _allowed.set((*_allowed.get(), *(path.resolve() for path in paths)))
 
 
 def allowed_python() -> tuple[Path, ...]:
-    """What is allowed besides files below the scene's folder."""
+    """Return folders with allowed Python files besides the scene's folder."""
     return _allowed.get()
 
 
@@ -139,7 +139,7 @@ DEPTH = 6  # of functions in functions, lists in lists
 
 
 def digest_of_function(function: object) -> str:
-    """Of code, constants, defaults, enclosed and global values that it uses; of objects that can be called, theirs.
+    """Return a hash of a function: code, constants, defaults, enclosed and global values.
 
     Of the user's own modules that it names, of their files.
     """

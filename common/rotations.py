@@ -156,13 +156,13 @@ def smallest_turn(axis: Array) -> Array:
 
 
 def rotation(theta: float) -> Array:
-    """A(θ), (2, 2)."""
+    """Return the rotation matrix A(θ), (2, 2)."""
     c, s = np.cos(theta), np.sin(theta)
     return np.array([[c, -s], [s, c]])
 
 
 def in_3d(vectors: Array) -> Array:
-    """(…, 3) of `vectors` (…, 2) of the plane z = 0; longer ones as they are."""
+    """Extend `vectors` (…, 2) of the plane z = 0 to (…, 3); longer ones stay as they are."""
     return vectors if vectors.shape[-1] > 2 else np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)
 
 

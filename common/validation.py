@@ -35,7 +35,7 @@ class Record(BaseModel):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """What to say of a key that this record does not have, but `others` that may stand in its place, if any.
+        """Return the message for a key of `others` records that this one does not have; empty without one.
 
         Nothing where it is to be called an unknown key.
         """
@@ -43,7 +43,7 @@ class Record(BaseModel):
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """What to say where `key` is missing; nothing where the general words do."""
+        """Return the message for a missing `key`; empty if the general one suffices."""
         return ""
 
 
