@@ -139,7 +139,7 @@ class Sets:
             self.add(name, ((instance, number, place) for number in range(first, last + (step > 0) - (step < 0), step)))
 
     def numbers(self, name: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
-        """(instance, number, place) of the members of a set, those of sets in it too.
+        """Yield (instance, number, place) of the members of a set, including those of nested sets.
 
         Raises `InputError` for a set in it that is not there, or contains itself.
         """
@@ -152,7 +152,7 @@ class Sets:
                 yield instance or found, number, place
 
     def meant(self, entry: str, place: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
-        """Likewise of what `entry` means: NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET."""
+        """Yield the members that `entry` names: NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET."""
         name = entry.strip("\"'").upper()
         of, _, short = name.rpartition(".")
         if short.isdigit():

@@ -180,7 +180,7 @@ class Instance:
 
     @classmethod
     def of(cls, keyword: Keyword, parts: dict[str, Scope]) -> Instance:
-        """From *INSTANCE and its data lines: a translation, then a turn about an axis through two points."""
+        """Read *INSTANCE and its data lines: a translation, then a rotation about an axis through two points."""
         name = keyword.option("PART")
         if name.upper() not in parts:
             raise InputError(f"{keyword}: expected PART= one of {', '.join(parts) or 'none'}, found {name}")
@@ -208,13 +208,13 @@ class Instance:
         return instance
 
     def points(self) -> Array:
-        """(p, 3) of its nodes, in the assembly."""
+        """Return the nodes (p, 3) of the instance in the assembly."""
         own = np.array(list(self.scope.nodes.values()), dtype=np.float64).reshape(-1, 3) + self.moved
         return self.center + self.rotation.apply(own - self.center) if len(own) else own
 
 
 class Deck:
-    """What a deck says, gathered keyword by keyword: in `instances` those of parts, in `assembly` all else."""
+    """Content of a deck, gathered keyword by keyword: parts in `instances`, all else in `assembly`."""
 
     def __init__(self, path: Path) -> None:
         self.parts: dict[str, Scope] = {}

@@ -100,7 +100,7 @@ _BLOCK = 20_000  # cells integrated at a time
 
 @lru_cache
 def reference_nodes(cell: CellName, degree: int) -> Array:
-    """(v, 3) nodes on the reference cell: corners, then middles of edges, faces and (hexahedra) the cell."""
+    """Return nodes (v, 3) of the reference cell: corners, then middles of edges, faces and (hexahedra) the cell."""
     shape = CELLS[cell]
     if degree == 1:
         return shape.corners
@@ -128,7 +128,7 @@ def _of_nodes(cell: CellName, degree: int) -> Array:
 
 
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
-    """(c, q, 3, 3) derivatives ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
+    """Return derivatives (c, q, 3, 3) ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
     slopes = _monomial_slopes(cell, degree, X) @ _of_nodes(cell, degree)  # (3, q, v)
     return np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
 
@@ -159,7 +159,7 @@ def _gauss(cell: CellName, count: int) -> tuple[Array, Array]:
 
 
 def cell_quality(corners: Array, cell: CellName) -> Array:
-    """(c,) 1 for regular tetrahedra and cubes, 0 for flat cells; `corners` (c, v, 3).
+    """Return quality (c,) of cells with `corners` (c, v, 3): 1 for regular tetrahedra and cubes, 0 for flat cells.
 
     Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
     a hexahedron's Jacobian relative to the product of its edges.

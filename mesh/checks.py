@@ -32,7 +32,7 @@ _LENGTHS = (0.2, 5.0)
 
 
 def check_size(size: float, volume: float, where: str) -> float:
-    """How many tetrahedra of about `size` (m) fill a `volume` (m³). Raises `InputError` for more than `MOST_CELLS`."""
+    """Return the number of tetrahedra of `size` (m) in `volume` (m³). Raises `InputError` above `MOST_CELLS`."""
     cubes = volume / size**3
     side = cubes ** (1 / 3) * size
     count = 6 * 2**0.5 * cubes  # regular tetrahedra

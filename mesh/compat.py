@@ -85,7 +85,7 @@ def cell_name(mesh: Mesh) -> str:
 
 
 def geometry_nodes(mesh: Mesh) -> Integers:
-    """(c, v) nodes of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; its corners come first."""
+    """Return nodes (c, v) of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; corners first."""
     dofmap = mesh.geometry.dofmap
     cells = mesh.topology.index_map(mesh.topology.dim).size_local
     if not _OLD:
@@ -113,7 +113,7 @@ def lagrange_element(space: FunctionSpace) -> basix.finite_element.FiniteElement
 
 
 def node_map(space: FunctionSpace) -> Integers:
-    """(c, d) nodes of each cell of this process, ghosts too; component i of node k is degree of freedom 3k + i."""
+    """Return nodes (c, d) of cells of this process, ghosts too; degree of freedom 3k + i is component i of node k."""
     nodes = space.dofmap.list
     return np.asarray(nodes.array if _OLD else nodes, dtype=np.int64).reshape(-1, lagrange_element(space).dim)
 

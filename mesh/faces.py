@@ -75,7 +75,7 @@ class SmoothFace:
 
     @classmethod
     def of(cls, boundary: Boundary, facets: Choice) -> SmoothFace:
-        """From the facets that it consists of."""
+        """Make a face from its facets."""
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]
         normal = weights @ normals
@@ -94,7 +94,7 @@ class SmoothFace:
         return size > 0.5 and bool(self.normal @ direction > _ALONG * size)
 
     def distance(self, boundary: Boundary, position: Array) -> float:
-        """From `position` (3,) to the nearest of its facets, roughly; of a bore, to its center."""
+        """Return the approximate distance, m, from `position` (3,) to the nearest facet; of a bore, to its center."""
         if self.axis is not None:
             return float(np.linalg.norm(self.center - position))
         normals, centroids = boundary.normal[self.facets], boundary.centroid[self.facets]

@@ -70,7 +70,7 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
 
 
 def installed_forms() -> Path:
-    """Those of the installation, in a folder for each kind."""
+    """Return the folder of compiled forms in the installation, with a folder for each kind."""
     return Path(sys.prefix, "share", "ffrobot", "forms")
 
 

@@ -25,7 +25,7 @@ class Frame:
 
     @classmethod
     def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> Frame:
-        """From `points` (3, 3): the origin, one on the axis `axes[0]` from there, one on the side of `axes[1]`.
+        """Make a frame from `points` (3, 3): origin, a point on the axis `axes[0]`, a point on the side of `axes[1]`.
 
         `axes` are in cyclic order: "xy", "yz" or "zx". Raises `ValueError` for three points on one line.
         """
@@ -39,7 +39,7 @@ class Frame:
         return cls(origin, np.stack([unit.get(axis, c) for axis in "xyz"], axis=1), kind)
 
     def points(self, coordinates: Array) -> Array:
-        """(p, 3) global coordinates of points with `coordinates` (p, 3) in this frame."""
+        """Return global coordinates (p, 3) of points with `coordinates` (p, 3) in this frame."""
         a, b, c = np.asarray(coordinates, dtype=np.float64).T
         if self.kind == "rectangular":
             local = np.stack([a, b, c], axis=1)

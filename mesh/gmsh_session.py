@@ -66,7 +66,7 @@ def _stdout_captured() -> Iterator[Callable[[], str]]:
 
 
 def volume_and_surface() -> tuple[float, float]:
-    """Of all volumes of the model, and of the faces of these, in the model's units."""
+    """Return volume of the model and area of its faces, in the model's units."""
     occ = gmsh.model.occ
     faces = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
     return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)

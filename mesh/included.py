@@ -58,7 +58,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def text_of(file: Path) -> str:
-    """What stands in a file of UTF-8, or of UTF-16 where it begins with a byte order mark that says so."""
+    """Return the text of a file in UTF-8, or in UTF-16 if a byte order mark declares it."""
     content = file.read_bytes()
     encoding = "utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     return content.decode(encoding, errors="replace")

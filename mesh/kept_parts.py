@@ -48,7 +48,7 @@ def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
 
 
 def kept_path(tables: PartTables) -> Path:
-    """Where in the cache the mesh of a part is, or would be."""
+    """Return the path of a part's mesh in the cache, existing or not."""
     file = tables.geometry.file
     content = {
         "code": digest_of_mesh_code(),

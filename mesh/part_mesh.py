@@ -40,16 +40,16 @@ class PartMesh:
 
     @property
     def corners(self) -> Integers:
-        """(c, 4 or 8) corners of each cell."""
+        """Corners (c, 4 or 8) of each cell."""
         return self.cells[:, : len(self.shape.corners)]
 
     def moved(self, points: Array) -> PartMesh:
-        """The same mesh at other `points` (p, 3)."""
+        """Return the mesh with other `points` (p, 3), m."""
         return replace(self, points=points)
 
 
 def facet_keys(facets: Integers, points: int) -> Integers:
-    """(f,) a number for each of `facets` (f, 3 or 4) that tells it among all facets of a mesh of so many `points`.
+    """Return numbers (f,) that identify `facets` (f, 3 or 4) of a mesh with that many `points`.
 
     The three smallest of its corners identify a facet of either shape.
     """
@@ -58,7 +58,7 @@ def facet_keys(facets: Integers, points: int) -> Integers:
 
 
 def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
-    """Of facets that only one cell has: (b, 3 or 4) corners, counter-clockwise from outside, and (b,) their cells."""
+    """Return corners (b, 3 or 4) of facets of one cell only, counter-clockwise from outside, and their cells (b,)."""
     facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
     _, first, count = np.unique(facet_keys(facets, len(part.points)), return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])

@@ -36,7 +36,7 @@ class RectangleSection(Record):
 
 
 class CircleSection(Record):
-    """Solid circle."""
+    """Solid circular section."""
 
     shape: Literal["circle"]
     diameter: Positive
@@ -44,7 +44,7 @@ class CircleSection(Record):
 
 
 class TubeSection(Record):
-    """Circular tube."""
+    """Circular tube section."""
 
     shape: Literal["tube"]
     outer: Positive

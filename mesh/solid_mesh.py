@@ -60,7 +60,7 @@ def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
 
 
 def reference_facets(mesh: Mesh) -> Integers:
-    """(m, 3 or 4) corners of each facet of the reference cell, in dolfinx's order."""
+    """Return corners (m, 3 or 4) of each facet of the reference cell, in dolfinx's order."""
     return np.array(basix.topology(coordinate_element(mesh).cell_type)[2])
 
 

@@ -40,7 +40,7 @@ class PointMass:
 
 @struct
 class RawMesh:
-    """What a source gives."""
+    """Mesh as read from a source."""
 
     points: Array  # (p, 3) in the source's unit and axes; some may belong to no volume
     blocks: Sequence[tuple[str, Integers]]  # of volume elements: type, (c, v) points
@@ -80,7 +80,7 @@ class MeshBlocks:
             self.facets[name].append(corners[members])
 
     def mesh(self, points: Array, point_groups: Mapping[str, Integers], remarks: Iterable[str] = ()) -> RawMesh:
-        """Of elements that have these points (p, 3)."""
+        """Make the mesh of the collected elements on points (p, 3)."""
         regions = {name: np.concatenate(members) for name, members in self.regions.items()}
         groups = regions, self.facets, point_groups
         return RawMesh(points, self.blocks, *groups, self.surfaces, self.lines, tuple(remarks))

@@ -47,7 +47,7 @@ COINCIDENT = 1e-9
 
 
 def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
-    """(elements + 1,) ascending nodes, m, of so many `elements`, with a node at each of `breakpoints` (s + 1,).
+    """Return ascending nodes (elements + 1,), m, with a node at each of `breakpoints` (s + 1,).
 
     Within a segment the elements are equal; they are shared out so that the longest is as short as possible. A uniform
     mesh that meets all breakpoints is therefore kept. Raises `ValueError` for fewer elements than segments.
