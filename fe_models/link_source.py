@@ -24,7 +24,7 @@ LinkSource = Path | LinkTable
 
 
 def link_path(source: LinkSource) -> Path:
-    """What messages call a link."""
+    """Return the path of a link for messages."""
     return source.path if isinstance(source, LinkTable) else source
 
 

@@ -18,7 +18,7 @@ OVERDAMPED = 1.0  # damping ratio: links have less
 
 
 def remarks_on_link(link: Link, label: str) -> Iterator[str]:
-    """Of a link, which `label` names: its length, its material, its damping."""
+    """Yield remarks on length, material and damping of a link, which `label` names."""
     yield from remarks_on_length(link.geometry.length, label)
     if (ratio := float(np.max(link.damping.ratio or 0.0))) >= OVERDAMPED:
         yield f"{label}: a damping ratio of {ratio:g} is above critical damping, 1: is it in percent?"
@@ -56,6 +56,6 @@ def _beam(link: BeamLink, label: str) -> Iterator[str]:
 
 
 def remarks_on_length(length: float, label: str) -> Iterator[str]:
-    """Of a length in m of what `label` names."""
+    """Yield a remark on an implausible length, m, of what `label` names."""
     if length > LONGEST:
         yield f"{label} is {length:g} m long: units are SI; is this in mm?"

@@ -42,7 +42,7 @@ POINTS = 5  # Gauss points of an element: exact, since of cubics no product is o
 def geometric_stiffness(
     link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]
 ) -> dict[str, Array]:
-    """(n, n) K by unit load (`unit_loads`), of the link as its reference condition holds it.
+    """Return geometric stiffness (n, n) by unit load (`unit_loads`), under the link's reference condition.
 
     `fields` (6, k, n) are rows U_X … R_Z at k stations; every interface, at its m from the root, is a vertex of their
     mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
@@ -87,7 +87,7 @@ def _products(values: Array, slopes: Array) -> Array:
 def section_forces(
     link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Sequence[tuple[Property, Sequence[float]]]
 ) -> dict[str, Array]:
-    """(6, g) n and m at x (g,) in the straight link under each unit load, as its reference condition holds it.
+    """Return force and moment (6, g) at x (g,) in the straight link by unit load, under its reference condition.
 
     Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
     """
@@ -102,7 +102,7 @@ def section_forces(
 
 
 def of_load(load: Array, arm: Array) -> Array:
-    """(6, g) of forces and moments, (6, 1) or (6, g), that act further along the axis by arm (g,)."""
+    """Return force and moment (6, g), from `load` (6, 1) or (6, g), that acts a distance `arm` (g,) further along x."""
     force, moment = load[:3] * np.ones_like(arm), load[3:]
     return np.concatenate([force, moment + _lever(force * arm)])
 
@@ -113,7 +113,7 @@ def _lever(force: Array) -> Array:
 
 
 def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
-    """(6, g) of the forces across with which a support at the tip takes moments about the root, (6, 1) or (6, g)."""
+    """Return (6, g) of the lateral forces with which a tip support bears moments `at_root`, (6, 1) or (6, g)."""
     L, none = link.geometry.length, np.zeros_like(at_root[0])
     return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 

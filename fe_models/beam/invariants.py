@@ -71,5 +71,5 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
 
 
 def weighted(link: BeamLink, stations: Functions, moment: Property, rho: float) -> sp.csr_matrix:
-    """(k, k): ∫ρ·moment·a b dx of two fields a, b at the stations."""
+    """Return the matrix (k, k) of ∫ρ·moment·a b dx for two fields a, b at the stations."""
     return gram(stations.root(cellwise(link, stations.nodes, lambda s: rho * moment(s))))

@@ -30,16 +30,16 @@ class Functions:
 
     @property
     def degree(self) -> int:
-        """Of the polynomials."""
+        """Degree of the polynomials."""
         return len(self.powers) - 1
 
     @property
     def lengths(self) -> Array:
-        """(e,) of the elements, in m."""
+        """Lengths (e,) of the elements, m."""
         return np.diff(self.nodes)
 
     def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
-        """(k, size): values, or a derivative by x, at points x (k,) of the axis."""
+        """Return the matrix (k, size) of values, or of a derivative by x, at points x (k,) of the axis."""
         cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
         return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
 
@@ -71,7 +71,7 @@ def gram(B: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def lagrange(nodes: Array, degree: int) -> Functions:
-    """Of degree 2 or 3, by their values at the Gauss–Lobatto points of each element between `nodes` (e + 1,)."""
+    """Return polynomials of degree 2 or 3 by values at Gauss–Lobatto points of elements between `nodes` (e + 1,)."""
     inner = {2: [0.0], 3: [-np.sqrt(0.2), np.sqrt(0.2)]}[degree]
     X = 0.5 * (1.0 + np.array([-1.0, *inner, 1.0]))
     element = degree * np.arange(nodes.size - 1)[:, None] + np.arange(degree + 1)
@@ -87,5 +87,5 @@ def hermite(nodes: Array) -> Functions:
 
 
 def on_axis(x: Array) -> Array:
-    """(k, 3) points of the axis at x (k,)."""
+    """Return points (k, 3) of the axis at x (k,)."""
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)

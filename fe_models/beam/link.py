@@ -190,7 +190,7 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
 
 
 def select_default(models: Mapping[Family, FamilyModel]) -> list[Mode]:
-    """As many of each family as a link with attachment modes has by default, ascending."""
+    """Select the default number of modes of each family for a link with attachment modes, ascending."""
     modes = []
     for family, model in models.items():
         count = min(DEFAULT_COUNT[family], model.K.shape[0])
@@ -209,7 +209,7 @@ def _together(model: FamilyModel, family: Family, modes: Sequence[Mode]) -> Arra
 
 
 def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Array:
-    """(6, k, n) displacement and rotation, rows U_X … R_Z, of n modes at k stations."""
+    """Return displacement and rotation (6, k, n), rows U_X … R_Z, of n modes at k stations."""
     fields = np.zeros((6, stations, len(modes)))
     for k, mode in enumerate(modes):
         for row, values in models[mode.family].fields.items():
@@ -218,7 +218,7 @@ def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], 
 
 
 def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> Array:
-    """(n, n) m_ff = xᵀMx as assembled; families do not couple."""
+    """Return m_ff (n, n) = xᵀMx as assembled; families do not couple."""
     products = np.zeros((len(modes), len(modes)))
     for i, one in enumerate(modes):
         for j, other in enumerate(modes[: i + 1]):

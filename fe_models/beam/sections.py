@@ -31,12 +31,12 @@ def rod_properties(link: BeamLink, family: Family) -> tuple[Property, Property]:
 
 
 def second_moment(family: Family) -> Property:
-    """Of area in m⁴, for bending."""
+    """Return the second moment of area for bending of that family, m⁴."""
     return (lambda s: s.I_yy) if family == "in-plane-bending" else (lambda s: s.I_zz)
 
 
 def cellwise(link: BeamLink, nodes: Array, quantity: Property) -> Array:
-    """(e,) of the section of each element between `nodes` (e + 1,)."""
+    """Return a section property (e,) of each element between `nodes` (e + 1,)."""
     segment = np.searchsorted(link.geometry.breakpoints[1:-1], 0.5 * (nodes[1:] + nodes[:-1]))
     return np.array([quantity(section) for section in link.sections])[segment]
 
@@ -45,7 +45,7 @@ ROUND_CORNERS = 16  # of the polygon that stands for a circle; divisible by 4
 
 
 def section_outlines(sections: Sequence[SectionRecord]) -> Array:
-    """(s, q, 2) corners (y, z) in m of each section's outer outline, the same number of all, counter-clockwise about x.
+    """Return corners (s, q, 2), (y, z) in m, of each section's outer outline, counter-clockwise about x.
 
     Four where all are rectangles; otherwise rectangles have further ones along their sides.
     """

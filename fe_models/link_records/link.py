@@ -66,7 +66,7 @@ class SurfacePatches(Record):
         return [(center - self.length / 2, center + self.length / 2) for center in centers]
 
     def outlines(self, length: float) -> Outlines:
-        """What the mesh of a solid of `length` (m) outlines for them."""
+        """Return the outlines of the patches in the mesh of a solid of `length` (m)."""
         return Outlines(tuple(self.edges(length)), self.width, self.faces)
 
 
@@ -74,7 +74,7 @@ Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
 
 
 class Material(Record):
-    """Linear elastic, isotropic."""
+    """Linear elastic, isotropic material."""
 
     youngs_modulus: Positive
     """Young's modulus E, Pa."""
@@ -122,7 +122,7 @@ class Region(Record):
 
 
 class BeamModel(Record):
-    """Beam theory."""
+    """Beam theory of a link."""
 
     theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
     """Beam theory: without shear, or with shear and rotary inertia of the sections."""
@@ -276,17 +276,17 @@ class SolidLink(_Link):
 
     @property
     def coupling(self) -> Coupling:
-        """How the supports of the reference condition hold the end faces."""
+        """How supports of the reference condition constrain the end faces."""
         return self.reference.coupling or ("rigid" if self.reference.holds_root else "mean")
 
     def part(self, path: Path) -> PartTables:
-        """What its mesh is made of; `path` is the link file."""
+        """Return the tables that determine the mesh; `path` is the link file."""
         outlines = self.surface_patch.outlines(self.geometry.length) if self.surface_patch else None
         return PartTables(path, self.geometry, self.mesh, self.interface, outlines)
 
     @property
     def couplings(self) -> dict[str, Coupling]:
-        """How each interface takes its face along: "rigid" or "mean"; cross sections inside always by their mean.
+        """Coupling of each interface to its face, "rigid" or "mean"; interior cross sections always by their mean.
 
         The others follow [reference] where they do not say it themselves; a tip that nothing holds has its mean.
         """

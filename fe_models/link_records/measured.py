@@ -37,7 +37,7 @@ class MeasuredMode:
 
     @property
     def label(self) -> str:
-        """What messages and tables call the mode."""
+        """Name of the mode in messages and tables."""
         return f"{self.family} {self.number}" if self.family else f"mode {self.number}"
 
 

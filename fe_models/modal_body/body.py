@@ -130,7 +130,7 @@ class ModalBody(Integrals, Frozen):
 
     @property
     def eigenmode_count(self) -> int:
-        """Number of eigenmodes."""
+        """Number of eigenmodes, which come before attachment modes."""
         return self.mode_count - int(self.residual.sum())
 
     @property

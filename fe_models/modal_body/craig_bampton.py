@@ -52,7 +52,7 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
 
 @struct
 class InterfaceCoordinates:
-    """What the modes of a body make of interface motion."""
+    """Interface coordinates of the modes of a body."""
 
     names: list[str]  # of the c coordinates d: "tip/y" … "tip/rz", of interfaces other than the root
     rows: Array  # (c, n) d = rows p
@@ -66,7 +66,7 @@ INDEPENDENT = 1e-6  # singular values of interface coordinates, each scaled to 1
 
 
 def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping[str, Interface]) -> int:
-    """How many of n modes stand for unit motions of interfaces; 0 where interfaces cannot move so by themselves.
+    """Return how many of n modes are constraint modes (unit motions of interfaces); 0 if interfaces cannot move so.
 
     For bodies of other programs, whose modes say no more than ω² (n,), families, and what they do at interfaces.
     """
@@ -87,7 +87,7 @@ def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping
 def interface_coordinates(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> InterfaceCoordinates:
-    """From ω² and families of n modes, the number of static shapes among them, and what all do at interfaces.
+    """Return interface coordinates from ω² and families of n modes and the number of `static` shapes.
 
     Raises `InputError` for interfaces so near to each other that they cannot move by themselves.
     """
@@ -138,7 +138,7 @@ class CraigBampton:
 
 
 def craig_bampton(body: ModalBody) -> CraigBampton:
-    """Of a body with reference condition "craig-bampton", from its invariants: nothing new is approximated."""
+    """Return Craig–Bampton matrices of a body with that reference condition, exactly from its invariants."""
     omega2 = np.diag(body.stiffness)
     static = body.mode_count - body.eigenmode_count
     coordinates = interface_coordinates(omega2, body.family, static, body.interfaces)

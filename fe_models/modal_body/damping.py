@@ -9,7 +9,7 @@ from ..link_records.link import Link
 
 
 def damping_ratio(link: Link, omega: Array) -> Array:
-    """(n,) ζ as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2.
+    """Return ζ (n,) as given, or of Rayleigh damping D = aM + bK: ζ = a/(2ω) + bω/2.
 
     A list is for the eigenmodes: its last number is that of the attachment modes, too.
     """
@@ -23,7 +23,7 @@ def damping_ratio(link: Link, omega: Array) -> Array:
 
 
 def canonical_signs(fields: Array) -> Array:
-    """(n,) 1 or −1, to multiply each mode by; `fields` (6, k, n) as in `station_fields`, root first.
+    """Return factors 1 or −1 (n,) of each mode; `fields` (6, k, n) as in `station_fields`, root first.
 
     The dominant translation is then positive at the station nearest the root where it exceeds half its largest value;
     of a mode without translation, the dominant rotation.

@@ -11,7 +11,7 @@ from .parts import Stations
 
 
 class AlongAxis(NamedTuple):
-    """What the n modes do at m places of the axis: `position` (m, 3), `translation` and `rotation` (m, 3, n)."""
+    """Modes at m points of the axis: `position` (m, 3), m; `translation` and `rotation` (m, 3, n)."""
 
     position: Array
     translation: Array
@@ -19,7 +19,7 @@ class AlongAxis(NamedTuple):
 
 
 def interpolate(stations: Stations, x: Array) -> AlongAxis:
-    """What the modes do at `x` (m,) from the root, within the stations, on the axis: see `ModalBody.interpolate`."""
+    """Return the modes at `x` (m,), m from the root, within the stations; see `ModalBody.interpolate`."""
     element = stations.element
     if element is None:
         return _hermite(stations, x)

@@ -42,7 +42,7 @@ def eigensolver(solver: Solver) -> str:
 
 
 class Product(Protocol):
-    """A matrix."""
+    """Product of a matrix with vectors."""
 
     def __matmul__(self, U: Array) -> Array:
         """Its product with U (m, k)."""
@@ -85,7 +85,7 @@ class KrylovSchur:
         return X
 
     def candidates(self, count: int) -> Array:
-        """The same, but of several alike one may be missing: `complete` finds out.
+        """Return the lowest modes; one of several equal ones may be missing, which `complete` finds.
 
         Raises `SolveError` where there are not as many but for round-off, or too few converge.
         """

@@ -37,7 +37,7 @@ class Lump:
 
     @property
     def weights(self) -> Array:
-        """(6,) m, m, m, J_x, J_y, J_z: M gains Bᵀ diag(weights) B, B (6, dofs) the motion of the interface."""
+        """Weights (6,) m, m, m, J_x, J_y, J_z: M gains Bᵀ diag(weights) B, B (6, dofs) the motion of the interface."""
         return lump_weights(self.mass, self.inertia)
 
     @property
@@ -47,7 +47,7 @@ class Lump:
 
 
 def lump_weights(mass: float, inertia: Iterable[float]) -> Array:
-    """(6,) what multiplies the squares of the three velocities and three angular velocities of an interface."""
+    """Return weights (6,) of the squared velocities and angular velocities of an interface, kg and kg·m²."""
     return np.array([mass, mass, mass, *inertia])
 
 
@@ -84,7 +84,7 @@ def with_added(integrals: Of, added: Mapping[str, Any]) -> Of:
 
 
 def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> dict[str, Any]:
-    """What a rigid mass adds to the integrals of these names.
+    """Return what a rigid mass adds to the integrals of these names.
 
     It is m (kg) with its center at x (3,) and E = ∫ρ ξ ξᵀ dV about it. The center moves by Φ p, its points by (φ p) × ξ
     more; Φ and φ are (3, n).
@@ -101,7 +101,7 @@ def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> 
 
 
 def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
-    """What is linear in the loads of a link (geometric stiffness, static stress), the inertia of the lumps included.
+    """Return quantities linear in the loads of a link (geometric stiffness, static stress), including lumps' inertia.
 
     A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves:
     `of_loads` has an array for each unit load (`unit_loads`) of the bare link.
@@ -128,7 +128,7 @@ def with_lumped_stiffness(matrices: Mapping[str, Array], attached: Iterable[Lump
 
 
 def of_turning(E: Array, products: Array) -> dict[str, Array]:
-    """(n, n) by load: geometric stiffness of d'Alembert's loads on a rigid body that turns to second order.
+    """Return geometric stiffness (n, n) by load: d'Alembert's loads on a rigid body that turns, to second order.
 
     A point d from its center moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ φ·d = pᵀG p are
     K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md). E (3, 3)

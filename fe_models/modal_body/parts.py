@@ -38,7 +38,7 @@ class Integrals:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Invariants(Integrals):
-    """With the inertia of lines of mass about their axis, along which φ is the twist of the modes."""
+    """Integrals with the inertia of lines of mass about their axis, along which φ is the twist of the modes."""
 
     J_spin: float  # J_s = ∫ρI_p dx in kg·m²
     h_spin: Array  # (n,) h_s = ∫ρI_p φ dx
@@ -77,7 +77,7 @@ def _frozen(value: object) -> object:
 
 @struct
 class Interface(Frozen):
-    """What the modes do at one point of the axis, in the link's frame."""
+    """Modes at one point of the axis, in the link's frame."""
 
     position: Array  # (3,) in m, undeformed
     translation: Array  # (3, n) displacement of mode l in column l, in m per unit of its modal coordinate
@@ -111,7 +111,7 @@ class Stations(Frozen):
 
 @struct
 class PictureMesh(Frozen):
-    """What a picture of the link needs."""
+    """Mesh of the link for pictures, with its mode shapes."""
 
     points: Array  # (p, 3) in m
     cells: Integers  # (c, v) points of each cell
@@ -135,14 +135,14 @@ class StressPoint(Frozen):
 
 @struct
 class MeasuredValues(Frozen):
-    """Which values of the modes were measured, and what the finite element model says in the place of frequencies."""
+    """Measured values of the modes, and the frequencies of the finite element model."""
 
     frequency: Integers  # (n,) 1 of modes whose `ModalBody.frequency` was measured, else 0
     damping_ratio: Integers  # (n,) likewise, of `ModalBody.damping_ratio`
     computed_frequency: Array  # (n,) in Hz, of the finite element model
 
     def in_words(self) -> str:
-        """Which modes they are, counted from 1."""
+        """Return which modes are measured as text, counted from 1."""
         found = {"frequencies": self.frequency, "damping ratios": self.damping_ratio}
         numbers = {what: np.flatnonzero(flags) + 1 for what, flags in found.items()}
         parts = [f"{what} of modes {', '.join(map(str, of))}" for what, of in numbers.items() if len(of)]

@@ -57,7 +57,7 @@ def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> dict[str, Array]:
 def work_on_modes(
     S_bar: Array, I_bar: Array, interfaces: Mapping[str, Interface], h_spin: Array | None = None
 ) -> dict[str, Array]:
-    """(n,) modal forces Φᵀb of each unit load b, from the invariants of a link and what its modes do at interfaces.
+    """Return modal forces Φᵀb (n,) of each unit load b, from invariants of a link and modes at interfaces.
 
     `h_spin` (n,) = ∫ρI_p φ dx of a line of mass, which Ī does not have.
     """

@@ -33,7 +33,7 @@ def attachment_modes(
     length: float,
     twists_along: bool,
 ) -> ModeSet:
-    """Those of the loads that belong to `families`; collective.
+    """Return attachment modes of the loads that belong to `families`; collective.
 
     `loads` and `shapes` (3 owned,) are as `invariants.unit_loads` and `static_shapes` find them, `mass` has what is
     attached; `length` and `twists_along` as of `beam.attachment_modes`.
@@ -58,7 +58,7 @@ def attachment_modes(
 
 
 class FixedInterfaceFlexibility:
-    """Of a body whose interfaces rest, as `Flexibility`; vectors hold this rank's own degrees of freedom.
+    """`Flexibility` of a body with fixed interfaces; vectors contain this rank's own degrees of freedom.
 
     `flexibility` is that under the supports of the root, B (c, 3 owned) are the `rows` of what is held besides.
     """

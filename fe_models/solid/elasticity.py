@@ -30,7 +30,7 @@ AnyMaterial = Material | OrthotropicMaterial
 
 @struct
 class MaterialMap:
-    """Which material each cell of this rank (ghosts too) is made of."""
+    """Material of each cell of this rank, ghosts included."""
 
     C: Array  # (r, 6, 6) stiffness of each material, as in `constitutive.stiffness`
     density: Array  # (r,) in kg/m³
@@ -98,7 +98,7 @@ class SolidModel:
         return result
 
     def to_owners(self, parts: Array) -> Array:
-        """(r, owned) of (r, owned + ghosts): what several processes have for a node is added; collective."""
+        """Return (r, owned) of (r, owned + ghosts): contributions of all processes to a node added; collective."""
         if self.comm.size == 1:
             return parts
         seen = np.arange(parts.shape[1], dtype=PETSc.IntType)
@@ -113,7 +113,7 @@ class SolidModel:
         return result
 
     def with_ghosts(self, U: Array) -> Array:
-        """(3 (owned + ghosts), n) degrees of freedom of U (3 owned, n), ghosts from their owners; collective."""
+        """Extend U (3 owned, n) to (3 (owned + ghosts), n), ghosts from their owners; collective."""
         if self.comm.size == 1:
             return U
         function = fem.Function(self.V)

@@ -33,11 +33,11 @@ class SectionShapes:
     families: tuple[Array, ...]  # by the order of `FAMILIES`, (rows, n) each
 
     def energy(self) -> Array:
-        """(4, n) share of each family in the modal mass."""
+        """Share (4, n) of each family in the modal mass."""
         return np.array([np.sum(rows**2, axis=0) for rows in self.families])
 
     def turned(self, Q: Array) -> SectionShapes:
-        """Of the modes Φ Q."""
+        """Return the shapes of the modes Φ Q."""
         return SectionShapes(tuple(rows @ Q for rows in self.families))
 
 
@@ -76,7 +76,7 @@ def names(motion: SectionShapes) -> list[str]:
 
 
 def aligned(omega2: Array, motion: SectionShapes, wanted: Sequence[str] | str) -> Array:
-    """(n, n) Q that turns modes of equal frequency into the families, so that the basis is reproducible; orthogonal.
+    """Return Q (n, n), orthogonal, that rotates modes of equal frequency to the families: a reproducible basis.
 
     `omega2` (n,) is ascending, `motion` that of the modes. For `wanted` families (not "all") modes of nearly equal
     frequency are turned too: into Ritz vectors, of which one has all that the cluster has of a family.

@@ -41,7 +41,7 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
 
 
 def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, Array]:
-    """(3 owned,) consistent nodal forces of each unit load (docs/theory.md, Geometric stiffness); collective.
+    """Return consistent nodal forces (3 owned,) of each unit load (docs/theory.md, Geometric stiffness); collective.
 
     D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and ω_y
     ω_x together), and unit forces and moments at interfaces, which the transpose of their mean motion B (6, 3 owned)
@@ -57,7 +57,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, 
 
 
 def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[str, Array]:
-    """(3 owned,) displacements under each of the `unit_loads`, the body held by its reference condition; collective."""
+    """Return displacements (3 owned,) under each of the `unit_loads`, under the reference condition; collective."""
     model = flexibility.model
     forces = np.stack(list(loads.values()), axis=1)
     displacements = flexibility @ forces
@@ -67,7 +67,7 @@ def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[
 
 
 def prestressed(model: SolidModel, modes: Array, shapes: Mapping[str, Array]) -> dict[str, Array]:
-    """(n, n) geometric stiffness by unit load of `modes` (3 owned, n), by its `static_shapes`; collective."""
+    """Return geometric stiffness (n, n) by unit load of `modes` (3 owned, n), by its `static_shapes`; collective."""
     displacements = np.stack(list(shapes.values()), axis=1)
     matrices = geometric_stiffness(model, model.with_ghosts(modes), model.with_ghosts(displacements))
     return dict(zip(shapes, matrices, strict=True))

@@ -55,7 +55,7 @@ class Interfaces(NamedTuple):
     couplings: dict[str, Coupling]
 
     def motion(self, model: SolidModel, modes: Array) -> dict[str, Interface]:
-        """What `modes` (3 (owned + ghosts), n) do at each; collective."""
+        """Return the motion of each interface in `modes` (3 (owned + ghosts), n); collective."""
         interfaces = {}
         for name, averages in self.averages.items():
             translation, rotation = averages.of(model, modes)

@@ -37,11 +37,11 @@ class Gradients:
     shapes: Array  # (3, q, d) slopes of the shape functions on the reference cell
 
     def only(self, fields: slice) -> Gradients:
-        """Of some of the fields."""
+        """Return the gradients of some of the fields."""
         return replace(self, values=self.values[..., fields])
 
     def forces(self, stress: Array) -> Array:
-        """(c, d, 3, k) ∫ σ : ∇N_a dV at the nodes of each cell, of stresses (c, 6, q, k) times weights."""
+        """Return ∫ σ : ∇N_a dV (c, d, 3, k) at the nodes of each cell, of stresses (c, 6, q, k) times weights."""
         c, _, q, k = stress.shape
         tensor = np.empty((c, 3, q, 3, k))
         for row, (i, j) in enumerate(VOIGT):
@@ -54,7 +54,7 @@ class Gradients:
         return np.asarray(slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
 
     def strains(self) -> Array:
-        """(c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
+        """Strains (c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
         g = self.values
         rows = [g[:, j, :, i] if i == j else g[:, j, :, i] + g[:, i, :, j] for i, j in VOIGT]
         return np.stack(rows, axis=1)
@@ -94,13 +94,13 @@ def _at_points(inverse: Array, gradient: Array) -> Array:
 
 
 def stresses(model: SolidModel, piece: Gradients, strains: Array) -> Array:
-    """(c, 6, q, k) σ = C ε in the cells of `piece`."""
+    """Return stresses (c, 6, q, k) σ = C ε, Pa, in the cells of `piece`."""
     C = model.materials.C[model.materials.of_cell[piece.cells]]
     return np.asarray((C @ strains.reshape(*strains.shape[:2], -1)).reshape(strains.shape))
 
 
 def strain_energy(model: SolidModel, modes: Array) -> Array:
-    """(n, n) K_ff = ∫ ε(Φ_i) : C : ε(Φ_j) dV of `modes` (3 (owned + ghosts), n); collective."""
+    """Return K_ff (n, n) = ∫ ε(Φ_i) : C : ε(Φ_j) dV of `modes` (3 (owned + ghosts), n); collective."""
     n = modes.shape[1]
     total: Array = np.zeros((n, n))
     for piece in gradients(model, modes):
@@ -112,7 +112,7 @@ def strain_energy(model: SolidModel, modes: Array) -> Array:
 
 
 def internal_forces(model: SolidModel, fields: Array) -> Array:
-    """(3 owned, k) K u of displacements `fields` (3 (owned + ghosts), k), by their strains; collective."""
+    """Return K u (3 owned, k) of displacements `fields` (3 (owned + ghosts), k), from strains; collective."""
     k = fields.shape[1]
     nodes = node_map(model.V)
     total = np.zeros((fields.shape[0] // 3, 3 * k))
@@ -125,7 +125,7 @@ def internal_forces(model: SolidModel, fields: Array) -> Array:
 
 
 def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Array:
-    """(l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
+    """Return (l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
 
     Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
     Procedures, §6.2.3): positive where tension stiffens. `modes` (3 (owned + ghosts), n) are Φ, `prestress` (3 (owned +

@@ -31,7 +31,7 @@ NEWTON_STEPS = 10
 
 
 def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
-    """(q, 6, n) strains ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes at points of cells.
+    """Return strains (q, 6, n) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes at points of cells.
 
     `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (dofs, n) with ghosts.
     """
@@ -51,7 +51,7 @@ def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array)
 
 
 def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
-    """(q, 3, 3) J = ∂x/∂X at reference coordinates X (q, 3) in each of `cells` (q,)."""
+    """Return J (q, 3, 3) = ∂x/∂X at reference coordinates X (q, 3) in each of `cells` (q,)."""
     shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     return np.asarray(np.einsum("kqv,qvi->qik", shapes, corners))
@@ -87,7 +87,7 @@ def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers,
 
 
 def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
-    """(q, 3) reference coordinates of `points` (q, 3) in `cells` (q,); NaN where none are found, far outside cells."""
+    """Return reference coordinates (q, 3) of `points` (q, 3), m, in `cells` (q,); NaN if none, far outside cells."""
     element = coordinate_element(mesh)
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     X = np.full_like(points, 0.25)
@@ -109,7 +109,7 @@ INSIDE, ON_CURVED_FACE = 1e-6, 0.02
 def recovered_stresses(
     link: SolidLink, model: SolidModel, modes: Array, shapes: Mapping[str, Array], surface: Array, path: Path
 ) -> dict[str, Any]:
-    """What a link file asks for: `stress` … `surface_static` of its `ModalBody`.
+    """Compute the stresses that a link file requests: `stress` … `surface_static` of its `ModalBody`.
 
     `modes` (3 (owned + ghosts), n); `shapes` (3 owned,) static displacements by unit load; `surface` (p, 3) its points.
     """
@@ -151,7 +151,7 @@ def point_stresses(
 
 
 def surface_stresses(space: FunctionSpace, C: Array, modes: Array, points: Array) -> Array:
-    """(p, 6, n) modal stresses at `points` (p, 3), the same on all processes: those of the picture mesh.
+    """Return modal stresses (p, 6, n) at `points` (p, 3) of the picture mesh, the same on all processes.
 
     Raises `ValueError` for a point that is not on the mesh.
     """

@@ -102,7 +102,7 @@ class Flexibility:
         self._factor.release()
 
     def reactions(self, loads: Array) -> Array:
-        """(6, k) forces along the rows of B with which mean supports bear `loads` (3 owned, k); none of rigid faces."""
+        """Return reactions (6, k) along the rows of B of mean supports under `loads` (3 owned, k); none if rigid."""
         if self.B is None:
             return np.empty((0, loads.shape[1]))
         return np.asarray(-self._BR_inverse.T @ self.model.total(self.R.T @ loads))
