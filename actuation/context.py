@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @struct
 class ActuatedContext(Context):
-    """With the `patches` of links by body, the modal bodies of `links`, bodies `carrying` all their payloads."""
+    """Context with `patches` by body, modal bodies of `links`, and bodies `carrying` all their payloads."""
 
     _: KW_ONLY
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)

@@ -35,7 +35,7 @@ RINGING = 2.0  # times the static shift, of a force that is missing all at once
 
 @struct
 class Unsupplied:
-    """What motors, with the patches that there are, miss of a path whose modal forces nothing supplies."""
+    """Path error of motors and patches that cannot supply the modal forces of a path."""
 
     bodies: tuple[str, ...]  # links without patches or points, or with too few, for the modal forces that were found
     with_patches: bool  # whether any link has patches
@@ -55,12 +55,12 @@ class Unsupplied:
 
     @property
     def drift(self) -> str:
-        """What becomes of the error where the motors repeat their moments, in words."""
+        """Text on the growth of the error if the motors repeat their torques."""
         return f"unstable (growth rate {self.growth:.2g} 1/s)" if self.growth > 0.0 else "drifting"
 
     @property
     def in_words(self) -> str:
-        """What it means, and what to do."""
+        """Explanation and remedies as text."""
         links = [
             f"{body} ({families}), off by {_length(deflection)}{_turn(turn)}"
             for body, families, deflection, turn in zip(
@@ -89,7 +89,7 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 
 
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
-    """The same of one point at these rows, where motors keep their moments: the robot recoils by γ.
+    """Return the shift (T, 3), m, of a point at these rows if motors keep their torques: the robot recoils by γ.
 
     δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still, and no momentum
     comes from within.
@@ -102,7 +102,7 @@ def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices)
 
 
 def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> Unsupplied:
-    """With what modal forces r (T, n) that are left do to these points: `point` is the one that is farthest off."""
+    """Add the shift of points by unmet modal forces r (T, n); `point` becomes the one with the largest error."""
     shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(run, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
     kept, step = shift[point], max(1, len(run.time) // ROWS)
@@ -154,7 +154,7 @@ MOST_PATCHES = 200  # that are tried on one link
 
 @struct
 class Remedies:
-    """What alone would make the patches suffice; infinite or 0 where the word has no meaning."""
+    """Single changes with which the patches suffice; infinite or 0 if there is none."""
 
     limit: float  # largest voltage, V, of the patch that needs most
     layers: int  # number of layers of the same thickness, at the same voltage
@@ -167,7 +167,7 @@ class Remedies:
 
 @struct
 class PatchFeasibility:
-    """What is asked of the patches of one body in one analysis; k patches, n modes, peaks over time."""
+    """Requirements on the patches of one body in one analysis; k patches, n modes, peaks over time."""
 
     # required_moment, available_moment: (k,) N·m, c times the required voltage, c times the limit
     required_moment: Array
@@ -188,18 +188,18 @@ class PatchFeasibility:
 
     @cached_property
     def remedies(self) -> Remedies:
-        """What would do; found when it is asked for, as it takes longer than all else."""
+        """Single changes with which the patches suffice, computed on request."""
         return self.find_remedies()
 
     @property
     def factor(self) -> Array:
-        """(k,) required over available moment, slew rate or current: above 1 the patch cannot do it."""
+        """Required over available torque, slew rate or current (k,); the patch suffices up to 1."""
         rates = np.maximum(self.slew / self.slew_limit, self.current / self.current_limit)
         return np.maximum(self.required_moment / self.available_moment, rates)
 
     @property
     def mode_factor(self) -> Array:
-        """(n,) required over available modal force: above 1 no voltages within the limits reach it, even alone.
+        """Required over available modal force (n,); above 1 no voltages within limits reach it, even alone.
 
         Infinite where no patch reaches the mode, 0 where nothing is required of it.
         """
@@ -273,7 +273,7 @@ def judge_patches(
 
 
 def worst(values: Array, range: Array) -> tuple[Array, Array]:
-    """Of values (T, k) the absolute ones (k,) nearest to their limits or farthest beyond, and these limits.
+    """Return values (k,) of (T, k) with the largest share of their limits, in absolute value, and these limits.
 
     `range` (2, k): the negative limits, then the positive ones.
     """
@@ -382,7 +382,7 @@ def find_unmet(
     *,
     limited: bool,
 ) -> dict[str, Array]:
-    """By link: F_p less what its patches do (T, n) at the voltages that are required, or at those within limits."""
+    """Return unmet modal forces (T, n) by link, at required voltages or at those within limits."""
     found = {}
     for name, link in links.items():
         found[name] = link.F_p
@@ -400,7 +400,7 @@ def find_unsupplied(
     voltages: Mapping[str, Voltages],
     others: Container[str],
 ) -> Unsupplied | None:
-    """What no voltages supply, but of links with `others` for that; None where that bends no link."""
+    """Return what no voltages supply, except on links in `others`; None if no link bends by it."""
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     found: list[tuple[float, float, str, str]] = []
     for name, left in find_unmet(links, patches, voltages, limited=False).items():

@@ -47,7 +47,7 @@ class _Catalog(Record):
 
 
 class JointTask(NamedTuple):
-    """What a joint has to do: `time` (T,) s; its `load` (T,), N·m or N, without any rotor; rate and acceleration."""
+    """Task of a joint: `time` (T,), s; `load` (T,), N·m or N, without any rotor; rate and acceleration."""
 
     time: Array
     load: Array
@@ -69,7 +69,7 @@ class MotorChoice(NamedTuple):
 
     @property
     def shares(self) -> tuple[float, float, float]:
-        """Of rated torque, peak torque and speed."""
+        """Shares of rated torque, peak torque and speed."""
         motor = self.motor
         return self.rms / motor.rated_torque, self.peak / motor.peak_torque, self.speed / motor.max_speed
 
@@ -80,7 +80,7 @@ class MotorChoice(NamedTuple):
 
 
 def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
-    """From a TOML file with [[motor]] tables, or a CSV file whose columns are their keys.
+    """Read motors from a TOML file with [[motor]] tables, or a CSV file with their keys as columns.
 
     Several gear ratios of a CSV line are separated by spaces; see `parse_csv`. Raises `InputError` for wrong keys or
     numbers.
@@ -127,7 +127,7 @@ def _size(motor: CatalogMotor) -> tuple[float, ...]:
 
 
 def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> MotorChoice:
-    """With the ratio N: τ = J N α + L/(N η) where the load L takes power, J N α + η L/N where it returns it."""
+    """Judge a motor with gear ratio N: τ = J N α + L/(N η) if load L takes power, J N α + η L/N if it returns it."""
     is_driven = task.load * task.rate >= 0.0
     through = np.where(is_driven, 1.0 / motor.efficiency, motor.efficiency)
     torque = motor.rotor_inertia * N * task.acceleration + task.load * through / N

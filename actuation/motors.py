@@ -32,7 +32,7 @@ JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 @struct
 class MotorFeasibility:
-    """What one motor has to do at the joint, against its limits (infinite without): N·m, rad/s, W; N, m/s of forces."""
+    """Requirements on one motor at the joint, and its limits (infinite if none): N·m, rad/s, W; or N, m/s, W."""
 
     moment: float  # largest absolute value, as those of speed and power
     moment_limit: float
@@ -83,7 +83,7 @@ class MotorFeasibility:
 
 
 def judge_motors(run: Run, analysis: Analysis) -> dict[str, MotorFeasibility]:
-    """What every motor has to do up to the end of the path; a number behind the joint tells coordinates apart.
+    """Return the requirements on every motor up to the end of the path, by joint or "JOINT k".
 
     Behind a compliant gear the motor turns otherwise than its joint.
     """
@@ -147,7 +147,7 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
 
 
 def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:
-    """What a motor has to do that gives `moment` (T,) at `rate` (T,) of its joint over `time` (T,); SI units.
+    """Return the requirements of `moment` (T,) at `rate` (T,) of a joint over `time` (T,); SI units.
 
     Root mean square and shares of time are those from 0 to `end` (s), without what comes before and after the path.
     """
@@ -171,7 +171,7 @@ def first_time(time: Array, beyond: Booleans) -> Array:
 
 
 def path_jump(run: Run, analysis: Analysis, at: float) -> str:
-    """Which derivative of a trajectory jumps near the time `at` (s), if moments follow from it.
+    """Return which derivative of a trajectory jumps near the time `at` (s), if torques follow from it.
 
     "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.
     """

@@ -79,16 +79,16 @@ class PointSet:
 
     @property
     def direction(self) -> Array:
-        """(3, c) unit vectors in body axes."""
+        """Unit vectors (3, c) of the force components, body axes."""
         return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """What the core takes of them: mbs/core/analysis/found_forces.h."""
+        """Return arrays for the core: mbs/core/analysis/found_forces.h."""
         position = np.transpose([point.position for point in self.points])
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """(T, 6 + n, c) at modal coordinates p (T, n) of the equations."""
+        """Return generalized forces (T, 6 + n, c) of unit force components at modal coordinates p (T, n)."""
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T
@@ -242,7 +242,7 @@ def solve_points(chosen: PointSet, run: Run) -> PointForces:
 
 
 def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Array]:
-    """By "BODY.POINT" the force (T, 3) there, N, global axes, along the motion of a run.
+    """Return forces (T, 3) by "BODY.POINT", N, global axes, along the motion of a run.
 
     Raises `InputError` where a body without points has driving forces.
     """

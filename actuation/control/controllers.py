@@ -34,7 +34,7 @@ from .robot import RigidArm, Setup, estimate
 
 
 class Controller(Protocol):
-    """What is asked once a sample: a small object that may keep a state from sample to sample.
+    """Protocol of controllers, which are called at each sample and may keep a state.
 
     `bandwidth` (rad/s): the fastest motion that it means to act on; 0 where it does not say.
     """
@@ -238,7 +238,7 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
 
 
 def joint_mobility(setup: Setup) -> Array:
-    """(motors,) acceleration of each joint per moment on it at the start, links rigid, the other joints free."""
+    """Return (motors,) acceleration per torque of each joint at the start, links rigid, the other joints free."""
     rest = np.zeros(len(setup.robot.motors))
     if not setup.robot.motors_fit:
         return rest

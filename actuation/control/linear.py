@@ -52,7 +52,7 @@ class LinearModels(Details):
 
     @property
     def times(self) -> tuple[float, ...]:
-        """Of the models, s."""
+        """Times of the models, s."""
         return tuple(model.time for model in self.models)
 
     @property
@@ -126,7 +126,7 @@ def make_linear_models(context: ActuatedContext, analysis: Linear, about: Operat
 
 
 def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:
-    """By "pzt/LAYOUT/k", what a volt does along s: on the modes of its link, or of the pieces of that."""
+    """Return, by "pzt/LAYOUT/k", the generalized force (f,) along s per volt, on modes of the link or its pieces."""
     found: dict[str, Array] = {}
     for of_link in patches.values():
         along_s = modal_directions(model, of_link.per_volt) @ mechanism.transformation

@@ -155,7 +155,7 @@ def is_kept(name: str, modes: int) -> bool:
 def kept_modes(
     mechanism: LinearMechanism, voltages: Mapping[str, Array], modes: int
 ) -> tuple[LinearMechanism, Mapping[str, Array]]:
-    """With only the lowest `modes` of each link, higher ones truncated; `voltages` as in `state_space`."""
+    """Truncate a linear mechanism to the lowest `modes` of each link; `voltages` as in `state_space`."""
     chosen = [j for j, name in enumerate(mechanism.names) if is_kept(name, modes)]
     block = np.ix_(chosen, chosen)
     kept = replace(
@@ -299,7 +299,7 @@ def locked_frequencies(model: LinearModel) -> Array:
 
 @struct
 class Reachability:
-    """How well inputs reach, or outputs see, each mode: (f,) between 0 and 1, and names of the modes out of reach.
+    """Controllability or observability of each mode (f,), from 0 to 1, and names of the modes out of reach.
 
     1: a unit of the input that fits best drives nothing but this mode, in the mass metric. Modes of equal frequency are
     judged together, by the worst mixture of them: one input cannot reach two such modes.
@@ -310,13 +310,13 @@ class Reachability:
 
 
 def controllability(model: LinearModel, inputs: Names) -> Reachability:
-    """By mode, from [λ² I + λ D̂ + K̂, b̂] (Popov–Belevitch–Hautus, for second-order equations)."""
+    """Return controllability by mode, from [λ² I + λ D̂ + K̂, b̂] (Popov–Belevitch–Hautus, second-order equations)."""
     _, _, B, _ = model.second_order
     return _reach(model, _scaled(B, model.input_names)[:, model.inputs(inputs)], left=True)
 
 
 def observability(model: LinearModel, outputs: Names) -> Reachability:
-    """By mode, as `controllability` with the outputs' rows, those of rates times λ."""
+    """Return observability by mode, as `controllability` with the rows of outputs, those of rates times λ."""
     f = model.freedom
     inverse = np.linalg.inv(np.linalg.cholesky(model.mass).T)
     C = np.vstack([inverse.T @ model.C[:, :f].T, inverse.T @ model.C[:, f:].T])
@@ -390,7 +390,7 @@ class Zeros:
         return float(np.abs(self.unstable).min(initial=np.inf))
 
     def describe(self) -> str:
-        """In words, for tables."""
+        """Return number and slowest unstable zero as text."""
         if self.minimum_phase:
             return "minimum phase"
         slowest = self.unstable[np.abs(self.unstable).argmin()]

@@ -40,7 +40,7 @@ SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Fran
 
 
 class Loop:
-    """What the core asks at every sample: errors of sensors, controllers, limits."""
+    """Sampled loop, called by the core at every sample: sensor errors, controllers, limits."""
 
     def __init__(
         self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], range: Array, seed: int
@@ -65,7 +65,7 @@ class Loop:
 
     @property
     def at_limits(self) -> Booleans:
-        """(K, inputs) at the samples taken, also where a controller has cut its commands itself."""
+        """Whether commands (K, inputs) are at limits, also if a controller has cut them itself."""
         lowest, highest = self._range * (1.0 - 1e-9)
         return (self.commands[: self.taken] <= lowest) | (self.commands[: self.taken] >= highest)
 
@@ -85,7 +85,7 @@ class Loop:
 
 
 class AmplifiedLoop:
-    """What the core asks at every step where amplifiers act: commands of motors, and means of the voltages that arrive.
+    """Sampled loop with amplifiers, called at every step: motor commands, and mean voltages behind the amplifiers.
 
     `directions` (k, n_v): current of the strain of each patch by v, A; `splits` part q, v, a of a state.
     """
@@ -172,7 +172,7 @@ def _is_seen(loop: Loop, setup: Setup) -> bool:
 
 @struct
 class LoopRecord(Details):
-    """What happened at the samples of a closed loop."""
+    """Samples, metrics, margins and advice of a closed loop."""
 
     # inputs, outputs: names of commands and readings
     inputs: tuple[str, ...]
@@ -194,7 +194,7 @@ class LoopRecord(Details):
 
 
 def sample_times(outputs: Array, T: float) -> Array:
-    """(K,) s: every T, from the first output to before the last."""
+    """Return sample times (K,), s: every T, from the first output to before the last."""
     return outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
 
 
@@ -241,7 +241,7 @@ def loop_record(
     *,
     gears: bool,
 ) -> LoopRecord:
-    """Of a run at its outputs, and at these and between; linear `loops` on the reference, none where it has none.
+    """Return the record of a run, given at its outputs and at these and between; linear `loops` about the reference.
 
     `lowest`: as in `measure`. `gears`: some give.
     """

@@ -69,7 +69,7 @@ Loops = Sequence[tuple[LinearModel, Feedback]]
 
 @struct
 class Margins:
-    """How far a loop is from its stability bound, the worst of several configurations."""
+    """Stability margins of a loop, the worst of several configurations."""
 
     radius: float  # the spectral radius; below 1 the loop is stable
     gain: float  # factor by which all gains may grow; below 1 the factor that would make it stable, 0 where none does
@@ -121,7 +121,7 @@ def spectral_radius(model: LinearModel, feedback: Feedback, T: float, delay: flo
 def lowest_frequency(
     models: Sequence[LinearModel], controllers: Sequence[ControllerRecord], T: float, delay: float
 ) -> float:
-    """Of the vibrations of the robot with its joints controlled or locked, Hz; NaN where nothing vibrates.
+    """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
     The lowest with all motors held and, where joints have PID controllers alone, of the sampled loop: its eigenvalues
     e^{sT} that are damped by less than `LIGHTLY`. With others half of the lowest with motors held.
@@ -149,7 +149,7 @@ def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexAr
 
 
 def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
-    """Those of the matrix F of the sampled loop: of the plant, commands on their way, and the controllers' states."""
+    """Return eigenvalues of the sampled loop: plant, commands on their way, and controller states."""
     seen, felt = _readings(model, feedback.outputs)
     columns = model.inputs(feedback.inputs)
     plant = sampled(model.A, model.B[:, columns], T, delay, with_last=bool(felt.any()))
@@ -179,7 +179,7 @@ def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
 
 
 def margins(loops: Loops, T: float, delay: float) -> Margins:
-    """Of a loop in several configurations, the worst."""
+    """Return the worst stability margins of a loop in several configurations."""
 
     def radius(factor: float, more: float) -> float:
         return max(spectral_radius(model, of.times(factor), T, delay + more) for model, of in loops)
@@ -226,7 +226,7 @@ class Suggestion:
     bandwidth: float
 
     def in_words(self) -> str:
-        """As keys of a scene file."""
+        """Return the gains as keys of a scene file."""
         P, D = (
             ", ".join(f"{toml_key(name)} = {value:.2g}" for name, value in of.items())
             for of in (self.proportional, self.derivative)
@@ -235,7 +235,7 @@ class Suggestion:
 
 
 def joint_inertia(model: LinearModel) -> Array | None:
-    """(motors, motors) with rigid links and gears, rotors included; None where motors are no coordinates of the model.
+    """Return (motors, motors) inertia, links and gears rigid, rotors included; None unless motors are coordinates.
 
     With compliant gears, the motor's angle and the joint's move as one.
     """

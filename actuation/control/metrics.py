@@ -106,7 +106,7 @@ def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Arr
 
 
 def watched(end: float, window: float, lowest: float) -> Array:
-    """(2 `WATCHED` + 1,) s: times over the `window` (s) before `end`, the last half of them in a period of `lowest`."""
+    """Return times (2 `WATCHED` + 1,), s, in the `window` (s) before `end`; the last half in one period of `lowest`."""
     begin = end - (min(window, 1.0 / lowest) if lowest > 0.0 else window)
     before = np.linspace(end - window, begin, WATCHED, endpoint=False)
     return np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
@@ -147,7 +147,7 @@ def _slower(t: Array, values: Array, lowest: float) -> Array:
 
 
 def overshoot(time: Array, place: Array, error: Array) -> float:
-    """How far (m) the tip, at `place` + `error` (T, d), gets beyond its last place along the line to it."""
+    """Return how far (m) the tip, at `place` + `error` (T, d), passes its final position along the line to it."""
     way = place[-1] - place[0]
     length = float(np.linalg.norm(way))
     beyond = np.maximum((place + error - place[-1]) @ way, 0.0)
@@ -161,7 +161,7 @@ def place_of_tip(
     paths: Sequence[Mapping[str, Any]],
     last: tuple[float, Array] | None = None,
 ) -> Array:
-    """(T, d) m: where its `paths`, functions of time by component, say, which are held before 0 and after `end` (s).
+    """Return prescribed tip positions (T, d), m, from its `paths`, held before 0 and after `end` (s).
 
     Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d). That may ring: from when
     all paths are over, s, its place is the `last` one (d,), the final position.
@@ -193,7 +193,7 @@ def _slow(t: Array, values: Array, window: float) -> Array:
 
 
 def settling(t: Array, distance: Array) -> float:
-    """When (s) `distance` (T,) stays below `SETTLED` of its largest value; NaN where it does not."""
+    """Return the time (s) from which `distance` (T,) stays below `SETTLED` of its largest value; NaN if never."""
     largest_error = float(distance.max())
     return _last_crossing(t, distance, SETTLED * largest_error) if largest_error > 0.0 else 0.0
 
@@ -218,7 +218,7 @@ def _last_crossing(t: Array, values: Array, level: float) -> float:
 
 
 def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
-    """When (s) what has `values_at` times (T, d) comes to where it is at the end of `time` (T,), s."""
+    """Return the time (s) at which `values_at` reaches its value at the end of `time` (T,), s."""
     even, values = resting(values_at, time)
     way = np.linalg.norm(values - values[-1], axis=1)
     changing = np.flatnonzero(way > AT_REST * way.max(initial=0.0))
@@ -228,7 +228,7 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
 def verdict_of(
     run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
-    """Of the sampled linear loop, where that is known, and of the run; `cut` (K, inputs): 1 and -1 at limits, else 0.
+    """Return the verdict on linear loop and run; `cut` (K, inputs) is 1 and −1 at limits, else 0.
 
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
     decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without

@@ -47,7 +47,7 @@ class Observer:
 
     @property
     def error(self) -> Array:
-        """(n, n) F of x − x̂⁻ from sample to sample."""
+        """Matrix F (n, n) of the estimation error x − x̂⁻ from sample to sample."""
         return as_floats(self.A - (self.A @ self.L + self.M) @ self.C)
 
     @property
@@ -187,7 +187,7 @@ class Schedule:
     observers: tuple[Observer, ...]
 
     def at(self, t: float) -> Observer:
-        """At t (s); outside of the times, the nearest."""
+        """Return the observer at t (s), interpolated; outside the times, the nearest one."""
         if len(self.times) == 1:
             return self.observers[0]
         k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
@@ -203,7 +203,7 @@ class Schedule:
 
 @struct
 class Estimates:
-    """What an observer found at K samples; of the tip, where it is estimated, against the truth."""
+    """Estimates at K samples, and tip error against the true motion."""
 
     names: tuple[str, ...]
     values: Array  # (K, names)
@@ -274,7 +274,7 @@ class Observed:
         return found
 
     def record(self, truth: Mapping[str, Array]) -> Estimates:
-        """What was estimated at the samples taken, against the `truth` (taken,) by name."""
+        """Return the estimates at the samples taken, compared with the `truth` (taken,) by name."""
         p, tip = self._p, self.tip
         taken = len(next(iter(truth.values())))
         first = self.schedule.observers[0]

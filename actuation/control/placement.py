@@ -77,7 +77,7 @@ class Evaluation:
 
 @struct
 class Placed(Details):
-    """What a search found."""
+    """Result of a search for patch positions."""
 
     wanted: Placement  # the keys of the scene
     # best, even: the patches found, and as many spread evenly
@@ -265,7 +265,7 @@ class PatchPlacement(InstantAnalysis):
         return not self.is_over_path
 
     def references(self) -> Iterator[Reference]:
-        """The link."""
+        """Yield references to the link and its patches."""
         yield from self.placement.references()
 
     def problems(self, among: Surroundings) -> Iterator[str]:

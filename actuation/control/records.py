@@ -96,7 +96,7 @@ class Sensor(Referring):
         return float(np.hypot(self.noise, self.noise_density / np.sqrt(2 * T)))
 
     def references(self) -> Iterator[Reference]:
-        """What is measured; points of strain are those of the link file."""
+        """Yield references to what is measured; points of strain belong to the link file."""
         yield from super().references()
         if self.strain is not None:
             link = self.strain.partition(".")[0]
@@ -426,7 +426,7 @@ class SampledAnalysis(ActuatedAnalysis):
             yield Need("feed_forward", self.feed_forward, "pzt")
 
     def references(self) -> Iterator[Reference]:
-        """What is measured, disturbed, controlled and reported."""
+        """Yield references of sensors, disturbances, controllers and tip."""
         for label, records in (
             ("sensor", self.sensor), ("disturbance", self.disturbance), ("controller", self.controller)
         ):  # fmt: skip
@@ -436,7 +436,7 @@ class SampledAnalysis(ActuatedAnalysis):
             yield Reference("tip", self.tip)
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """The disturbances."""
+        """Yield the disturbances with their labels."""
         for k, load in enumerate(self.disturbance, 1):
             for component, function in load.components.items():
                 yield f"disturbance no. {k}: {component}", function, 0

@@ -32,7 +32,7 @@ from .signals import check_joint, volts_on_file
 
 
 def rigid_freedom(model: Model) -> int:
-    """How many independent joint coordinates the mechanism with rigid links has where it starts."""
+    """Return the number of independent joint coordinates of the rigid mechanism in its initial posture."""
     return mobility(model, undeformed_posture(model).q).freedom + len(model.tree.gears)
 
 
@@ -68,7 +68,7 @@ class RigidArm:
             self._q[own.q] = q[node.q]
 
     def angles(self) -> Array:
-        """(motors,) where it stands."""
+        """Return current motor coordinates (motors,), rad or m."""
         return constraint_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
@@ -152,7 +152,7 @@ class ControlledRobot:
 
     @property
     def path(self) -> Path:
-        """Of the scene."""
+        """Path of the scene file."""
         return self.model.scene.path
 
     @property
@@ -166,7 +166,7 @@ class ControlledRobot:
         return tuple(name for joint in self.model.motors for name in self.coordinates(joint))
 
     def coordinates(self, joint: str) -> tuple[str, ...]:
-        """Of a joint: its name, or "NAME 1", "NAME 2" where there are several."""
+        """Return names of a joint's coordinates: its name, or "NAME 1", "NAME 2"."""
         check_joint(self.model, joint)
         return tuple(name.removeprefix("joint/") for name, _ in labelled(self.model, joint))
 
@@ -188,7 +188,7 @@ class ControlledRobot:
 
     @cached_property
     def patches(self) -> Mapping[str, PatchSignals]:
-        """By link, with the modes that its layouts reach together."""
+        """Patches by link, with the modes that its layouts reach together."""
         return {name: self._patched(name, of_link) for name, of_link in self.of_links.items()}
 
     def _patched(self, name: str, of_link: LinkPatches) -> PatchSignals:
@@ -215,7 +215,7 @@ class ControlledRobot:
         return found, voltages_at(plant, found, self.of_links)
 
     def rigid(self) -> RigidArm:
-        """With rigid links. Raises `InputError` where the motors do not fit the mechanism."""
+        """Return the robot with rigid links. Raises `InputError` if the motors do not fit the mechanism."""
         return RigidArm(self.model, self.source.q[0])
 
 
@@ -226,7 +226,7 @@ def input_names(robot: ControlledRobot) -> tuple[str, ...]:
 
 
 def estimate(volts: Array, count: int) -> Array:
-    """(count, k) of coordinates from what patches read of them, volts (k, m): as many as patches distinguish."""
+    """Return (count, k) estimates of coordinates from patch readings; `volts` (k, m) are readings per coordinate."""
     return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])
 
 
@@ -279,7 +279,7 @@ def default_tip(model: Model) -> str:
 
 @struct
 class Setup:
-    """What a controller may know when it is made."""
+    """Data for making a controller."""
 
     robot: ControlledRobot
     model: Model  # its equations of motion
@@ -305,12 +305,12 @@ class Setup:
         return any(name.startswith("estimate/") for name in self.outputs)
 
     def columns(self, *names: str) -> Indices:
-        """Where these readings are in y, or their estimates. Raises `InputError` where there is neither."""
+        """Return indices of readings in y, or of their estimates. Raises `InputError` for unknown ones."""
         of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
         return self._indices(of, self.outputs, "readings")
 
     def places(self, *names: str) -> Indices:
-        """Where these commands are in u. Raises `InputError` for a joint without a motor."""
+        """Return indices of commands in u. Raises `InputError` for a joint without motor."""
         return self._indices(names, self.inputs, "commands")
 
     def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
@@ -319,7 +319,7 @@ class Setup:
         return np.array([among.index(name) for name in names], dtype=int)
 
     def patch_places(self, body: str) -> Indices:
-        """Where the voltages of a body's patches are in u."""
+        """Return indices in u of the voltages of a body's patches."""
         return self.places(*self.robot.patches[body].inputs)
 
     def modal_columns(self, body: str, m: int, ending: str = "/rate") -> Indices:

@@ -48,7 +48,7 @@ class Signal:
 
 
 class Sensing:
-    """What signals read of states of a tree."""
+    """Readings of signals in states of a tree."""
 
     def __init__(self, model: Model, read: Sequence[Signal]) -> None:
         tree = model.tree
@@ -90,7 +90,7 @@ class Sensing:
         return found
 
     def rows(self, about: LinearMechanism) -> tuple[Array, Array, Array]:
-        """(signals, f) each: changes of readings by s, ṡ and s̈ of a linear mechanism of the same tree.
+        """Return derivatives (signals, f) of readings by s, ṡ and s̈, for a linear mechanism of the same tree.
 
         Exact of coordinates; of points by differences, to 1e-11. While loops move, the change of their ∂q/∂s counts
         once, not its rate.
@@ -198,7 +198,7 @@ def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Arra
 
 
 class Filter:
-    """What `filters` make of samples, one after the other; settled at the first one."""
+    """Filter of samples, one after the other (see `filters`); settled at the first sample."""
 
     def __init__(self, read: Sequence[Signal], T: float) -> None:
         self._matrices = filters(read, T)
@@ -233,7 +233,7 @@ def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Arr
 
 
 def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
-    """By body that may carry a layout: (k, n) that its patches read per unit of the modes of the body's file.
+    """Return, by body, (k, n) patch readings (V) per unit of the modes of the body's file.
 
     A patch reads its charge c [φ'(x2) − φ'(x1)] over its capacitance. By reciprocity the charge of a rotation is the
     moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The free capacitance of a patch is that of its

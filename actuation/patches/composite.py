@@ -72,7 +72,7 @@ class GaussPoint(NamedTuple):
 
 
 def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array]:
-    """What the k patches of all layouts and their link do to each other, over the n modes of the modal body.
+    """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
 
     The stiffness (n, n) that patches add, and the modal forces per volt (k, n) that the layers' own stiffness takes of
     those on a link held straight; R is 0 where rigidities are not known.
@@ -131,7 +131,7 @@ def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
 
 
 def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
-    """Of each patch (k,): ψ, and its authority; nan where the link's rigidities are not known.
+    """Return ψ (k,) of each patch, and its authority (k,); NaN without known rigidities of the link.
 
     ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature (or twist) under a
     voltage, in parts of c V/EI (c V/GJ), that of a link which does not feel the layers' stiffness.
@@ -238,7 +238,7 @@ def _strains(body: ModalBody, x: Array) -> Array:
 
 @struct
 class StructureEffect:
-    """What patches change of a link, bare → with patches."""
+    """Changes of a link by patches, bare → with patches."""
 
     mass: Array  # (2,) kg
     inertia: Array  # (2,) about the body's z axis, kg·m²
@@ -268,7 +268,7 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout])
 
 
 def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
-    """What the patches change."""
+    """Return the changes of a link by its patches."""
     pair = (bare, patched)
     return StructureEffect(
         np.array([body.mass for body in pair]),
@@ -281,7 +281,7 @@ STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
 
 class Effects(NamedTuple):
-    """Of k patches on the n modes of a modal body."""
+    """Effects of k patches on the n modes of a modal body."""
 
     extent: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m: see `LinkSections.extent`
     per_volt: Array  # (k,) c, the load that each is there for, N·m/V
@@ -291,7 +291,7 @@ class Effects(NamedTuple):
 
 
 def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
-    """Of the layouts of one link, which their stiffness makes feel each other where it counts."""
+    """Return the effects of one link's layouts, coupled by their stiffness if it counts."""
     found = [_straight(key, one, body) for one in placed]
     stiff = [k for k, one in enumerate(placed) if one.layout.adds_stiffness]
     if not stiff:

@@ -44,7 +44,7 @@ from .sections import check_sections
 
 @struct
 class OnBody:
-    """What all k patches of a link do to one body that may carry them, on the n modes of the body's file."""
+    """Effects of all k patches of a link on one body that carries them, on the n modes of the body's file."""
 
     Phi_V: Array  # (n, k) modal forces per volt
     turn: Array  # (n, k) by how much each mode turns the ends of each patch against each other, rad
@@ -74,26 +74,26 @@ class LinkPatches:
 
     @property
     def Phi_V(self) -> Array:
-        """(n, k) modal forces per volt on the modes of the link's file."""
+        """Modal forces per volt (n, k), on the modes of the link's file."""
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """By layout, of modal forces F_p (T, n); `unmet` is what all layouts leave of those that this one reaches."""
+        """Return voltages by layout for modal forces F_p (T, n); `unmet` is what all layouts leave."""
         found = solve_voltages(self.reach, self.reached.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
     @property
     def amplifiers(self) -> Amplifiers:
-        """Of the k patches."""
+        """Amplifiers of the k patches."""
         return self.reach.amplifiers
 
     @property
     def edges(self) -> Array:
-        """(k, 2) where patches begin and end, m from the root."""
+        """Begin and end (k, 2) of patches, m from the root."""
         return np.concatenate([array.edges for array in self.arrays.values()])
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
-        """By layout, of known V (T, k) where modal forces F_p (T, n) are wanted."""
+        """Return, by layout, given voltages V (T, k) and the modal forces F_p (T, n) they leave unmet."""
         return self._by_layout(V, np.clip(V, *self.amplifiers.range), F_p)
 
     def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
@@ -105,12 +105,12 @@ class LinkPatches:
 
     @property
     def per_volt(self) -> dict[str, Array]:
-        """By body, (n, k) modal forces per volt on the modes of its file."""
+        """Modal forces per volt (n, k) by body, on the modes of its file."""
         return {name: of.Phi_V for name, of in self.bodies.items()}
 
     @property
     def to_reached(self) -> dict[str, Array]:
-        """By body, (m, n) modal forces on `reached` by those on the modes of its file."""
+        """Matrices (m, n) by body, from modal forces on the modes of its file to those on `reached`."""
         return {name: self.reached.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
@@ -119,11 +119,11 @@ class LinkPatches:
         return as_floats(np.sum(found, axis=0))
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """From modal forces on `reached` to voltages (k,), with the limits of the patches or without."""
+        """Return the map from modal forces on `reached` to voltages (k,), with limits of the patches or without."""
         return allocation(self.reach, limited=limited)
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
-        """By layout with patches on a piece of the link: which of the k these are, and where they are on the piece.
+        """Return, by layout, indices of its patches on a piece of the link, and their position there.
 
         The piece is `length` (m) long and begins at `start` (m) from the root.
         """
@@ -135,19 +135,19 @@ class LinkPatches:
         return found
 
     def columns(self, layout: str) -> slice:
-        """Which of the k patches are those of one layout."""
+        """Return the columns of one layout among the k patches."""
         ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
         end = int(ends[list(self.arrays).index(layout)])
         return slice(end - len(self.arrays[layout].edges), end)
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
-        """(T, n) of modal forces F_p, at voltages (T, k) of all patches."""
+        """Return modal forces (T, n) that voltages (T, k) of all patches leave of F_p (T, n)."""
         left: Array = F_p - voltages @ self.Phi_V.T
         return left if self.on_kept is None else left @ self.on_kept
 
 
 def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
-    """Where the patches of layouts are on their link. Raises `InputError` for patches that do not fit it."""
+    """Return the positions of layouts on their link. Raises `InputError` for patches that do not fit it."""
     return [_placed(path, layout, body) for layout in layouts]
 
 
@@ -213,7 +213,7 @@ def on_pieces(
 
 
 def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:
-    """As many of the same patches, evenly spread over the link, alone, with one limit; None where they have no room."""
+    """Return `count` such patches alone, evenly spaced, with one limit; None if they do not fit the link."""
     if count * layout.length > body.length * (1 + 1e-9):
         return None
     try:

@@ -30,7 +30,7 @@ ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of poi
 
 @struct
 class Reach:
-    """What k patches do to n modes, and what is wanted of them."""
+    """Action of k patches on n modes, and the weights of the modes."""
 
     _: KW_ONLY
     Phi_V: Array  # (n, k) modal forces per volt
@@ -41,12 +41,12 @@ class Reach:
 
     @property
     def limit(self) -> Array:
-        """(k,) largest voltages of either sign, V; infinite where the scene gives none."""
+        """Largest voltages of either sign (k,), V; infinite without limit."""
         return np.abs(self.amplifiers.range).max(axis=0)
 
     @property
     def condition_number(self) -> float:
-        """Of Φ_V: how unequally the patches reach the modes; infinite where some mode is out of reach."""
+        """Condition number of Φ_V; infinite if a mode is out of reach."""
         return float(np.linalg.cond(self.Phi_V[: self.served]))
 
     @property
@@ -63,7 +63,7 @@ class Reach:
 
 
 def served_first(served: int, n: int, patches: int) -> Array:
-    """(rows, n) roots of weights of the `served` first of n modes; more patches than these serve the others, too."""
+    """Return (rows, n) roots of weights that prefer the first `served` of n modes; spare patches serve the others."""
     rows = n if patches > served else served
     return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
 
@@ -135,20 +135,20 @@ class ReachedModes:
     served: int  # number of them, the first ones: the others are attachment modes
 
     def forces(self, F_p: Array) -> Array:
-        """(T, m) on the p' from those on the modes of the modal body (T, n)."""
+        """Return modal forces (T, m) on p' from those on the modes of the modal body (T, n)."""
         return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
-        """(T, m) p' from those of the modal body (T, n)."""
+        """Return p' (T, m) from modal coordinates of the modal body (T, n)."""
         return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
 
     def seen(self, rows: Array) -> Array:
-        """(k, m) what is linear in the modes of the modal body, (k, n), over p'."""
+        """Return rows (k, n), linear in the modes of the modal body, as rows (k, m) of p'."""
         return self.forces(rows)
 
 
 def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
-    """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
+    """Return the mode families that patches excite, from modal forces per volt (k, n) on the modal body."""
     size = np.abs(per_volt).max(axis=0)
     return _modes_of(frozenset(body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())), body, spatial)
 
@@ -174,12 +174,12 @@ class Voltages:
     served: int  # number of modes, the first ones, that the patches are to serve
 
     def at(self, rows: Indices) -> Voltages:
-        """These rows alone."""
+        """Return these rows (outputs) alone."""
         return Voltages(self.required[rows], self.within_limit[rows], self.unmet[rows], self.served)
 
     @property
     def residual(self) -> Array:
-        """(T,) norm of the modal force on modes to be served that `within_limit` leaves unmet."""
+        """Norm (T,) of the modal force on served modes that `within_limit` leaves unmet."""
         return np.linalg.norm(self.unmet[:, : self.served], axis=1)
 
     @property
@@ -208,7 +208,7 @@ def voltage_gain(patches: Reach) -> Array:
 
 
 def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
-    """What turns modal forces into voltages, with the limits of the patches or without."""
+    """Return the map from modal forces to voltages, with limits of the patches or without."""
     lower, upper = (patches.amplifiers if limited else patches.amplifiers.unlimited()).range
     return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), lower, upper, voltage_scale(patches))
 
@@ -244,12 +244,12 @@ class PatchArray(Reach):
 
     @property
     def stiffness_ratio(self) -> Array:
-        """(k,) ψ of link to patch: see `composite.stiffness_ratios`."""
+        """Stiffness ratio ψ (k,) of link to patch; see `composite.stiffness_ratios`."""
         return self._stiffness[0]
 
     @property
     def authority(self) -> Array:
-        """(k,) the part of c V that bends the link, whose own stiffness takes the rest: see there."""
+        """Share (k,) of c V that bends the link against the patches' own stiffness."""
         return self._stiffness[1]
 
     @property
@@ -265,7 +265,7 @@ class PatchArray(Reach):
 
     @property
     def surface_distance(self) -> Array:
-        """(k,) from the link's axis to the outer surface of each patch, m."""
+        """Distance (k,) from the link's axis to the outer surface of each patch, m."""
         return self.height / 2 + self.layout.layers * self.layout.thickness
 
 
@@ -297,7 +297,7 @@ def edges_on_piece(layout: PztLayout, edges: Array, start: float, length: float)
 
 
 def patch_edges(layout: PztLayout, length: float) -> Array:
-    """(k, 2) where the patches of `layout` begin and end on a link of that length, m."""
+    """Return begin and end (k, 2) of the patches of `layout` on a link of that `length`, m."""
     if layout.centers is not None:
         centers = np.array(layout.centers)
     else:

@@ -51,7 +51,7 @@ def plain_lamina(modulus: float, d31: float, thickness: float) -> Lamina:
 
 @lru_cache
 def fibre_lamina(of: Fibres) -> Lamina:
-    """Of fibers at an angle: transformed compliances with σ_s = 0 (Jones, Mechanics of Composite Materials, 1999, 2.6).
+    """Return the lamina of fibers at an angle: transformed compliances, σ_s = 0 (Jones 1999, 2.6).
 
         S̄_11 = S_11 c⁴ + (2 S_12 + S_66) s²c² + S_22 s⁴
         S̄_16 = (2 S_11 − 2 S_12 − S_66) s c³ − (2 S_22 − 2 S_12 − S_66) s³c
@@ -128,7 +128,7 @@ class Amplifier(Record):
                 yield key, len(value)
 
     def for_any(self) -> Self:
-        """The same for each patch: what all of them can do."""
+        """Return one amplifier with limits that all patches can meet."""
         least = {key: float(np.min(getattr(self, key))) for key, _ in self.lists() if key not in ("range", "delay")}
         lowest = np.reshape(() if self.range is None else self.range, (-1, 2))
         range = (float(lowest[:, 0].max()), float(lowest[:, 1].min())) if len(lowest) else None
@@ -257,7 +257,7 @@ class PztLayout(Record):
             )
 
     def capacitance(self, *, clamped: bool = False) -> float:
-        """Of one patch with all its layers and faces, F: free, or on a link that stands still."""
+        """Return the capacitance of one patch with all layers and faces, F: free, or clamped."""
         field = 1.0 / ((self.fibre_angle is not None and self.electrode_spacing) or self.thickness)
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
         C, per_volt = self.lamina
@@ -265,7 +265,7 @@ class PztLayout(Record):
         return volume * (self.permittivity * field**2 - elastic)
 
     def amplifiers(self) -> Amplifiers:
-        """Of all patches."""
+        """Return the amplifiers of all patches."""
         of, k = self.amplifier or Amplifier(), self.patch_count
 
         def each(value: float | tuple[float, ...] | None) -> Array:
@@ -315,17 +315,17 @@ class PztLayout(Record):
 
     @property
     def label(self) -> str:
-        """What results and messages call the layout."""
+        """Name of the layout in results and messages."""
         return self.body if self.name is None else self.name
 
     @property
     def acts_in(self) -> Bends:
-        """What the patches do to their link."""
+        """Kind of deformation that the patches cause."""
         return self.bends
 
     @property
     def normal(self) -> Literal["y", "z"]:
-        """Of the faces that they sit on: an axis of the link."""
+        """Axis of the link along the normal of the patches' faces."""
         return "z" if self.bends == "out-of-plane" or self.face in ("+z", "-z") else "y"
 
     @property
@@ -350,7 +350,7 @@ class PztLayout(Record):
 
     @property
     def patch_count(self) -> int:
-        """Number of patches."""
+        """Number of patches along the link."""
         return len(self.centers) if self.centers is not None else (self.count or 0)
 
     def references(self) -> Iterator[Reference]:

@@ -34,7 +34,7 @@ ROUND = 1e-6  # of the radius: corners of an outline that are so far from the ax
 
 @struct
 class LinkSections:
-    """From each of k stations on; NaN where not known."""
+    """Section properties from each of k stations on; NaN if unknown."""
 
     x: Array  # (k,) m
     # height, width: (k,) along y and z, m
@@ -45,13 +45,13 @@ class LinkSections:
     middle: Array  # (k, 2) between the faces along y and z, from the axis, m
 
     def extent(self, normal: Literal["y", "z"], side: float = 0.0) -> Array:
-        """(k,) between the faces with that normal, m; of one at `side` ±1 twice its distance from the axis."""
+        """Return the extent (k,) along that normal, m; for `side` ±1, twice the distance of that face from the axis."""
         between, axis = (self.height, 0) if normal == "y" else (self.width, 1)
         return between + 2 * side * self.middle[:, axis]
 
     @cached_property
     def alike(self) -> Indices:
-        """(k,) of each station the first one with the same section."""
+        """Indices (k,) of the first station with the same section."""
         of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity, self.middle])
         _, first, same = np.unique(of_station, axis=0, return_index=True, return_inverse=True)
         return first[same.ravel()]
@@ -69,7 +69,7 @@ class LinkSections:
 
 @lru_cache(maxsize=KEPT)
 def link_sections(body: ModalBody) -> LinkSections:
-    """Of a modal body."""
+    """Return the section properties of a modal body."""
     stations = body.stations
     k = len(stations.height)
     unknown = np.full(k, np.nan)
@@ -107,7 +107,7 @@ def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twis
 
 
 def potentials(body: ModalBody, x: Array) -> Array:
-    """(m, 4, n) at x (m,) whose differences are integrals of the strains e along the link: φ_z, u, φ_x, −φ_y."""
+    """Return (m, 4, n) at x (m,) whose differences are integrals of the strains e along x: φ_z, u, φ_x, −φ_y."""
     _, translation, rotation = body.along_axis(x)
     return np.stack([rotation[:, 2], translation[:, 0], rotation[:, 0], -rotation[:, 1]], axis=1)
 
@@ -130,7 +130,7 @@ def side(layout: PztLayout) -> float:
 
 
 def bending_row(layout: PztLayout) -> int:
-    """Which of the strains e is the curvature towards the patches' normal."""
+    """Return the index of the strain e that is the curvature towards the patches' normal."""
     return BEND_Y if layout.normal == "y" else BEND_Z
 
 
@@ -140,7 +140,7 @@ def own_row(layout: PztLayout) -> int:
 
 
 def felt_rows(layout: PztLayout) -> Indices:
-    """Which of the strains e feel the patches: see `composite`."""
+    """Return the indices of the strains e that interact with the patches; see `composite`."""
     found = {own_row(layout)}
     if side(layout):
         found |= {bending_row(layout), STRETCH}
@@ -151,7 +151,7 @@ def felt_rows(layout: PztLayout) -> Indices:
 
 
 def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float]:
-    """(A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
+    """Return (A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
 
     On a link of that extent t_b (m) along their normal; those without a named face lie on one.
     """
@@ -163,7 +163,7 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
 
 
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
-    """Of all layers at a place of that extent (m) along their normal, on its strains; `lever`: β, 0 without fibers."""
+    """Return loads of all layers on their strains, for a link `extent` (m) along their normal; `lever` is β."""
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign = np.sign(S)
     arm = A * (extent + layout.layers * layout.thickness) / 2  # ∫ |η| dA
@@ -180,7 +180,7 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
 
 
 def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
-    """(4,) of a volt on a link held straight, of the rows that feel it: N·m, N."""
+    """Return loads (4,) per volt on a link kept straight, in the strains that feel it: N·m, N."""
     found, rows = np.zeros(4), felt_rows(layout)
     found[rows] = layer_loads(layout, extent, lever).f[rows]
     return found
