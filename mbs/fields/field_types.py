@@ -115,7 +115,7 @@ def one_of(record: Record, keys: tuple[str, ...]) -> str:
 
 
 def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple[str, ...]) -> list[str]:
-    """Which of the `optional` keys are set. Raises `ValueError` unless all are `allowed` and there is at least one."""
+    """Return the `optional` keys that are set. Raises `ValueError` unless all are `allowed` and one is given."""
     given = [key for key in optional if getattr(record, key) is not None]
     if not given or not set(given) <= set(allowed):
         raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(given)}')
@@ -123,7 +123,7 @@ def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple
 
 
 def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
-    """Those that are given, by name."""
+    """Return the given functions by name, without None."""
     return {name: function for name, function in functions.items() if function is not None}
 
 
@@ -157,7 +157,7 @@ class Reference:
 
     @property
     def body_and_point(self) -> tuple[str, str] | None:
-        """Its two parts; None where it names no point."""
+        """Body and point of "BODY.POINT"; None if it names no point."""
         return split_point(self.name) if self.kind == "body" and "." in self.name else None
 
 
@@ -172,7 +172,7 @@ class Referring(Record):
     refers_to: ClassVar[tuple[tuple[str, Kind | Literal["loaded"]], ...]] = ()  # keys, and what one or all values name
 
     def references(self) -> Iterator[Reference]:
-        """What it names."""
+        """Yield all references of the record."""
         for key, kind in self.refers_to:
             value = getattr(self, key)
             for name in () if value is None else (value,) if isinstance(value, str) else value:

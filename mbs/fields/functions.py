@@ -43,7 +43,7 @@ def user_function(function: object) -> TimeFunction:
 
 
 def called(function: Callable[..., object], t: float, *arguments: object) -> Array:
-    """What a user's function returns, as numbers; errors that it raises carry a note with its name and the time t.
+    """Return the numbers of a user's function; a note with its name and the time t is added to its errors.
 
     Raises `InputError` where it returns something else than numbers.
     """

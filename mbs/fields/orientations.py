@@ -34,7 +34,7 @@ class OrientationLaw:
 
     @cached_property
     def in_core(self) -> _core.TurningLaw:
-        """The same in the core, which says what it is at any time."""
+        """Return the law as a record of the core, which evaluates it at any time."""
         kind, reference = getattr(_core.OrientationKind, self.kind), exponential(np.array(self.reference))
         return _core.TurningLaw(kind, list(self.functions), reference)
 

@@ -34,35 +34,35 @@ class Piecewise:
 
     @property
     def begin(self) -> float:
-        """When the motion begins, s."""
+        """Start time of the motion, s."""
         return float(self.breaks[0])
 
     @property
     def end(self) -> float:
-        """When it is over, s."""
+        """End time of the motion, s."""
         return float(self.breaks[-1])
 
     def moved(self, factor: float = 1.0, delay: float = 0.0) -> Piecewise:
-        """The same, `factor` times as long about t = 0 and then `delay` (s) later."""
+        """Return the motion stretched by `factor` about t = 0, then delayed by `delay` (s)."""
         powers = factor ** -np.arange(self.coefficients.shape[1] - 1, -1, -1.0)
         return Piecewise(factor * self.breaks + delay, as_floats(self.coefficients * powers[None, :, None]))
 
     def along(self, change: Array) -> Piecewise:
-        """Of one component: the motion times a vector `change` (n,)."""
+        """Return the motion of one component times a vector `change` (n,)."""
         return Piecewise(self.breaks, as_floats(self.coefficients * change))
 
     @property
     def first(self) -> Array:
-        """(n,) where it begins."""
+        """Initial value (n,)."""
         return as_floats(self.coefficients[0, -1])
 
     @property
     def last(self) -> Array:
-        """(n,) where it is over."""
+        """Final value (n,)."""
         return as_floats(shifted(self.coefficients[-1], self.end - self.breaks[-2])[-1])
 
     def sample(self, times: Array, derivative: int = 0) -> Array:
-        """(T, n) a derivative at `times` (T,), s; where it jumps, that of the piece which follows."""
+        """Return a derivative (T, n) at `times` (T,), s; at jumps that of the following piece."""
         t = np.clip(times, self.begin, self.end)
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.coefficients) - 1)
         powers = range(self.coefficients.shape[1] - 1, derivative - 1, -1)
@@ -79,7 +79,7 @@ class Piecewise:
 
 
 def shifted(coefficients: Array, s: Array | float) -> Array:
-    """The same polynomials, (…, order, n) with the highest power first, in powers of x − s, s (…) (Horner's scheme)."""
+    """Return polynomials (…, order, n), highest power first, in powers of x − s, s (…) (Horner's scheme)."""
     moved, s = coefficients.copy(), np.asarray(s)[..., None]
     for last in range(moved.shape[-2], 1, -1):
         for k in range(1, last):
@@ -119,7 +119,7 @@ HALF = 0.5  # of each time of averaging to the one before, where no limit says o
 
 @struct
 class Limits:
-    """Of the speed, acceleration and jerk along the way: m/s or rad/s, and so on; infinite where there is none."""
+    """Limits of speed, acceleration and jerk along a path segment, m/s or rad/s and so on; infinite if none."""
 
     speed: float = inf
     acceleration: float = inf
@@ -127,7 +127,7 @@ class Limits:
 
     @property
     def by_order(self) -> tuple[float, float, float]:
-        """Of the first, second and third derivative."""
+        """Limits of the first, second and third derivative."""
         return self.speed, self.acceleration, self.jerk
 
 
@@ -296,7 +296,7 @@ class Impulse(NamedTuple):
 
 
 def impulses(kind: Kind, frequency: float, damping_ratio: float) -> list[Impulse]:
-    """Of a shaper for vibrations of one `frequency` (Hz, undamped).
+    """Return the impulses of a shaper for vibrations of one undamped `frequency`, Hz.
 
     "zv" leaves none at that frequency (Singer and Seering 1990, J. Dyn. Syst. Meas. Control 112); "zvd" none there, and
     little about it (the derivative with respect to frequency is zero, too); "ei" 5 % there, and at most 5 % over a

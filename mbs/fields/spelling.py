@@ -29,7 +29,7 @@ def is_planar(info: ValidationInfo) -> bool:
 
 
 def keys_here(record: Record, keys: Iterable[str], info: ValidationInfo) -> tuple[str, ...]:
-    """Those of the `keys` of a record that scenes have of the space that is being read."""
+    """Return those of a record's `keys` that exist in scenes of the space being read."""
     fields = type(record).model_fields
     return tuple(key for key in keys if is_key(fields[key], space_of(info)))
 
@@ -95,7 +95,7 @@ def as_written(value: Any) -> Any:
 
 
 def place(x_y: Sequence[float]) -> tuple[float, float, float]:
-    """Of the plane, (x, y) in m, in space."""
+    """Return the position (x, y), m, of the plane in 3D."""
     x, y = x_y
     return x, y, 0.0
 

@@ -22,7 +22,7 @@ METHOD = "integrator"
 
 @dataclass(frozen=True)
 class Steps:
-    """Of an analysis in the results file at `path`: the `method`, and the times (N,), in s, where its steps ended."""
+    """Steps of an analysis in the results file at `path`: `method`, and times (N,), s, at which steps ended."""
 
     path: Path
     method: str

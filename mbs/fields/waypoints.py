@@ -123,13 +123,13 @@ class Record:
     rates: Array | None = None
 
     def waypoints(self) -> Waypoints:
-        """Its rows as waypoints. Raises `InputError` as `waypoints_of`."""
+        """Return the rows as waypoints. Raises `InputError` as `waypoints_of`."""
         found = waypoints_of(self.columns, self.times, self.values, self.place)
         return replace(found, remarks=(*self.remarks, *found.remarks))
 
 
 def column_of(columns: Sequence[str], joint: str) -> int | None:
-    """Which of the columns is that of a joint: see `OF_A_JOINT`. Raises `ValueError` where two topics have it."""
+    """Return the column of a joint (see `OF_A_JOINT`). Raises `ValueError` if two topics contain it."""
     for pattern in OF_A_JOINT:
         name = pattern.format(joint)
         ends = (f"/{name}",) if name != pattern else ()

@@ -20,9 +20,9 @@ class CylindricalJoint(AxialJoint):
     along = (Along("turn", 2), Along("slide", 2))
 
     def state(self, coordinates: Array) -> Array:
-        """Way first."""
+        """Return coordinates in the order of q: displacement, then angle."""
         return coordinates[..., ::-1]
 
     def coordinates(self, q: Array) -> Array:
-        """Angle first."""
+        """Return coordinates in the order of the scene: angle, then displacement."""
         return q[..., ::-1]

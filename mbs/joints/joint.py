@@ -49,7 +49,7 @@ class Friction:
         return self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
 
     def slope(self, rate: Array) -> Array:
-        """Its derivative by γ̇: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+        """Return the derivative of the friction torque by γ̇: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
         return self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
 
 
@@ -131,12 +131,12 @@ class JointRecord(Record):
 
     @classmethod
     def type_name(cls) -> str:
-        """What the key `type` says."""
+        """Value of the key `type`."""
         return str(get_args(cls.model_fields["type"].annotation)[0])
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
-        """What to say of a key that only joints of other types have."""
+        """Return the message for a key that only joints of other types have."""
         if not others:
             return ""
         having = " or ".join(other.type_name() for other in others if issubclass(other, JointRecord))
@@ -144,7 +144,7 @@ class JointRecord(Record):
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Name of the joint in messages."""
         return f'joint "{self.name}"'
 
     @property
@@ -199,7 +199,7 @@ class JointRecord(Record):
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
-        """Its coordinates (…, k) in the scene's order, from q (…, q_count); likewise rates from v."""
+        """Return coordinates (…, k) in the scene's order from q (…, q_count); likewise rates from v."""
         return q
 
     # What a motor and a gear add; joints that can have them override this.
@@ -215,7 +215,7 @@ class JointRecord(Record):
 
     @property
     def motor_limits(self) -> tuple[MotorLimits, ...]:
-        """What its motor can do, for each coordinate."""
+        """Limits of the motor for each coordinate, N·m, rad/s, W or N, m/s, W."""
         return ()
 
     @property

@@ -79,7 +79,7 @@ class MovingJoint(JointRecord):
 
     @property
     def motor_limits(self) -> tuple[MotorLimits, ...]:
-        """What its motors can do, for each coordinate; infinite where the scene gives no limit."""
+        """Limits of the motors for each coordinate, N·m, rad/s, W or N, m/s, W; infinite if not given."""
         count = len(self.units)
         limits = (self.moment_limit, self.speed_limit, self.power_limit)
         rows = [np.broadcast_to(np.inf if limit is None else limit, count).tolist() for limit in limits]

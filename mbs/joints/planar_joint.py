@@ -32,7 +32,7 @@ class PlanarJoint(AxialJoint):
         return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)
 
     def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
-        """As `turned_around` of displacements, whose axes turn besides."""
+        """Return rates of the reversed joint, as `turned_around`; its axes of displacement rotate, too."""
         X, Y, _ = np.moveaxis(self.turned_around(coordinates), -1, 0)
         turn = rate[..., 2]
         x, y, _ = np.moveaxis(self.turned_around(np.concatenate([rate[..., :2], coordinates[..., 2:]], axis=-1)), -1, 0)

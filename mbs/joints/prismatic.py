@@ -33,7 +33,7 @@ class PrismaticJoint(AxialJoint):
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """Of the axis: the others have defaults, or are those of all joints."""
+        """Return the message for a missing axis; empty for other keys."""
         return "expected an axis that is not zero in a prismatic joint, found none" if key == "axis" else ""
 
     units = ("m",)

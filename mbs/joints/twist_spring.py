@@ -39,7 +39,7 @@ class TwistSpring:
 
     @classmethod
     def of(cls, stiffness: float | StiffnessSteps) -> "TwistSpring":
-        """With the stiffness that a joint has."""
+        """Make the spring from the key `stiffness` of a joint."""
         if not isinstance(stiffness, StiffnessSteps):
             return cls((stiffness,))
         parts = np.diff(stiffness.torques, prepend=0.0) / stiffness.values[:-1]

@@ -59,5 +59,5 @@ class UniversalJoint(AxialJoint):
         return (inner @ EXCHANGED, outer @ EXCHANGED) if backwards else (inner, outer)
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Both backwards, the second first."""
+        """Return coordinates of the reversed joint: both negative, the second first."""
         return -coordinates[..., ::-1]

@@ -18,7 +18,7 @@ from ...common.structs import struct
 
 @struct
 class Amplifiers:
-    """Of k patches; without an amplifier limits are infinite, and voltages arrive at once."""
+    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once."""
 
     range: Array  # (2, k) smallest and largest voltage, V
     slew: Array  # (k,) largest rate of the voltage, V/s
@@ -29,7 +29,7 @@ class Amplifiers:
 
     @property
     def lag(self) -> Array:
-        """(k,) time constants, s."""
+        """Time constants (k,), s."""
         return 1.0 / (2 * np.pi * self.bandwidth)
 
     @property
@@ -43,7 +43,7 @@ class Amplifiers:
         return self.has_rates or bool(self.lag.any() or self.delay.any())
 
     def unlimited(self) -> Amplifiers:
-        """The same with lag and delay alone."""
+        """Return amplifiers with the same lag and delay, without limits."""
         none = np.full_like(self.slew, np.inf)
         return Amplifiers(np.stack([-none, none]), none, none, self.capacitance, self.bandwidth, self.delay)
 
@@ -75,15 +75,15 @@ class Amplifiers:
 
 
 class Driven(Protocol):
-    """What has amplifiers."""
+    """Protocol of what has amplifiers."""
 
     @property
     def amplifiers(self) -> Amplifiers:
-        """Those of its patches."""
+        """Amplifiers of its patches."""
 
 
 def joined(links: Iterable[Driven]) -> Amplifiers:
-    """Of all patches of links, one link after the other."""
+    """Return the amplifiers of all patches of links, one link after the other."""
     none = np.zeros(0)
     parts = [Amplifiers(np.zeros((2, 0)), *[none] * 5), *(of_link.amplifiers for of_link in links)]
     keys = [field.name for field in fields(Amplifiers)]

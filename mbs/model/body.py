@@ -37,17 +37,17 @@ class Stiffening:
     S_turned: Array
 
     def at(self, point: str) -> Array:
-        """(6, n, n) of a point; zero where it is not known."""
+        """Return geometric stiffness (6, n, n) by force and moment at a point; zero if unknown."""
         n = self.K_s.shape[-1]
         return self.K_points.get(point, np.zeros((6, n, n)))
 
     def transformed(self, T: Array) -> Stiffening:
-        """In coordinates p' with p = T p'."""
+        """Return the stiffness in coordinates p' with p = T p'."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
     def with_payload(self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array) -> Stiffening:
-        """With a rigid mass (kg) at `arm` (3,) from one of its points, E (3, 3) = ∫ρ ξ ξᵀ dV about its center.
+        """Add a rigid mass (kg) at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV about its center.
 
         position (3,) and `phi` = Φ_r (3, n) of the point. What is d from it moves by (exp φ~ − 1) d besides, so that
         pᵀG p = pᵀK p + pᵀK_r p × d − φ × (φ × d), with φ = Φ_r p, K along and K_r about the axes.
@@ -64,7 +64,7 @@ class Stiffening:
         )
 
     def with_tool(self, name: str, point: str, phi: Array, arm: Array) -> Stiffening:
-        """With a further point `name` at `arm` (3,) from one of its points, with which it moves and turns."""
+        """Add a point `name` at `arm` (3,), m, rigidly attached to one of its points."""
         K = self.at(point).copy()
         K[:3] += np.einsum("lbmn,b->lmn", self._by_arm(point, phi), arm)
         return replace(self, K_points=MappingProxyType({**self.K_points, name: K}))
@@ -78,7 +78,7 @@ class Stiffening:
 
 
 def stiffening_of(body: ModalBody, *, is_planar: bool = False) -> Stiffening | None:
-    """What the file of a modal body holds; None where it lacks what motion in space asks, or in the plane z = 0.
+    """Return the geometric stiffness in a modal body; None if the file lacks what 3D or planar motion needs.
 
     With K of its d'Alembert loads: K_s,i = −K(t_i), K_r,i = −K(r_i), K_ω,ii = K(omega_ii), K_ω,ij = ½ K(omega_ij).
     """
@@ -151,17 +151,17 @@ class Body(Invariants):
 
     @property
     def n_eigenmodes(self) -> int:
-        """How many of them count as modes of the link: for `modes = k`."""
+        """Number of modes that count as modes of the link, for `modes = k`."""
         return self.n_modes - self.attachment_modes
 
     @property
     def whole(self) -> Body:
-        """With all modes of its file."""
+        """The body with all modes of its file."""
         return self if self.reduction is None else self.reduction.whole
 
     @cached_property
     def on_file(self) -> Array:
-        """(n, n_file): forces (…, n) on p times this are those on the modes of the file that do the same work on them.
+        """Matrix (n, n_file) that maps forces on p to equivalent forces on the modes of the file.
 
         Of a body with fewer modes they are those of loads at its loaded points, which act on all modes.
         """
@@ -178,7 +178,7 @@ class Body(Invariants):
 
     @property
     def largest_moment(self) -> float:
-        """Of inertia about the origin of the frame, kg·m²; with |p|² as large the body is bent by about its length."""
+        """Largest moment of inertia about the origin, kg·m²; |p|² of this size bends the body by about its length."""
         return max(float(np.linalg.eigvalsh(self.inertia)[-1]), 0.0)
 
     @property
@@ -202,7 +202,7 @@ class Body(Invariants):
 
 @struct
 class Reduction:
-    """How a body came by fewer modes: see `truncation.with_fewer_modes`."""
+    """Origin of a body with fewer modes; see `truncation.with_fewer_modes`."""
 
     whole: Body  # the body with all n modes of its file
     lowest: int  # how many of these it kept; the other coordinates stand for the rest
@@ -327,7 +327,7 @@ def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float
 
 
 class Section(NamedTuple):
-    """Of a bent body: u = x + Φp − … (…, 3), φ = Φ_r p − … (…, 3), and their derivatives by p, (…, 3, n) or (3, n)."""
+    """Section of a bent body: u = x + Φp − … (…, 3), m, φ = Φ_r p − … (…, 3), and ∂/∂p (…, 3, n) or (3, n)."""
 
     u: Array
     phi: Array
@@ -349,7 +349,7 @@ def bent_section(body: Body, point: str, p: Array) -> Section:
 
 
 def orientation(tool: Tool) -> Array:
-    """(3, 3) its axes, columns, in those of the body."""
+    """Return the axes (3, 3) of a tool, columns, in body axes."""
     return about(2, tool.angle) @ of_rpy(*tool.rpy)
 
 

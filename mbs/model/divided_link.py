@@ -66,7 +66,7 @@ class PieceOfLink(NamedTuple):
 
 
 def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink]) -> DividedLink:
-    """Of a link and its pieces, each with its equations, in the coordinates of these."""
+    """Return the relation between a link and its pieces, in the coordinates of the pieces' equations."""
     of_file = [_shape_in_piece(link, piece.start, piece.modal) for piece in pieces]
     own = [np.linalg.pinv(piece.spatial.modal_transform) @ p for piece, p in zip(pieces, of_file, strict=True)]
     spread = np.vstack(own) @ spatial.modal_transform
@@ -76,7 +76,7 @@ def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink
 
 
 def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
-    """(N, n) p of the pieces where a link in space bends, twists and stretches in its modes, both of the files' modes.
+    """Return the matrix (N, n) from modes of a link in 3D to modes of its pieces, both of the files.
 
     Pieces are given by where they begin, m from the root, from the root to the tip. Planes of bending, twist and
     stretch do not couple, so that their rigidities are of no account.

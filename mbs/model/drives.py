@@ -25,7 +25,7 @@ class PointDrive(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a unit of a command does: generalized forces `direction` (n_v,).
+    """Effect of a unit command: generalized forces `direction` (n_v,).
 
     Of motors on frames, not on sections, `frame` has the number of the body that the joint carries, and the sign.
     """

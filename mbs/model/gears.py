@@ -125,7 +125,7 @@ def resistance(model: Model, q: Array, v: Array) -> Array:
 
 
 def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
-    """Its derivative (T, n_v) by v, coordinate by coordinate, of joints in the tree."""
+    """Return the derivative (T, n_v) of the friction torque of tree joints by v, coordinate by coordinate."""
     return _of_frictions(tree, v, Friction.slope)
 
 

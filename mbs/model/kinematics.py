@@ -19,7 +19,7 @@ Placed = tuple[int, int]  # body, −1 the ground, and number of its marker
 
 
 class CutPlace(NamedTuple):
-    """Where a coordinate of a joint at which a loop is cut is measured, and what acts along it acts."""
+    """Location of the coordinate of a cut joint: where it is measured and where forces along it act."""
 
     # a, b: its sections, by numbers of wrenches
     a: int
@@ -42,12 +42,12 @@ class ModelParts(NamedTuple):
     cut: tuple[CutPlace, ...]
 
     def model(self) -> _core.SpatialModel:
-        """Of the core."""
+        """Return the model of the core."""
         return _core.SpatialModel(self.bodies, self.ground, self.rows, self.wrenches, self.gravity)
 
 
 class Markers:
-    """Where on the bodies of a tree, and on the ground, something is attached: made as it is asked for.
+    """Markers on bodies of a tree and on the ground, created on request.
 
     Attributes:
         of_bodies: sections of each body, by the numbers of its markers.
@@ -87,14 +87,14 @@ class Markers:
         return row_model
 
     def bodies(self, driven: Booleans | None = None) -> list[_core.SpatialBody]:
-        """With all markers; `driven` (n_v,): coordinates along which given forces act."""
+        """Return the core's bodies with all markers; `driven` (n_v,): coordinates along which given forces act."""
         return [
             carried_body(node, *sides, markers, driven is not None and bool(driven[node.v].any()))
             for node, sides, markers in zip(self._nodes, self._sides, self.of_bodies, strict=True)
         ]
 
     def standing(self) -> list[_core.SpatialMarker]:
-        """The ground's markers."""
+        """Return the markers on the ground."""
         turning = [number for number, _ in self.turning]
         markers = [_marker(section, np.zeros((6, 0)), section.position, []) for section in self._ground]
         for number, marker in enumerate(markers):
@@ -186,7 +186,7 @@ MOTION = 18  # numbers of one motion in the core: r, F, velocity, omega
 
 
 class Motion(NamedTuple):
-    """Of a triad over states: place r (T, 3), axes F (T, 3, 3), velocity and angular velocity (T, 3)."""
+    """Motion of a triad over states: position r (T, 3), m, axes F (T, 3, 3), velocity and angular velocity (T, 3)."""
 
     r: Array
     F: Array
@@ -222,7 +222,7 @@ class Kinematics:
 
     @classmethod
     def of_points(cls, nodes: Sequence[Node]) -> Kinematics:
-        """With the frames and points of all bodies, and the sections at joints.
+        """Make the kinematics of frames and points of all bodies, and of sections at joints.
 
         The core takes outputs of rotors, which have no mass, without sections: their frames are where it has them.
         """
@@ -235,7 +235,7 @@ class Kinematics:
         return cls(nodes, [*points, *still])
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """At states q (T, n_q) and v (T, n_v), by default at rest."""
+        """Return positions and motions at states q (T, n_q) and v (T, n_v), by default at rest."""
         rates = np.zeros((len(q), self.core.n_v)) if v is None else v
         return Places(
             self._numbers, self.core.motions(q, rates).reshape(len(q), len(self.nodes) + len(self._numbers), MOTION)
@@ -265,7 +265,7 @@ class Kinematics:
     def mobilities(
         self, q: Array, times: Array, is_path: Sequence[bool], length: float, loop_rank: int = -1
     ) -> list[_core.Mobility]:
-        """How joints can move with rigid links at q (T, n_q) and `times` (T,), ways in terms of `length` (m).
+        """Return the mobility with rigid links at q (T, n_q) and `times` (T,); `length` (m) scales displacements.
 
         Rows that are of no path close loops, of `loop_rank`; by default of the rank that they have there.
         """
@@ -273,14 +273,14 @@ class Kinematics:
 
 
 class Places:
-    """Where frames and sections of a tree are in states, and how they move."""
+    """Positions and motions of frames and sections of a tree over states."""
 
     def __init__(self, numbers: dict[tuple[object, ...], int], motions: Array) -> None:
         """`numbers` of sections in `motions` (T, frames and sections, 18)."""
         self._numbers, self._motions = numbers, motions
 
     def frame(self, number: int) -> Motion:
-        """Of the frame of body no. `number`."""
+        """Return the motion of the frame of body no. `number`."""
         return self._motion(self._numbers.get((number, "", None), number))
 
     def _motion(self, number: int) -> Motion:
@@ -288,7 +288,7 @@ class Places:
         return Motion(columns[:, :3], columns[:, 3:12].reshape(-1, 3, 3), columns[:, 12:15], columns[:, 15:])
 
     def at(self, section: Section) -> Motion:
-        """Of the triad of a section."""
+        """Return the motion of the triad of a section."""
         if section.body < 0:
             zero = np.zeros((len(self._motions), 3))
             return Motion(section.position + zero, np.tile(section.triad, (len(zero), 1, 1)), zero, zero)

@@ -22,7 +22,7 @@ class Wrench(NamedTuple):
     moment: Array
 
     def seen_from(self, arm: Array) -> Wrench:
-        """The same acting at `arm` (T, 3) from where moments are about: force, and moment about there."""
+        """Return the wrench about a point at `arm` (T, 3), m, from the present one."""
         return Wrench(self.force, self.moment + np.cross(arm, self.force))
 
     def plus(self, other: Wrench, sign: float = 1.0) -> Wrench:
@@ -43,15 +43,15 @@ class States(Protocol):
 
     @property
     def q(self) -> Array:
-        """(T, n_q)."""
+        """Positions (T, n_q)."""
 
     @property
     def v(self) -> Array:
-        """(T, n_v)."""
+        """Velocities (T, n_v)."""
 
     @property
     def a(self) -> Array:
-        """(T, n_v)."""
+        """Accelerations (T, n_v)."""
 
 
 class KnownStates(NamedTuple):
@@ -72,7 +72,7 @@ class SectionMotion(NamedTuple):
 
 @struct
 class MotionForces:
-    """What bodies and joints do to each other over states (T, …), global axes.
+    """Forces between bodies and in joints over states (T, …), global axes.
 
     Moments are about the origins of the sections on which they act: mbs/core/recursion/inverse/motion_forces.h.
     """
@@ -81,7 +81,7 @@ class MotionForces:
     found: _core.MotionForces
 
     def of_joint(self, number: int) -> Wrench:
-        """What the joint that carries body no. `number` does to its outer side, with a rotor that sits there."""
+        """Return the wrench of the joint of body no. `number` on its outer side, including a rotor there."""
         node, on_section = self.system.model.tree.nodes[number], _wrench(self.found.joints, number)
         if not node.backwards:
             return on_section
@@ -92,7 +92,7 @@ class MotionForces:
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
-        """Of each joint, about where its outer side is: what of `of_joint` does no work along it, at q (T, n_q).
+        """Return reaction wrenches of all joints about their outer sides, at q (T, n_q), without what does work.
 
         What drives, loads and brakes joints along their coordinates does the rest.
         """
@@ -102,23 +102,23 @@ class MotionForces:
         return [_wrench(table, number) for number in numbers]
 
     def of_row(self, number: int) -> tuple[Wrench, Wrench]:
-        """What row no. `number` does to its sections a and b; nothing where it is a joint coordinate of the tree."""
+        """Return the wrenches of row no. `number` on its sections a and b; zero for a joint coordinate of the tree."""
         return _wrench(self.found.constraints, 2 * number), _wrench(self.found.constraints, 2 * number + 1)
 
     @cached_property
     def at_points(self) -> list[list[tuple[Section, Wrench]]]:
-        """By body of the tree all that acts on it at its points and its frame, section by section."""
+        """Return, by body of the tree, all wrenches at its points and frame, with their sections."""
         wrenches: list[list[tuple[Section, Wrench]]] = [[] for _ in self.system.model.tree.nodes]
         for number, section in enumerate(self.system.sections):
             wrenches[section.body].append((section, _wrench(self.found.sections, number)))
         return wrenches
 
     def of_body(self, number: int) -> SectionMotion:
-        """Of the frame of body no. `number`."""
+        """Return the accelerations of the frame of body no. `number`."""
         return _motion(self.found.bodies, number)
 
     def of_point(self, point: str) -> SectionMotion:
-        """Of the section "BODY.POINT", which is one of those on which a drive of the system acts."""
+        """Return the accelerations of the section "BODY.POINT", on which a drive of the system must act."""
         return _motion(self.found.points, self.system.point_number(point))
 
 
@@ -131,14 +131,14 @@ def _motion(table: Array, number: int) -> SectionMotion:
 
 
 def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
-    """Under multipliers (T, rows) and all given forces of the system at `times` (T,)."""
+    """Return forces under multipliers (T, rows) and all given forces of the system at `times` (T,), s."""
     of_core = multipliers * system.row_signs
     forces = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
     return MotionForces(system, forces)
 
 
 def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
-    """What multipliers (T, rows) do by themselves to joints and constraints, at q (T, n_q)."""
+    """Return forces in joints and constraints of multipliers (T, rows) alone, at q (T, n_q)."""
     forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.row_signs)
     return MotionForces(system, forces)
 

@@ -50,7 +50,7 @@ class Model:
 
     @property
     def loop_rows(self) -> Booleans:
-        """(rows,) which rows close loops."""
+        """Whether rows (rows,) close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 
     @cached_property
@@ -60,7 +60,7 @@ class Model:
 
     @cached_property
     def senses(self) -> tuple[list[str], Kinematics]:
-        """What tells axes that "dot" rows align from opposite ones: positive cosines, with the owners of the rows.
+        """Cosines that distinguish parallel from opposite axes of "dot" rows, positive if parallel, with row owners.
 
         Of z of b against z of a and, of joints that do not turn, x against x. An owner's rows are of x and y of a with
         z of b and, of such joints, of x of a with y of b.
@@ -75,16 +75,16 @@ class Model:
 
     @cached_property
     def along_cut(self) -> AlongCut:
-        """What measures `cut`."""
+        """Measurement of the coordinates `cut`."""
         return AlongCut(self.tree, self.cut)
 
     @cached_property
     def motors(self) -> dict[str, Array]:
-        """By joint with motors: indices in v of its coordinates, in the scene's order."""
+        """Indices in v of motor coordinates by joint, in the scene's order."""
         return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
 
     def by_motor(self, values: Array) -> dict[str, Array]:
-        """By joint with motors: its columns of `values` (…, motors and whatever comes after them)."""
+        """Return columns of `values` (…, motors and any others) by joint with motors."""
         motors = self.motors
         parts = np.split(values, np.cumsum([len(columns) for columns in motors.values()]), axis=-1)
         return dict(zip(motors, parts[:-1], strict=True))
@@ -113,7 +113,7 @@ class Model:
         return self.driven(joint).sign
 
     def driven(self, joint: str) -> Node:
-        """What moments on a joint of the tree turn: the body that it carries, or its motor behind a compliant gear."""
+        """Return the node that torques on a joint turn: its body, or its motor behind a compliant gear."""
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
@@ -225,7 +225,7 @@ def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory
 
 
 def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
-    """By which a joint with one coordinate follows `target`, also one at which a loop is cut."""
+    """Return the row by which a joint with one coordinate, cut or not, follows `target`."""
     if joint.name not in tree.carried:
         return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
     node = tree.nodes[tree.carried[joint.name]]
@@ -245,7 +245,7 @@ def constraint_rates(model: Model, q: Array, v: Array, times: Array) -> Array:
 
 
 def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
-    """By joint of a loop, and trajectory of a tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
+    """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
 
     Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
     """
@@ -257,7 +257,7 @@ def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
 
 
 def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
-    """By trajectory of `held` how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
+    """Return path errors (T, m), m or rad, by trajectory of `held`, at `times` (T,), s, and q (T, n_q)."""
     C, owners = constraint_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
     return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
 

@@ -42,7 +42,7 @@ def driven_mechanism(model: Model, *, has_motors: bool = True) -> _core.SpatialD
 
 
 def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
-    """The same; of open chains that move in a plane in it, where their constraint equations are the same."""
+    """Return a mechanism of the core, planar for open chains in a plane if their equations are equal."""
     system = driven_system(model)
     if model.loop_rows.any() or system.plane is None:
         return driven_mechanism(model, has_motors=has_motors)
@@ -52,7 +52,7 @@ def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarD
 def integrated_mechanism(
     system: MultibodySystem, *, has_motors: bool = True
 ) -> _core.PlanarDriven | _core.SpatialDriven:
-    """The same as it is integrated: in the plane where all moves in one."""
+    """Return the mechanism as integrated: planar if all motion is in one plane."""
     (core, scene, rows), model = system.integrated, system.model
     is_path = [model.rows[k].is_trajectory for k in rows]
     driven: _core.PlanarDriven | _core.SpatialDriven
@@ -86,7 +86,7 @@ class InCore(NamedTuple):
 
 
 def frames_in_core(model: Model, core: _core.SpatialModel, q: Array) -> list[InCore]:
-    """Of all bodies, found at q (n_q,)."""
+    """Return the frames of all bodies for the core, at q (n_q,)."""
     places = model.tree.places(q[None])
     own = [places.frame(number) for number in range(len(model.tree.nodes))]
     return [
@@ -96,7 +96,7 @@ def frames_in_core(model: Model, core: _core.SpatialModel, q: Array) -> list[InC
 
 
 def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Array) -> dict[str, Array]:
-    """By body what the forces on the paths do on it alone (T, 6 + n): on its frame, in its axes, and on its modes."""
+    """Return, by body, path forces (T, 6 + n) on it alone: on its frame, in its axes, and on its modes."""
     system = driven_system(model)
     driven = driven_mechanism(model, has_motors=False)
     on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * system.row_signs)
@@ -125,14 +125,14 @@ def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
 
 
 def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
-    """The same, modal forces by body and in the modes of the modal body files."""
+    """Return motor torques, and modal forces by body in the modes of the modal body files."""
     moments, left, _ = split_forces(model, q, wanted)
     stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)
 
 
 class FrameShare(NamedTuple):
-    """What a unit moment of a motor on frames, along the tree's coordinate, does on modes beside.
+    """Effect of a unit torque of a motor on frames, along the tree's coordinate, on modes.
 
     `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v: the axis turns with the section.
     """
@@ -142,7 +142,7 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Of the motor of a revolute joint at q (n_q,): −Φ_rᵀ J_l(φ) z of both its sections.
+    """Return the modal effect −Φ_rᵀ J_l(φ) z, for both sections, of a revolute joint's motor at q (n_q,).
 
     Why: core/recursion/motion/frame_motor.h.
     """
@@ -172,7 +172,7 @@ def turning_motors(model: Model) -> list[str]:
 
 
 def motor_commands(model: Model) -> Iterator[Command]:
-    """What a unit of each motor does, in the order of `Model.motors`, on the second side of its joint."""
+    """Yield the effect of a unit command of each motor on the second side of its joint, in order of `Model.motors`."""
     turning = turning_motors(model)
     for joint, columns in model.motors.items():
         frame = (model.tree.carried[joint], model.sign(joint)) if joint in turning else None

@@ -28,7 +28,7 @@ class Section(NamedTuple):
     still: bool = False
 
     def turned(self, rotation: Array) -> Array:
-        """What modes turn it by, of rotations (…, 3, n) of the section, or (…, 3) with a last axis of length one."""
+        """Return the rotation of the section by modes, from rotations (…, 3, n), or (…, 3) with a last axis of one."""
         if not self.still:
             return rotation
         z = self.triad[:, 2]
@@ -56,7 +56,7 @@ class Node:
         return -1.0 if self.backwards else 1.0
 
     def coordinates(self, q: Array) -> Array:
-        """Those of the joint (…, k) as the scene counts them, at q (…, n_q)."""
+        """Return the joint's coordinates (…, k) in the scene's order, at q (…, n_q)."""
         own = self.joint.coordinates(q[..., self.q])
         return self.joint.turned_around(own) if self.backwards else own
 
@@ -104,7 +104,7 @@ class ConstraintRow:
 def coordinate_row(
     owner: str, node: Node, target: TimeFunction | None = None, column: int | None = None, sign: float = 1.0
 ) -> ConstraintRow:
-    """By which v[`column`] of the joint of a node, by default the first of its own, follows `target`, `sign` times."""
+    """Return the row by which `sign` · v[`column`] of a node's joint, by default its first, follows `target`."""
     k, none = node.v.start if column is None else column, np.zeros(3)
     return ConstraintRow(
         owner, "coordinate", node.inner, node.outer, none, none, coordinate=k, sign=sign, target=target
@@ -114,7 +114,7 @@ def coordinate_row(
 def rows_of_joint(
     owner: str, node: Node, columns: Array, targets: Sequence[TimeFunction | None], sign: float = 1.0
 ) -> list[ConstraintRow]:
-    """By which v[`columns`] of the joint of a node follow `targets`, `sign` times.
+    """Return the rows by which `sign` · v[`columns`] of a node's joint follow `targets`.
 
     Of planar joints between its sections, `sign` 1: the core prescribes no coordinates whose axes turn.
     """

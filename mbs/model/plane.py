@@ -39,14 +39,14 @@ class Plane(NamedTuple):
     cut: tuple[CutPlace, ...]
 
     def shares(self, component: int) -> list[tuple[int, float]]:
-        """Of a force (0, 1, 2) or moment (3, 4, 5) along a global axis: components of a planar wrench, with shares."""
+        """Return components and shares of a planar wrench for a global force (0, 1, 2) or moment (3, 4, 5)."""
         along = self.axes[:, component % 3]
         parts = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
         return [(k, float(share)) for k, share in parts if abs(share) > EXACT]
 
 
 def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
-    """The same mechanism in its plane; None where it has none. `is_path` (rows,): which rows may not be left out."""
+    """Return the mechanism in its plane; None without one. `is_path` (rows,): rows that must be kept."""
     if any(marker.turns for marker in parts.ground) or not all(body.joint in PLANAR for body in parts.bodies):
         return None
     frames = list(_frames(parts))

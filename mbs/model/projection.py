@@ -55,7 +55,7 @@ def projected(body: Body) -> Body:
 
 
 def vanishing_in_plane(body: Body) -> tuple[str, ...]:
-    """Which terms of the equations in the plane are round-off for the modes of a body; none of a rigid one."""
+    """Return names of terms that are round-off in the planar equations of a body; none of a rigid one."""
     if not body.n_modes:
         return ()
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(at.position)) for at in body.points.values()), default=0.0)
@@ -88,7 +88,7 @@ class AcrossError(Exception):
 
 
 def axes_across(normal: Array) -> Array:
-    """(3, 3) rows x, y and the normal; x is the axis x where the normal is square to it."""
+    """Return axes (3, 3), rows x, y and the normal; x is the axis x if the normal is perpendicular to it."""
     x = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
     x = x - normal * (normal @ x)
     x /= np.linalg.norm(x)
@@ -96,7 +96,7 @@ def axes_across(normal: Array) -> Array:
 
 
 def axes_of_triad(normal: Array) -> Array:
-    """(3, 3) rows: of a planar marker x, y and the normal, in axes of the triad that it stands for.
+    """Return axes (3, 3) of a planar marker, rows x, y and the normal, in axes of the triad it stands for.
 
     Revolute and planar joints have z along the normal and keep x and y, prismatic ones slide along z: it becomes x.
     """

@@ -22,7 +22,7 @@ from .projection import EXACT
 
 
 class Derivatives(NamedTuple):
-    """By increments δ of q, by v and by generalized forces, all along v (n_v)."""
+    """Derivatives by increments δ of q, by v and by generalized forces, all along v (n_v)."""
 
     # a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are. Springs in gears
     # are left as they are: see `gear_matrices`
@@ -80,17 +80,17 @@ class MultibodySystem:
 
     @cached_property
     def core(self) -> _core.SpatialModel:
-        """In space."""
+        """The 3D model of the core."""
         return self._parts.model()
 
     @cached_property
     def scene(self) -> _core.TreeScene:
-        """What the rows of `core` follow, and what acts on it."""
+        """Functions that rows of `core` follow, and given loads."""
         return self._follow(None)
 
     @cached_property
     def plane(self) -> Plane | None:
-        """In the plane in which all moves, with the same q and v; None where there is none.
+        """The plane that contains all motion, with the same q and v; None without one.
 
         Forces of the motion of points may lead out of it, but for those of scenes in the plane.
         """
@@ -105,14 +105,14 @@ class MultibodySystem:
 
     @cached_property
     def integrated(self) -> Integrated:
-        """What integrators take: in the plane where all moves in one."""
+        """The model for integrators: planar if all motion is in one plane."""
         if self.plane is None:
             return Integrated(self.core, self.scene, np.arange(len(self.model.rows)))
         return Integrated(self.plane.model, self._follow(self.plane), self.plane.followed)
 
     @cached_property
     def replay(self) -> _core.Replay | None:
-        """What integrators take of the numbers that are replayed; None where there are none."""
+        """Replayed numbers for integrators; None without any."""
         if self.replayed is None:
             return None
         size = len(OF_POINT) if self.plane is None else 3
@@ -125,17 +125,17 @@ class MultibodySystem:
         return _core.Replay(self.replayed.source, zero_order_hold(self.model, self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
-        """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
+        """Return multipliers (T, rows) of the model from those of `integrated`; 0 for omitted or dependent rows."""
         of_rows = of_core if self.plane is None else of_core @ self.plane.spread.T
         return of_rows * self.row_signs
 
     @property
     def sections(self) -> list[Section]:
-        """Of the core's sections."""
+        """Sections of the core's model, in its order."""
         return [self._markers.of_bodies[body][marker] for body, marker in self.core.sections]
 
     def point_number(self, point: str) -> int:
-        """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
+        """Return the index among the core's wrenches of "BODY.POINT", on which a load or drive acts."""
         return self._wrenches.index(self._markers.place(self.model.tree.section(point)))
 
     def forward_model(self) -> _core.ForwardModel:
@@ -180,11 +180,11 @@ class MultibodySystem:
 
     @property
     def row_signs(self) -> Array:
-        """(rows,) −1 where the core's row, target and multiplier count the tree's coordinate, not the joint's."""
+        """Signs (rows,): −1 if the core's row counts the tree's coordinate, not the joint's."""
         return np.array([row.sign for row in self.model.rows])
 
     def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
-        """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
+        """Return derivatives of accelerations and rows by q, v and forces, at time t (s) under the scene's loads.
 
         `supplied` (n_v,) acts beside loads, friction and springs in gears. Rows that depend on others at q, v are left
         out.

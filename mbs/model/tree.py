@@ -132,7 +132,7 @@ class KinematicTree:
 
     @property
     def joint_columns(self) -> Booleans:
-        """(n_v,) which of v belong to joints, not to modes."""
+        """Whether entries (n_v,) of v belong to joints, not to modes."""
         is_joint = np.ones(self.n_v, dtype=bool)
         for node in self.nodes:
             is_joint[node.p_v] = False
@@ -148,7 +148,7 @@ class KinematicTree:
         return q
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """Where all frames and sections are at states q (T, n_q), and how they move with v (T, n_v), else at rest."""
+        """Return positions of frames and sections at q (T, n_q), and their motions with v (T, n_v), else at rest."""
         return self._moving.places(q, v)
 
     def integrate(self, q: Array, dv: Array) -> Array:
@@ -204,7 +204,7 @@ def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[Cons
 
 
 def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutCoordinate]:
-    """Of all joints at which loops are cut and whose coordinates the tree has not."""
+    """Yield coordinates of cut loop joints that the tree does not contain."""
     for joint in tree.cut_joints:
         frictions = joint.frictions or (None,) * len(joint.along)
         guesses = np.array(scene.initial.joints.get(joint.name, ()), dtype=float).ravel()
@@ -215,7 +215,7 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
 
 
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
-    """What measures a coordinate of a joint at which a loop is cut, `sign` times: of the second side on the first."""
+    """Return the row of a coordinate of a cut joint, times `sign`: of the second side relative to the first."""
     along = joint.along[number]
     sides = [tree.section(side, triad, joint.at) for side, triad in zip(joint.between, joint.triads(), strict=True)]
     if joint.name in tree.on_frames:
@@ -227,7 +227,7 @@ def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> Constra
 
 
 class CutMotion(NamedTuple):
-    """Of a coordinate along a joint at which a loop is cut."""
+    """Motion of a coordinate along a cut joint."""
 
     coordinate: Array  # (T,), full turns counted
     rate: Array  # (T,)
@@ -268,7 +268,7 @@ class AlongCut:
         return D
 
     def motions(self, q: Array, v: Array, times: Array) -> list[CutMotion]:
-        """Of each at q (T, n_q), v (T, n_v) and `times` (T,); angles begin nearest to their guesses."""
+        """Return motions at q (T, n_q), v (T, n_v) and `times` (T,), s; angles start nearest to their guesses."""
         motions = list[CutMotion]()
         if self._kinematics is None:
             return motions

@@ -60,7 +60,7 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
 
 
 def modes_kept(body: Body) -> str:
-    """How many of its modes (in the plane: of those that move there) a body has, in words."""
+    """Return the number of modes of a body as text; in planar scenes of those that move in the plane."""
     if body.reduction is None:
         attachment = f" and {body.attachment_modes} attachment modes" if body.attachment_modes else ""
         return f"all {body.n_eigenmodes} modes{attachment}"

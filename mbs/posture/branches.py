@@ -36,7 +36,7 @@ SAME = 1e-6  # rad: angles that differ by less
 
 
 class StartPosture(NamedTuple):
-    """One of them.
+    """Initial posture of a robot, with the guess that selects it.
 
     `q` (n_q,); `guess`, the line of [initial] that chooses it, and `guesses`, its coordinates by joint; `away` (rad),
     the largest turn to it; `branch`, how its joints stand, by name (see `branch_names`).
@@ -112,7 +112,7 @@ MEETING = 1e-6  # of the size of the robot: axes that miss each other by less me
 
 
 def branch_names(model: Model, q: Array) -> dict[str, Word]:
-    """By joint, how the arm that carries the tool stands at q (n_q,): shoulder, elbow and wrist, as far as it has them.
+    """Return the branch at q (n_q,) by joint: configuration of shoulder, elbow and wrist of the tool's arm.
 
     The wrist is the fifth of six turning joints. An arm whose first axis is not parallel to the next two has a shoulder
     and an elbow, one whose first two are parallel an elbow.

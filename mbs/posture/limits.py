@@ -35,12 +35,12 @@ class Watched(NamedTuple):
 
     @property
     def limits(self) -> tuple[float, float]:
-        """In the core: of the tree's coordinate."""
+        """Limits of the tree's coordinate, for the core."""
         lowest, highest = sorted(self.sign * limit for limit in self.joint.position_limits[self.number])
         return lowest, highest
 
     def seen(self, found: Seen) -> Seen:
-        """Of the joint's coordinate, from what the core has found."""
+        """Return the core's findings in terms of the joint's coordinate."""
         least, largest = sorted(self.sign * value + 0.0 for value in found[:2])
         return least, largest, found[2]
 

@@ -40,7 +40,7 @@ def robot_size(model: Model) -> float:
 
 
 def row_sizes(model: Model) -> Array:
-    """(rows,) natural sizes of C: 1 rad, or the robot's size."""
+    """Return natural sizes (rows,) of C: 1 rad, or the robot's size, m."""
     length = robot_size(model)
     return np.array([length if model.measures_way(row) else 1.0 for row in model.rows])
 
@@ -52,7 +52,7 @@ def solve_posture(model: Model, t: float, q: Array, held: Booleans | None = None
 
 
 def posture_search(model: Model) -> PostureSearch:
-    """By steps of joints, modes staying as they are."""
+    """Return a search by joint coordinates; modal coordinates stay constant."""
     # Coordinates by themselves have no branches
     farthest = np.inf if all(row.kind == "coordinate" for row in model.rows) else LARGEST_TURN
     return PostureSearch(joint_scales(model), row_sizes(model), farthest)
@@ -88,7 +88,7 @@ def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans 
 
 
 def joint_scales(model: Model) -> Array:
-    """(n_v,) natural size of the joints' coordinates: 1 rad, or the size of the robot; 0 of modes, which stay."""
+    """Return natural sizes (n_v,) of joint coordinates: 1 rad or the robot's size, m; 0 for modes, which stay."""
     scales, length = np.zeros(model.tree.n_v), robot_size(model)
     for node in model.tree.nodes:
         units = node.joint.units or node.joint.guess_units
@@ -99,7 +99,7 @@ def joint_scales(model: Model) -> Array:
 
 @struct
 class Mobility:
-    """How the rigid mechanism can move in a posture."""
+    """Mobility of the rigid mechanism in a posture."""
 
     freedom: int  # degrees of freedom that joints and loops leave
     followed: int  # how many of these the trajectories take
@@ -110,7 +110,7 @@ class Mobility:
 
 
 def mobilities(model: Model, times: Array, q: Array, loop_rank: int = -1) -> list[_core.Mobility]:
-    """With rigid links and gears at `times` (T,) and q (T, n_q).
+    """Return the mobility with rigid links and gears at `times` (T,), s, and q (T, n_q).
 
     Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
     `loop_rank` is their rank with straight ones.
@@ -120,14 +120,14 @@ def mobilities(model: Model, times: Array, q: Array, loop_rank: int = -1) -> lis
 
 
 def row_ratios(model: Model, times: Array, q: Array, rank: int) -> Array:
-    """(T,) of the singular values of all rows, not zero by their `rank`: least over largest, as in `mobilities`."""
+    """Return smallest over largest nonzero singular value (T,) of all rows, by their `rank`, as in `mobilities`."""
     is_path = [False] * len(model.rows)
     motions = model.constraints.mobilities(q, times, is_path, robot_size(model), rank)
     return np.array([at.loop_ratio for at in motions])
 
 
 def mobility(model: Model, q: Array) -> Mobility:
-    """Of the mechanism with rigid links and gears at q (n_q,)."""
+    """Return the mobility with rigid links and gears at q (n_q,)."""
     at = mobilities(model, np.zeros(1), q[None])[0]
     freedom, left = at.free.shape[1] - len(model.tree.gears), _joints(model, _largest(at.left) > MOVES)
     return Mobility(freedom, at.followed, at.ratio, left, at.loop_rank)
@@ -145,7 +145,7 @@ def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
 
 
 def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
-    """How many rows of paths move what loops lock at q (n_q,) with rigid links, and the joints that these lock.
+    """Return how many path rows move coordinates locked by loops at q (n_q,), links rigid, and these joints.
 
     0 with rigid links: there nothing lets such rows move.
     """
@@ -166,7 +166,7 @@ def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> 
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
-    """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine.
+    """Return a message on the worst posture q (n_q,) of a path, at time t (s) with that ratio; "" if regular.
 
     Of one in which the run ends it is said to be singular. `loop_rank` as in `mobilities`.
     """
@@ -179,7 +179,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
 
 
 def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
-    """Where loops pass a singular posture, in which branches meet, at `times` (T,) and q (T, n_q); "" if far from one.
+    """Return a message if loops pass a singular posture at `times` (T,) and q (T, n_q); "" if far from one.
 
     `loop_rank` as in `mobilities`.
     """
@@ -195,7 +195,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
 
 def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
-    """Of loops, and of paths through them, at q (n_q,), v (n_v,) and time t: whether their rows hardly differ here.
+    """Return a message if loop rows are nearly dependent at q (n_q,), v (n_v,) and time t (s); else "".
 
     "" where they do, or did not before.
     """
@@ -333,7 +333,7 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
 
 
 def misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """(T − 1, …) what the trapezoidal rule on the next derivative misses of each change between `times` (T, …)."""
+    """Return (T − 1, …) deviations of the trapezoidal rule on the next derivative from changes between `times`."""
     value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
     missed: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
     return np.nan_to_num(missed, nan=0.0, posinf=0.0)

@@ -38,14 +38,14 @@ PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
 
 
 def prescribed_by(mechanism: _core.PlanarDriven | _core.SpatialDriven, q: Array) -> PrescribedMotion:
-    """What prescribes the modes of a mechanism, and finds its postures from q (n_q,) on."""
+    """Return the prescribed motion of a mechanism's modes; postures are searched from q (n_q,) on."""
     if isinstance(mechanism, _core.PlanarDriven):
         return _core.PlanarPrescribedMotion(mechanism, q)
     return _core.SpatialPrescribedMotion(mechanism, q)
 
 
 def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, times: Array, near: Array) -> Prescribed:
-    """At `times` (T,), with `modes` (3, T, n): p, ṗ and p̈ of all bodies, from postures near (T, n_q).
+    """Return the motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, from postures near (T, n_q).
 
     From a single one, near the first, postures are found one after the other. The multipliers are those that go with
     joints that move freely: what is left of the forces on the modes holds the shape.
@@ -88,5 +88,5 @@ def left_slopes(
 
 
 def joint_places(model: Model) -> Array:
-    """Where the joints of all bodies stand in q."""
+    """Return indices in q of the joints of all bodies."""
     return np.concatenate([np.arange(node.q.start, node.q.stop) for node in model.tree.nodes])

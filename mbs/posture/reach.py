@@ -34,7 +34,7 @@ class _Chain(NamedTuple):
 
 
 def out_of_reach(model: Model, times: Array) -> str:
-    """How far the first path that leads beyond the reach of the links does, at the first of `times` (T,); else ""."""
+    """Return a message on the first path that leaves the reach of the links, at the first of `times` (T,); else ""."""
     return next((f'trajectory "{name}" {how}' for name, how in _all_beyond(model, times)), "")
 
 
@@ -92,7 +92,7 @@ def _chain(model: Model, point: str) -> _Chain | None:
 
 
 def working_start(model: Model, guess: Array) -> Array | None:
-    """(n_q,) in whole degrees, from which a regular posture meets all rows at t = 0; None if none is found.
+    """Return q (n_q,) in whole degrees from which a regular posture satisfies all rows at t = 0; None if not found.
 
     Of random coordinates of joints that turn, those nearest to `guess` (n_q,); others stay there.
     """
@@ -127,14 +127,14 @@ def _angles(node: Node) -> list[int]:
 
 
 def regular_postures(model: Model, q: Array) -> Array:
-    """Of postures next to q (T, n_q) those (…, n_q) that meet all rows at t = 0 and are regular."""
+    """Return postures (…, n_q) near q (T, n_q) that satisfy all rows at t = 0 and are regular."""
     found, is_met = solve_postures(model, np.zeros(len(q)), q)
     found = found[is_met]
     return found[are_regular(model, found, np.zeros(len(found)))]
 
 
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
-    """(T,) whether joints follow all rows at `times` (T,) in the postures q (T, n_q)."""
+    """Return (T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q)."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
     return np.asarray(row_ratios(model, times, q, rank) > REGULAR)
 

@@ -119,7 +119,7 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
 
 
 def rank_of_redundant_loops(model: Model, rows: Indices) -> int | None:
-    """Of the constraints of loops among `rows`, where straight links make some of them redundant; else None.
+    """Return the rank of loop constraints among `rows` if straight links make some redundant; else None.
 
     Bent links raise it: joints seem to be locked that the links let move. So does a path by which links bend.
     """

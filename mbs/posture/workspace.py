@@ -177,7 +177,7 @@ def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
 
 
 def within_limits(model: Model, q: Array) -> Booleans:
-    """(P,) whether postures q (P, n_q) keep the limits of all joints."""
+    """Return (P,) whether postures q (P, n_q) are within the limits of all joints."""
     cut = any(np.isfinite(joint.position_limits).any() for joint in model.tree.cut_joints)
     if cut and len(q) > 1:  # angles there are by the motion up to them
         return np.array([within_limits(model, one[None])[0] for one in q])

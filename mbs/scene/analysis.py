@@ -28,7 +28,7 @@ class Need(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """Where an analysis stands: those before it, itself and those after it, and what returns all kinds."""
+    """Position of an analysis among the others of a scene, with all known kinds."""
 
     earlier: Sequence["Analysis"]
     later: Sequence["Analysis"]
@@ -78,7 +78,7 @@ class Analysis(Referring):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Which kinds have the key."""
+        """Return the message for a key of other kinds."""
         if not others:
             return ""
         kinds = either(other.kind_name() for other in others if issubclass(other, Analysis))
@@ -86,7 +86,7 @@ class Analysis(Referring):
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """With the kind that has to have the key."""
+        """Return the message for a missing key, with the kind."""
         return f'expected the key "{key}" in kind = "{cls.kind_name()}", found none'
 
     @property
@@ -110,7 +110,7 @@ class Analysis(Referring):
         return getattr(self, "check", None) is not None
 
     def run(self, context: Any) -> Any:
-        """What is found."""
+        """Return the run of the analysis."""
         raise NotImplementedError
 
     def needs(self) -> Iterator[Need]:
@@ -123,7 +123,7 @@ class Analysis(Referring):
         yield from ()
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """What does not fit the analyses that it stands among, a line each."""
+        """Yield what does not fit the other analyses of the scene, a line each."""
         yield from ()
 
 
@@ -154,7 +154,7 @@ class TimedAnalysis(Analysis):
 
     @property
     def last_time(self) -> float:
-        """`end`."""
+        """End of the paths, s: `end`."""
         return self.end
 
 
@@ -178,7 +178,7 @@ class IntegratedAnalysis(TimedAnalysis):
 
     @property
     def is_repeated(self) -> bool:
-        """With `repeat_steps`."""
+        """Whether steps of an earlier run are repeated (`repeat_steps`)."""
         return self.repeat_steps is not None
 
     @model_validator(mode="after")
@@ -254,12 +254,12 @@ class ActuatedAnalysis(IntegratedAnalysis):
         yield from self.replay_problems(source)
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """What of `source` cannot be replayed in the way that is asked for."""
+        """Yield what of `source` cannot be applied as requested, a line each."""
         yield from ()
 
 
 def output_times(end: float, step: float, before: float = 0.0, after: float = 0.0) -> Array:
-    """(T,) s: multiples of `step` from −`before` to `end` + `after`, whole steps; `end` is one of them, exactly."""
+    """Return output times (T,), s: multiples of `step` from −`before` to `end` + `after`; `end` exactly."""
     if not (end and step):
         return np.zeros(1)
     early, late, count = (round(x / step) for x in (before, after, end))

@@ -29,7 +29,7 @@ ROUNDING = 1e-9  # of the largest entry of an inertia tensor
 
 
 def tensor(inertia: Inertia) -> Array:
-    """(3, 3) from [xx, yy, zz] or all nine entries."""
+    """Return the inertia tensor (3, 3), kg·m², from [xx, yy, zz] or all nine entries."""
     array = np.array(inertia, dtype=float)
     return np.diag(array) if array.ndim == 1 else array
 

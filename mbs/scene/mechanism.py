@@ -66,7 +66,7 @@ class Initial(Referring):
         return self._named.get(table, frozenset(getattr(self, table)))
 
     def naming(self, **named: frozenset[str]) -> Self:
-        """The same with these joints in `named`, by table, which other joints have values beside."""
+        """Return the guesses with these joints in `named`, by table, beside values for all other joints."""
         copy = self.model_copy()
         copy._named = named
         return copy
@@ -148,7 +148,7 @@ class MechanismKeys(Record):
 
     @property
     def topology(self) -> Topology:
-        """Which joint carries which body, by numbers of `joint`."""
+        """Return which joint carries which body, by indices of `joint`."""
         return spanning_forest([body.name for body in self.body], self.edges)
 
     @property
@@ -159,7 +159,7 @@ class MechanismKeys(Record):
 
     @property
     def tool_point(self) -> str | None:
-        """Which point is the tool: that of the last path of one, else the last tool; None where there is neither."""
+        """Point of the last path of a point, else of the last tool; None without either."""
         points = [*(tool.reference for tool in self.tool), *(path.point for path in self.trajectory if path.point)]
         return points[-1] if points else None
 

@@ -59,7 +59,7 @@ class Shaper(Record):
 
 
 class MotionKeys(Referring):
-    """What a trajectory has beside what follows it."""
+    """Keys of the motion of a trajectory."""
 
     via: Annotated[tuple[Place, ...], OfPlaces] | None = None
     """Waypoints from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""

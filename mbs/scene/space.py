@@ -25,11 +25,11 @@ class Space:
         return len(self.rotations) == 1
 
     def along(self, vectors: Array) -> Array:
-        """Of places, velocities or forces (…, 3) the components along its axes (…, d)."""
+        """Return components (…, d) along the space's axes of positions, velocities or forces (…, 3)."""
         return vectors[..., list(self.translations)]
 
     def about(self, vectors: Array) -> Array:
-        """Of angular velocities or moments (…, 3) the components about its axes (…, 3), in the plane one (…)."""
+        """Return components about the space's axes of angular velocities or moments (…, 3): (…, 3), planar (…)."""
         return vectors[..., self.rotations[0]] if self.is_plane else vectors[..., list(self.rotations)]
 
 

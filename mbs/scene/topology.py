@@ -18,7 +18,7 @@ class Edge(NamedTuple):
 
 
 class Carrier(NamedTuple):
-    """What carries a body: the number of the joint, the body's `own` side of it and the `other`."""
+    """Joint that carries a body: its index, the body's `own` side and the `other` side."""
 
     joint: int
     own: str

@@ -154,7 +154,7 @@ class Trajectory(MotionKeys):
             raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
 
     def changed(self, **keys: object) -> Self:
-        """The same with some keys replaced."""
+        """Return the trajectory with some keys replaced."""
         return type(self)(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
 
     @property
@@ -164,12 +164,12 @@ class Trajectory(MotionKeys):
 
     @property
     def turning_axis(self) -> Vector3:
-        """Of an absolute angle."""
+        """Axis of an absolute angle."""
         return self.axis or (0.0, 0.0, 1.0)
 
     @property
     def force_components(self) -> tuple[str, ...]:
-        """What its forces are: those of `components`, then moments about global axes, or two about a tool's axis."""
+        """Names of the force components: `components`, then moments about global axes or two about a tool axis."""
         if self.orientation is None:
             return tuple(self.components)
         return (*self.components, *(("mx", "my", "mz") if self.tool_axis is None else ("tool 1", "tool 2")))
@@ -210,7 +210,7 @@ class Trajectory(MotionKeys):
 
     @cached_property
     def orientation(self) -> OrientationLaw | None:
-        """How the section turns; None where that is left open."""
+        """Prescribed orientation of the section; None if it is free."""
         if self._turning is not None:
             assert self._turns is not None
             return OrientationLaw("rotation_vector", tuple(self._turning.functions()), self._turns[1])
@@ -224,13 +224,13 @@ class Trajectory(MotionKeys):
 
     @property
     def tool_triad(self) -> tuple[tuple[float, ...], ...]:
-        """Of a tool axis: rows of the triad of the section whose z is along it."""
+        """Triad of the section with z along the tool axis, rows."""
         assert self.tool_axis is not None
         return tuple(map(tuple, as_rows(smallest_turn(np.array(self.tool_axis)))))
 
     @property
     def row_count(self) -> int:
-        """How many constraints it is: three of a full orientation, two of a direction."""
+        """Number of constraints: three for a full orientation, two for a direction."""
         turning = 0 if self.orientation is None else 2 if self.direction is not None else 3
         return len(self.components) + turning
 
