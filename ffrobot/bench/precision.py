@@ -38,7 +38,7 @@ NEGLIGIBLE_PEAK = 1e-6
 
 
 def histories(results: Results, analysis: str) -> dict[str, dict[str, Array]]:
-    """What errors are taken of: by kind of quantity and dataset name, an array (T,) or (T, columns) each."""
+    """Return the histories whose errors are measured, by kind and dataset: arrays (T,) or (T, columns), SI units."""
     found = _datasets(results, analysis, _KIND_OF)
     if "displacement" not in found:
         found |= _datasets(results, analysis, _WITHOUT_DEFLECTION)
@@ -62,7 +62,7 @@ def _datasets(results: Results, analysis: str, kinds: Mapping[tuple[str, str], s
 
 
 def errors(found: Mapping[str, Mapping[str, Array]], reference: Mapping[str, Mapping[str, Array]]) -> dict[str, float]:
-    """By kind: the largest difference at any output of any dataset, relative to that dataset's peak in `reference`.
+    """Return, by kind, the largest difference at any output, relative to the peak of the same dataset in `reference`.
 
     Kinds that the reference does not have are left out, and datasets that only one of them has.
     """
@@ -84,7 +84,7 @@ UNLIMITED = 10**12  # steps: the budget ends a run
 
 @dataclass(frozen=True)
 class TimedRun:
-    """What a run took and gave.
+    """One solve: how it ended, its cost, and its histories.
 
     Attributes:
         integrator: the one that ran; for "auto" the one chosen.
@@ -206,7 +206,7 @@ Row = dict[str, object]
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """What errors are measured against.
+    """The run against which errors are measured.
 
     Attributes:
         error: by kind, the difference from the run with `other`: an estimate of the larger error of the two.
@@ -221,13 +221,13 @@ class ReferenceRun:
     bodies: Mapping[str, str] = field(repr=False)
 
     def about(self) -> Row:
-        """For the record."""
+        """Integrators, tolerances and errors of the reference, for the JSON record."""
         keys = ("integrator", "tolerance", "other", "other_tolerance")
         return {**{key: getattr(self, key) for key in keys}, "error": dict(self.error)}
 
     @property
     def in_words(self) -> str:
-        """For the title of a table."""
+        """The reference and its error as text, for the title of a table."""
         error = ", ".join(f"{kind} {value:.0e}" for kind, value in self.error.items())
         other = f"which {self.other} at {self.other_tolerance:.0e} agrees with to"
         return f"against {self.integrator} at {self.tolerance:.0e}, {other}: {error}"
@@ -244,7 +244,7 @@ class Point:
     seconds: list[float]
 
     def row(self) -> Row:
-        """For the table."""
+        """Row of the table: integrator, tolerance, least and median run time (s), steps, errors by kind."""
         return {
             "integrator": self.integrator,
             "ran": self.first.integrator,
@@ -366,7 +366,7 @@ def refined(scene: Scene, elements: float, modes: float) -> Scene | None:
 
 
 def sizes_of(scene: Scene) -> dict[str, str]:
-    """What the link files say of elements and modes, for the record: "20" or "20, 40"."""
+    """Return numbers of elements and modes in the link files, for the record: "20", or "20, 40" where they differ."""
     links = [link_keys(body.link) for body in scene.body if body.link is not None]
     meshes = (item for keys in links for item in keys.get("mesh", {}).items())
     elements = [str(value) for key, value in meshes if key not in ("cell", "order")]

@@ -225,7 +225,7 @@ def print_import(imported: Imported, console: Console) -> None:
 
 
 def print_export(exported: Exported, console: Console) -> None:
-    """What was written, and what the format does not carry."""
+    """Print remarks on what the format does not contain, and the file."""
     for remark in exported.remarks:
         console.print(f"note       {remark}", soft_wrap=True)
     console.print(f"written    {exported.path}: {exported.what}", soft_wrap=True)

@@ -72,7 +72,7 @@ class LinkTarget:
         self._tables = load_toml(path, "link file")
 
     def start(self, key: Key) -> object:
-        """What the file says at `key`; None where it is not given."""
+        """Return the value of `key` in the file; None if absent."""
         return value_of(self._tables, key)
 
     def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
@@ -117,7 +117,7 @@ class RobotTarget:
         self._tables |= {name: link for name, link in bodies.items() if isinstance(link, dict)}
 
     def start(self, key: Key) -> object:
-        """What scene or link file say at `key`, `links.BODY.…` in the latter; None where it is not given."""
+        """Return the value of `key` in the scene, or in a link file for `links.BODY.…`; None if absent."""
         if key[0] != LINKS:
             return value_of(self._scene, key)
         return value_of(self._tables, key[1:]) if len(key) > 2 else None

@@ -53,7 +53,7 @@ class Fit:
 
     @property
     def deviation(self) -> Array:
-        """(n,) standard deviations of the parameters, in their units."""
+        """Standard deviations (n,) of the parameters, in their units."""
         return self.relative_deviation * self.value
 
     @property
@@ -73,7 +73,7 @@ class Fit:
 
     @property
     def error(self) -> Array:
-        """(m,) of the fitted frequencies, relative to the measured ones."""
+        """Relative errors (m,) of the fitted frequencies."""
         return self.after / self.measured - 1.0
 
     @property

@@ -30,12 +30,12 @@ NOT_IN_TABLE = ("compliance", "response", "robot")
 
 
 def torque_share(poses: PoseMap) -> Array:
-    """(P, motors) of the torque of each motor in the pose in its limit; nan where it has none."""
+    """Return static torque over limit (P, motors) in P poses; NaN without a limit."""
     return np.abs(poses.values["torque"]) / poses.limits
 
 
 def write_map(poses: PoseMap) -> Path:
-    """Both files in the folder of the plan; the HDF5 file."""
+    """Write map.h5 and table.csv to the folder of the plan; returns the path of map.h5."""
     plan = poses.plan
     with in_memory() as file:
         file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, MARK: CHECKSUM})
@@ -113,7 +113,7 @@ class Quantity(NamedTuple):
 
 
 def quantities(poses: PoseMap) -> dict[str, Quantity]:
-    """By the name of their picture."""
+    """Return the mapped quantities by the names of their pictures."""
     values, table = poses.values, {}
     for condition, words in CONDITIONS.items():
         if f"joints_{condition}/frequency" in values:

@@ -98,7 +98,7 @@ STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
 
 @dataclass(frozen=True)
 class MapPlan:
-    """What a map is made of.
+    """Request of a map: scene, grid, point, number of frequencies, folder.
 
     Attributes:
         point: "BODY.POINT" whose stiffness and place it has.
@@ -117,7 +117,7 @@ class MapPlan:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the grid."""
+        """Number of grid points along each axis."""
         return tuple(len(axis.values) for axis in self.axes)
 
 

@@ -64,11 +64,11 @@ class MovingBody:
 
     @property
     def global_points(self) -> Array:
-        """Where the points are in global axes (T, k, 3), m."""
+        """Positions of the points (T, k, 3), m, global axes."""
         return self.placed(self.points + self.deflection)
 
     def exaggerated(self, s: float) -> Array:
-        """Where the points are (T, k, 3), m, with deflections s times as large."""
+        """Return positions of the points (T, k, 3), m, global axes, with deflections times s and closed joints."""
         return self.placed(self.points + s * self.deflection) + (s - 1.0) * self.shift[:, None]
 
     def global_deflection(self, point: str) -> Array:
@@ -128,7 +128,7 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
 
 
 def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
-    """(T, 3, 3) the axes of the section on a `side` of a joint, "BODY.POINT"; of the ground the global ones.
+    """Return axes (T, 3, 3), columns, of the section on a `side` of a joint, "BODY.POINT"; global ones for the ground.
 
     Those of the frame where sections are not known.
     """
@@ -145,7 +145,7 @@ def size_of(bodies: Sequence[MovingBody]) -> float:
 
 
 def largest_deflection(bodies: Iterable[MovingBody]) -> float:
-    """Of any component of any point at any output, m."""
+    """Return the largest deflection component of all points and outputs, m."""
     return max((float(np.abs(body.deflection).max(initial=0.0)) for body in bodies), default=0.0)
 
 
@@ -165,7 +165,7 @@ PLACES = ("x", "y", "z")  # components of trajectories that are places
 
 @dataclass(frozen=True)
 class PointTarget:
-    """Where a point should be: the `columns` (0 for x, 1 for y, 2 for z) of its position, (T, m) in m."""
+    """Prescribed position of a point: `columns` (0, 1, 2 for x, y, z) and their values `wanted` (T, m), m."""
 
     trajectory: str
     point: str
@@ -174,7 +174,7 @@ class PointTarget:
 
     @property
     def places(self) -> Array:
-        """(T, 3) m, zero where it specifies nothing."""
+        """Prescribed positions (T, 3), m; zero in components that are not prescribed."""
         places = np.zeros((len(self.wanted), 3))
         places[:, self.columns] = self.wanted
         return places
@@ -219,7 +219,7 @@ class Marker:
     directions: Array
 
     def exaggerated(self, s: float) -> Array:
-        """Where it is (T, 3), m, with deflections s times as large."""
+        """Return the position (T, 3), m, with deflections times s."""
         return self.position + (s - 1.0) * self.exaggeration
 
 
@@ -237,7 +237,7 @@ def tool_marker(point: str, bodies: Sequence[MovingBody]) -> Marker:
 
 
 def tool_markers(targets: Iterable[PointTarget], bodies: Sequence[MovingBody]) -> list[Marker]:
-    """Of each point that follows a path, once."""
+    """Return a marker for each point that follows a path."""
     return [tool_marker(point, bodies) for point in dict.fromkeys(target.point for target in targets)]
 
 
@@ -259,7 +259,7 @@ def _place(side: str, bodies: Sequence[MovingBody]) -> tuple[Array, Array]:
 
 
 def ground_places(scenes: Iterable[Mapping[str, Any]]) -> Array:
-    """(g, 3) where joints of any of the scenes sit on the ground, each place once, in m."""
+    """Return positions (g, 3), m, of joints on the ground in any of the scenes, each once."""
     joints = [joint for scene in scenes for joint in scene.get("joint", []) if GROUND in joint["between"]]
     places = [in_3d(np.array(joint.get("at", (0.0, 0.0)), dtype=float)) for joint in joints]
     return np.array(list(dict.fromkeys(map(tuple, places)))).reshape(-1, 3)

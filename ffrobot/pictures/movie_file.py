@@ -25,7 +25,7 @@ COLORS = 256  # of a frame of a GIF
 
 @dataclass(frozen=True)
 class MovieOptions:
-    """What a movie shows.
+    """Options of a movie.
 
     Attributes:
         analysis: the first that goes through time if None.

@@ -13,7 +13,7 @@ TOOL_COLORS = ("#D55E00", "#009E73", "#0072B2")  # of x, y, z
 
 
 class View(NamedTuple):
-    """Where a viewer stands: unit vectors (3,) that go right and up in the picture, and towards the viewer."""
+    """Direction of view: unit vectors (3,) to the right and up in the picture, and towards the viewer."""
 
     right: Array
     up: Array

@@ -83,12 +83,12 @@ LAYERS = 4  # clusters that remain at least over each of the three dimensions of
 
 
 def triangles_of(cells: Integers) -> Integers:
-    """(t, 3) of triangles or quadrilaterals."""
+    """Return triangles (t, 3); quadrilaterals are split in two."""
     return cells if cells.shape[1] == 3 else np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
 
 
 def coarsened(points: Array, triangles: Integers, limit: int) -> tuple[Indices, Integers]:
-    """Which of many points (p, 3) remain, and triangles (at most `limit`, 3) on those.
+    """Reduce a surface: return indices of kept points (p, 3), and at most `limit` triangles on them.
 
     Points in the same box of a grid become the one nearest to their mean (vertex clustering: Rossignac & Borrel, 1993),
     so that the points that remain keep their exact displacements. Boxes are as small as the limit allows, and across a
@@ -181,7 +181,7 @@ class Shape:
         return self.body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
 
     def placed(self, s: float = 1.0) -> Array:
-        """Where its points are (T, p, 3), m, with deflections s times as large and joints shut."""
+        """Return positions of the points (T, p, 3), m, global axes, with deflections times s and closed joints."""
         rest = self.body.placed(np.broadcast_to(self.points, (len(self.coordinates), *self.points.shape)))
         places: Array = rest + s * self.deflection
         return places if s == 1.0 else places + (s - 1.0) * self.body.shift[:, None]
@@ -250,7 +250,7 @@ def thickened(shape: Shape, radius: float) -> Shape:
 
 
 def shortest_tree(points: Array) -> Integers:
-    """(p − 1, 2) which of points (p, 3) to join so that all are connected by the shortest lines."""
+    """Return the edges (p − 1, 2) of the shortest tree that connects points (p, 3)."""
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     distance = np.linalg.norm(points[:, None] - points, axis=2)

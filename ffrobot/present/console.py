@@ -41,7 +41,7 @@ def plain_console(file: TextIO, width: int) -> Console:
 
 
 def summary_console() -> Console:
-    """The standard output."""
+    """Return the standard output as a console."""
     return plain_console(sys.stdout, summary_width())
 
 
@@ -92,7 +92,7 @@ class Display(Watcher):
         os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
 
     def advance(self, t: float, end: float) -> bool:
-        """Move the bar."""
+        """Update the bar, or print a line now and then."""
         if self._progress is not None and self._task is not None:
             self._progress.update(self._task, completed=t, total=end)
         elif self._progress is None:

@@ -200,7 +200,7 @@ def _rows(joint: str, found: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]
 
 
 def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTask]]:
-    """By joint with a motor of one coordinate, its load without the rotor that the scene has now.
+    """Yield the load of each joint with one coordinate and a motor, without the scene's rotor.
 
     Accelerations are derivatives of a cubic spline through the rates at outputs. Peaks of the torque between outputs
     count: the load is scaled by their ratio to the largest output.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """What is said of several analyses, once for all of them."""
+    """Yield each text once, after the names of all analyses with it."""
     names: dict[str, list[str]] = {}
     for name, text in lines:
         names.setdefault(text, []).append(name)
@@ -37,7 +37,7 @@ def folded(lines: Iterable[str]) -> Iterator[str]:
 
 
 def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Of all analyses by name; of those whose links bend too much the worst in full, the others by name."""
+    """Yield warnings of all analyses; deflection warnings in full for the worst analysis only."""
     bent = {name: text for name, links in bending.items() if (text := deflection_warning(links))}
     if bent:
         worst = max(bent, key=lambda name: max(link.missing.of_length for link in bending[name].values()))
@@ -48,7 +48,7 @@ def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mappin
 
 
 def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
-    """How far links bend, and what it does to results, in the analysis in which it is worst."""
+    """Describe the largest deflection of links and its effect on results, in the worst analysis."""
     found = [worst for links in bending if (worst := largest(links)) is not None]
     if not found:
         return "links are rigid"

@@ -114,7 +114,7 @@ def log_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """As `warnings.showwarning`: warnings of libraries are for developers, in the log; those of this one for users."""
+    """Replace `warnings.showwarning`: warnings of libraries go to the log, those of ffrobot to the user."""
     if issubclass(category, FfrobotWarning):
         click.echo(f"ffrobot: {message}", err=True)
     LOGGER.info("%s line %d: %s: %s", filename, lineno, category.__name__, message)

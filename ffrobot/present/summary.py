@@ -28,7 +28,7 @@ Row = tuple[str, ...]
 def summary_lines(
     verdict: Verdict, notes: Sequence[str], accuracy: str, results: str, width: int, printed: int = 0
 ) -> list[str]:
-    """At most `LINES` lines of `width` columns, less those that are `printed` already.
+    """Return the summary in `width` columns, at most `LINES` lines less those already `printed`.
 
     What has no room is counted, and left to `--verbose`. `notes` stand below warnings; `accuracy` and `results` (the
     name of the file) come last.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # most scenes have none of these
 
 
 def write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:
-    """Of an analysis: pzt/, by layout.
+    """Write pzt/ of an analysis, a group for each layout.
 
     `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
     """
@@ -49,7 +49,7 @@ def write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation) 
 
 
 def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
-    """Of an analysis: feasibility/."""
+    """Write feasibility/ of an analysis."""
     entry = group.create_group("feasibility")
     layouts = {name: array.layout for of_link in solution.patches.values() for name, array in of_link.arrays.items()}
     entry.attrs["feasible"] = judged.is_feasible
@@ -86,7 +86,7 @@ def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[st
 
 
 def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeasibility]:
-    """Of the feasibility of an analysis: what every motor has to do, in the order of `joints`."""
+    """Read requirements and limits of motors from feasibility/ of an analysis, in the order of `joints`."""
     from ..actuation.motors import MotorFeasibility
 
     about = {name: group["joints"][name].attrs for name in joints if f"joints/{name}" in group}
@@ -94,7 +94,7 @@ def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeas
 
 
 def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
-    """Of the feasibility of an analysis: what nothing supplies; None where there is nothing of the kind."""
+    """Read the forces that neither motors nor patches supply, from feasibility/; None if there are none."""
     if "unsupplied" not in group:
         return None
     from ..actuation.feasibility import Unsupplied
@@ -105,7 +105,7 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
 
 
 def write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces, space: Space) -> None:
-    """Of the actuation points of one body what has no peaks, as far as the `space` of the scene has it."""
+    """Write position, direction and residual of the actuation points of a body, in axes of the scene's `space`."""
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
     group["position"] = space.along(np.array([point.position for point in points.points]))
@@ -117,7 +117,7 @@ def write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces,
 
 
 def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
-    """Of an analysis: placement/, with the patches found and those spread evenly.
+    """Write placement/ of an analysis: optimum and evenly spaced patches.
 
     What each reaches, and what one patch would reach anywhere.
     """

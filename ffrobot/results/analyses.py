@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class AnalysisAccess(Datasets):
-    """What a results file has of its analyses."""
+    """Access to a results file by analysis: histories, tables, linear models, verdict."""
 
     @property
     def analyses(self) -> list[str]:

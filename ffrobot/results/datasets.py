@@ -68,7 +68,7 @@ class Datasets:
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the HDF5 file; datasets cannot be read any more."""
         self._file.close()
 
     def keys(self) -> list[str]:

@@ -34,7 +34,7 @@ class ModalFile:
 
 
 class LinkAccess(Datasets):
-    """What a results file has of its links."""
+    """Access to a results file by link: modal bodies, modal coordinates, stresses."""
 
     @property
     def modal_files(self) -> dict[str, ModalFile]:
@@ -85,7 +85,7 @@ FORMAT = "ffrobot-results"
 
 
 def status_in_words(attributes: Mapping[str, Any]) -> str:
-    """How an analysis with these attributes ended, with the number of its warnings: "completed, 2 warnings"."""
+    """Return status and number of warnings from an analysis's attributes: "completed, 2 warnings"."""
     status, count = attributes["status"], len(attributes.get("warnings", ()))
     return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
 

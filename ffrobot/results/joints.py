@@ -31,12 +31,12 @@ class Coordinate(NamedTuple):
     limits: MotorLimits
 
     def of(self, values: Array) -> Array:
-        """Its own (T,) of `values` of a dataset of its joint, (T,) or (T, coordinates)."""
+        """Return the column (T,) of this coordinate in `values` of a joint's dataset, (T,) or (T, coordinates)."""
         return values.reshape(len(values), -1)[:, int(self.column[1:-1] or 0)]
 
     @property
     def force_unit(self) -> str:
-        """Of what acts along it: "N·m" or "N"."""
+        """Unit of force or torque along the coordinate, "N·m" or "N"."""
         return "N·m" if self.unit == "rad" else "N"
 
 
@@ -46,7 +46,7 @@ def joint_type(keys: Mapping[str, Any]) -> type[JointRecord]:
 
 
 def joint_keys(scene: Scene, name: str) -> Mapping[str, Any]:
-    """What the scene says of a joint; nothing of one that it does not have."""
+    """Return the table of a joint in the scene; empty without such a joint."""
     return next((keys for keys in scene.get("joint", []) if keys["name"] == name), {})
 
 
@@ -67,6 +67,6 @@ Coordinates = Mapping[str, tuple[str, Coordinate]]
 
 
 def labelled_coordinates(scene: Scene) -> Coordinates:
-    """Those of all joints, in the order of the scene."""
+    """Return the coordinates of all joints by label, in the order of the scene."""
     names = [str(joint["name"]) for joint in scene.get("joint", [])]
     return {f"{name}{one.label}": (name, one) for name in names for one in joint_coordinates(scene, name)}

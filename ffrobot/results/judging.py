@@ -66,7 +66,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
 
 
 def end_of(scene: Scene, name: str) -> float:
-    """Of an analysis, s, by default that of its actuation; 0 of one without duration."""
+    """Return the end of an analysis, s, or of its actuation; 0 for one without duration."""
     keys: Mapping[str, Any] = next((keys for keys in scene.get("analysis", []) if keys["name"] == name), {})
     return float(keys["end"]) if "end" in keys else end_of(scene, keys["actuation"]) if "actuation" in keys else 0.0
 

@@ -35,7 +35,7 @@ Shapes = Mapping[str, Mapping[str, Array]]
 
 
 def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
-    """Of an analysis: linear/, and what is held; `motion` is what it is about."""
+    """Write linear/ of an analysis, and its joint conditions."""
     n_v, space = run.model.tree.n_v, run.space
     shapes = _shapes(run, np.array([modes.motion.real for modes in linear.modes]))
     write_joint_conditions(group, run, linear)
@@ -49,7 +49,7 @@ def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
 
 
 def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | RobotAtRest) -> None:
-    """Of an analysis, by condition of the joints (`joint_conditions`): joints_locked/ and joints_compliant/."""
+    """Write joints_locked/ and joints_compliant/ of an analysis: frequencies, modes, compliance."""
     for condition in details.conditions[0]:
         held, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
         own["frequency"] = np.array([one.modes.frequency for one in held])
@@ -186,7 +186,7 @@ def save_models(models: Sequence[LinearModel], path: Path) -> None:
 
 
 def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
-    """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
+    """Write tip_error and control/ of a closed loop: samples, and metrics and names as attributes."""
     metrics, error = record.metrics, group.create_dataset("tip_error", data=record.tip_error)
     error.attrs.update(peak=metrics.tip_error_max, peak_time=record.tip_error_peak_time, rms=metrics.tip_error_rms)
     group = group.create_group("control")

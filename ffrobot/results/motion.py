@@ -28,7 +28,7 @@ SAME = 1e-9  # of a time: what differs by less is rounding
 
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis: bodies/ and points/; modes of planar scenes are those that move in the plane."""
+    """Write bodies/ and points/ of an analysis; modes of planar scenes are those that move in the plane."""
     run, histories = result.run, result.histories
     forces = actuator_forces(histories.run)
     for name, points in reported_points(run).items():
@@ -56,7 +56,7 @@ def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) 
 
 
 def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:
-    """How far flexible bodies leave small deformations: attributes of bodies/BODY."""
+    """Write deflection, foreshortening and their errors as attributes of bodies/BODY."""
     for name, link in links.items():
         group[f"bodies/{name}"].attrs.update(
             {
@@ -79,7 +79,7 @@ def read_modal(group: h5py.Group, body: str) -> Array:
 
 
 def read_recovery(group: h5py.Group, body: str) -> Recovery:
-    """What stresses of a flexible body of an analysis are computed from; in old files modal coordinates alone."""
+    """Read the data for stresses of a flexible body in an analysis; old files contain modal coordinates alone."""
     if f"stress/{body}/modal" not in group:
         return mode_displacement(read_modal(group, body))
     entry = group[f"stress/{body}"]
@@ -92,7 +92,7 @@ def read_recovery(group: h5py.Group, body: str) -> Recovery:
 
 
 def write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> None:
-    """Of one body, at its stress points and on its surface at `outputs`, and what they were computed from."""
+    """Write stresses of a body at stress points and on its surface at `outputs`, and the data for them."""
     recovery = stress.recovery.at(outputs)
     group.attrs["method"] = recovery.method
     group["modal"] = recovery.modal
@@ -108,7 +108,7 @@ def write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> Non
 
 
 def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
-    """Of an analysis: trajectories/ that hold in it, or that motors alone follow; at rest before and after."""
+    """Write trajectories/ of an analysis: prescribed or followed paths, constant before and after their duration."""
     run, details = result.run, result.run.details
     inside = np.clip(run.time, 0.0, run.analysis.last_time)
     errors = {} if details.held is None else path_errors(details.held, run.time, run.q)
@@ -134,7 +134,7 @@ def _write_path(entry: h5py.Group, trajectory: Trajectory) -> None:
 
 
 def write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis: joints/, what has no peaks."""
+    """Write joints/ of an analysis, except quantities with peaks."""
     run = result.run
     for joint in solution.scene.joint:
         entry = group.create_group(f"joints/{joint.name}")

@@ -21,7 +21,7 @@ SAME_TIME = 9  # digits of output times (s) that count
 
 
 def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """How far a replay is off the paths that its actuation follows, at outputs and between: off_path/."""
+    """Write off_path/: distance of a replay from the paths of its actuation, at outputs and between."""
     source, run = str(group.attrs["actuation"]), result.histories.run
     if source not in solution.analyses or own_results(group).is_controlled or not len(run.time):
         return
@@ -39,7 +39,7 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
 
 
 def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
-    """Of an analysis; `feasible` as its verdict says."""
+    """Return the tool error of an analysis; `feasible` is that of its verdict."""
     own = own_results(group)
     if own.is_controlled and (about := own.about(group)):
         return ToolError(controlled=float(about["tip_error_max"]))
@@ -55,7 +55,7 @@ def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> Too
 
 
 def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
-    """Of a replay: each point with its largest distance (m) from the path and the RMS, while both last.
+    """Yield each point of a replay with its largest and RMS distance (m) from the path, over their common time.
 
     Of points whose path was given, along the axes for which it was; of old files at outputs that both have.
     """

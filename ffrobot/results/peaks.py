@@ -85,7 +85,7 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
 
 
 def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], outputs: Indices) -> None:
-    """To an analysis `histories` at `time` (T,), s: those of them that are outputs, and peaks of all.
+    """Write `histories` at `time` (T,), s: values at outputs, and peaks over all times.
 
     Attributes `peak`, `peak_time`, `rms`, `mean` are of every column, of vectors of the length.
     """

@@ -42,7 +42,7 @@ STOPPED = ("interrupted", "too many steps", "not evaluated")
 
 
 def how_to_go_on(solution: Solution, command: str) -> str:
-    """What a message about a run that was stopped adds; empty where it cannot be resumed, or by no `command`."""
+    """Return the part of a message that states how to resume a stopped run; empty if it cannot be resumed."""
     if not command:
         return ""
     outcome = stopped(solution)
@@ -149,7 +149,7 @@ COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 
 
 def write_earlier_run(group: h5py.Group, outcome: Run) -> None:
-    """What the next step of a run depends on, and its numbers that results files do not hold anyway."""
+    """Write the state that the next step of a run depends on, and its counts."""
     assert outcome.continuation is not None
     for name in ROWS:
         group[name] = getattr(outcome, name)

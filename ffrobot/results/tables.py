@@ -18,7 +18,7 @@ Cells = dict[str, str]
 
 
 def analysis_cells(results: Results, verdict: AnalysisVerdict) -> Cells:
-    """How an analysis went, and what it took."""
+    """Return the table row of an analysis: status, integrator, steps, tolerance, wall time."""
     from ..mbs.run.integrators import Choice  # loads the core
 
     about, time = results.attributes(verdict.name), results.time(verdict.name)
@@ -38,7 +38,7 @@ def analysis_cells(results: Results, verdict: AnalysisVerdict) -> Cells:
 
 
 def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
-    """What the patches of every layout should give, and what they can."""
+    """Yield a table row for each layout: required voltage, limit, their ratio."""
     for layout in results.names(f"{analysis}/pzt"):
         group = f"{analysis}/pzt/{layout}"
         about, patches = results.attributes(group), range(results[f"{group}/required_voltage"].shape[1])
@@ -73,7 +73,7 @@ def robustness_cells(results: Results, analysis: str) -> Iterator[Cells]:
 
 
 def settling_cells(results: Results, analysis: str) -> Iterator[Cells]:
-    """How far points are from their final position once all paths are over."""
+    """Yield a table row for each point with residual vibration after the paths."""
     for point in results.names(f"{analysis}/settling"):
         about = results.attributes(f"{analysis}/settling/{point}")
         if not vibrates(about):
@@ -96,7 +96,7 @@ def volts(value: float) -> str:
 
 
 def loop_cells(metrics: Metrics) -> Cells:
-    """How well a closed loop follows its reference, and what that takes."""
+    """Return the table row of a closed loop: errors, settling, effort, saturation."""
     return {
         "verdict": metrics.verdict.partition(" ")[0].replace("not", "stable"),  # and settling: "no"
         "rms (mm)": f"{1e3 * metrics.tip_error_rms:.3g}",

@@ -55,7 +55,7 @@ def vibrates(about: Mapping[str, Any]) -> bool:
 
 @struct
 class Settled:
-    """Of the point that vibrates most once all paths are over: see `mbs.quantities.settling.Settling`."""
+    """Residual vibration of the point that vibrates most after all paths; see `mbs.quantities.settling.Settling`."""
 
     point: str
     residual: float  # m, peak to peak

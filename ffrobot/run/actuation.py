@@ -29,7 +29,7 @@ FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no mo
 
 @struct
 class Actuation:
-    """What an analysis asks of motors and patches.
+    """Requirements of an analysis on motors and patches.
 
     Attributes:
         voltages: by layout.
@@ -48,7 +48,7 @@ class Actuation:
 
 
 def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
-    """By body. Raises `InputError` for layouts that do not fit their link, or do not serve what an analysis asks."""
+    """Return patches by body. Raises `InputError` for layouts that do not fit link or analyses."""
     if not scene.pzt:
         return {}
     from ..actuation.patches.link_patches import check_reach, link_patches, on_kept_modes
@@ -76,7 +76,7 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
 
 
 def given_voltages(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
-    """What the voltages that the scene gives to patches do on modes."""
+    """Yield the drives of voltages that the scene prescribes for patches."""
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
     for load in model.scene.load:
         if load.pzt is not None:
@@ -112,7 +112,7 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str,
 
 
 def missing_forces(run: Run, actuation: Actuation) -> dict[str, Array]:
-    """By body, modal forces (T, n), modes of its file, that nothing supplies; none where nothing is missing."""
+    """Return modal forces (T, n) by body, modes of its file, that nothing supplies; empty if none are missing."""
     forces = actuator_forces(run)
     if forces is None or not motors_fit(run) or not (actuation.unmet or actuation.feasibility.unsupplied):
         return {}

@@ -75,7 +75,7 @@ IN_PLANE: tuple[Family, ...] = ("in-plane-bending",)
 
 
 def robot_damping_ratios(bodies: Mapping[str, LoadedBody]) -> dict[str, float]:
-    """By body: ζ of the links that want it of the robot's vibrations."""
+    """Return ζ by body, for links whose damping ratio is that of the robot's vibrations."""
     return {
         name: float(modal.damping_ratio[0])
         for name, body in bodies.items()
@@ -103,7 +103,7 @@ def records_on(
 
 
 def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
-    """In the order of the scene, with payloads and patches; stage 1 (after `stage`) where links are out of date.
+    """Load bodies in the order of the scene, with payloads and patches; runs stage 1 for outdated links.
 
     They have geometric stiffening where the scene, or the key `pieces` of the body, may put it into the equations.
 

@@ -60,7 +60,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def files_of_tables(path: Path, text: str) -> list[Path]:
-    """Likewise, of a scene with the TOML `text` that was made in Python."""
+    """Return the path of a scene with the TOML `text`, and all files that it names."""
     return [path, *named_files(tomllib.loads(text), path.parent)]
 
 
@@ -87,6 +87,6 @@ def digest_of_file(path: Path) -> str:
 
 
 def changed(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """What differs between two fingerprints, by name: files by the last part of theirs."""
+    """Return names of what differs between two fingerprints, for files the last part."""
     names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
     return list(dict.fromkeys(name if name == PROGRAM else Path(name).name for name in names))

@@ -25,7 +25,7 @@ Errors = Mapping[str, Mapping[str, float]]
 
 @struct
 class ModeChoice:
-    """What the search for the number of modes found.
+    """Result of the search for the number of modes.
 
     Attributes:
         errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
@@ -101,7 +101,7 @@ def _remaining(ratio: float) -> float:
 
 
 def difference(now: Reported, before: Reported) -> dict[str, float]:
-    """By kind, the largest difference of two solves relative to the peak of its quantity."""
+    """Return, by kind, the largest difference of two solves relative to the peak of its quantity."""
     errors = {}
     for kind, quantities in now.items():
         peaks = {name: np.abs(values).max(initial=0.0) for name, values in quantities.items()}
@@ -115,7 +115,7 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
 
 
 class ModeSearch:
-    """How many modes to solve a scene with next, and when there are enough.
+    """Search for a sufficient number of modes.
 
     `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`mode_levels`).
     """
@@ -154,7 +154,7 @@ class ModeSearch:
         return len(self._levels) - 1 - self._level
 
     def choice(self) -> ModeChoice:
-        """What was found."""
+        """Return numbers of modes tried, the kept ones and their estimated errors."""
         errors = self._estimate.errors if self._completed else {}
         if not self._more:
             errors = {name: dict.fromkeys(of, 0.0) for name, of in errors.items()}
@@ -167,7 +167,7 @@ class ModeSearch:
 
 
 def error_tolerances(scene: Scene) -> dict[str, float]:
-    """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
+    """Return the error tolerance of each analysis; default of algebraic ones: the tightest of the integrated ones."""
     tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
     return {
         analysis.name: tightest

@@ -42,7 +42,7 @@ def links_in_pieces(solution: Solution) -> dict[str, LinkInPieces]:
 
 
 def wanted_pieces(solution: Solution) -> dict[str, int]:
-    """How many pieces bodies with `pieces = "auto"` want after a solve; empty where they have them.
+    """Return the number of pieces for bodies with `pieces = "auto"` after a solve; empty if they have it.
 
     What a piece loses of its length goes down with the square of their number. A run that failed has bent links
     farther than they are.
@@ -58,7 +58,7 @@ def wanted_pieces(solution: Solution) -> dict[str, int]:
 
 
 def bending_of_links(solution: Solution, run: Run) -> dict[str, Bending]:
-    """How far flexible bodies bend, links in pieces as their worst piece, and whether they can be divided further."""
+    """Return deflections of flexible bodies (of links in pieces, the worst piece) and whether they can be divided."""
     bodies = solution.parts or solution.bodies
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
     worst = worst_of_pieces(link_bending(run, links), solution.divided)
@@ -100,7 +100,7 @@ def _shortening(solution: Solution, name: str) -> float:
 
 
 def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyInPieces]) -> dict[str, Bending]:
-    """How far links bend, each divided one as its piece whose results are worst."""
+    """Return deflections of links; for a divided link those of its worst piece."""
     link_of = {piece: name for name, body in divided.items() for piece in body.names}
     worst: dict[str, Bending] = {}
     for piece, bent in bending.items():
@@ -114,7 +114,7 @@ def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyIn
 
 
 def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:
-    """How far links bend, none with smaller errors than the worst: what one does wrong moves and loads all others."""
+    """Return deflections with the largest errors for all links: errors of one link move and load all others."""
     missing = [of.missing for of in bending.values()] or [Missing(0.0, 0.0)]
     worst = Missing(*(max(errors) for errors in zip(*missing, strict=True)))
     return {name: replace(of, missing=of.missing.grown_to(worst)) for name, of in bending.items()}

@@ -63,7 +63,7 @@ def _with_points(bodies: Bodies, points: Mapping[str, PointSet]) -> Bodies:
 
 
 def with_scene(solution: Solution, scene: Scene) -> Solution:
-    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    """Return the same bodies in a scene with other trajectories or analyses, not solved yet."""
     return _unsolved(replace(solution, scene=scene))
 
 

@@ -55,7 +55,7 @@ def robust(scene: Scene) -> Scene:
 
 
 def deviations(context: ActuatedContext, source: Run) -> Deviations:
-    """Of the result of an analysis that asks for them. Raises `InputError` for robots with compliant gears."""
+    """Return the robustness table of a run. Raises `InputError` for robots with compliant gears."""
     asked: Robustness = source.analysis.robustness  # type: ignore[attr-defined]
     if elastic_joints(context.model):
         raise InputError(

@@ -51,7 +51,7 @@ if TYPE_CHECKING:  # most scenes have none of these
 
 @struct
 class FinerCheck:
-    """What a replay on twice the modes found.
+    """Result of a forward simulation on links with twice the modes.
 
     Attributes:
         modes: eigenmodes of each flexible body in it.
@@ -71,7 +71,7 @@ class FinerCheck:
 
     @property
     def in_words(self) -> str:
-        """On how many modes, and how far off."""
+        """Number of modes, largest deviation and least voltage as text."""
         ended = "" if self.status == "completed" else f", which ended early ({self.status})"
         modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
         least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
@@ -84,7 +84,7 @@ class FinerCheck:
 
 @struct
 class Histories:
-    """What has peaks, at outputs of an analysis and at times between them.
+    """Quantities with peaks, at outputs of an analysis and at times between them.
 
     Attributes:
         run: at these times.
@@ -105,7 +105,7 @@ class Histories:
 
 @struct
 class AnalysisResult:
-    """What was computed of one analysis.
+    """Results of one analysis.
 
     Attributes:
         run: its motion, with forces that redundant constraints share, and how it went.
@@ -140,13 +140,13 @@ class AnalysisResult:
 
     @cached_property
     def actuation(self) -> Actuation | None:
-        """What patches have to do, and whether motors and patches can; None where nothing is prescribed."""
+        """Requirements on motors and patches at outputs; None if nothing is prescribed."""
         actuation = self.histories.actuation
         return None if actuation is None else actuation.at(self.histories.outputs)
 
     @property
     def analysis(self) -> Analysis:
-        """What was asked for."""
+        """Record of the analysis."""
         return self.run.analysis
 
     @cached_property
@@ -157,7 +157,7 @@ class AnalysisResult:
 
     @cached_property
     def start_jolt(self) -> float:
-        """See `attachment_error`."""
+        """Relative jump of acceleration at the start; see `attachment_error`."""
         return start_jolt(self._start) if self._is_integrated else 0.0
 
     @cached_property
@@ -170,7 +170,7 @@ class AnalysisResult:
 
     @property
     def status(self) -> str:
-        """How the run ended."""
+        """Status of the run, such as "completed"."""
         return self.run.status
 
     @property
@@ -190,7 +190,7 @@ class AnalysisResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is worth knowing of results that are right, a text each."""
+        """Properties of correct results, a text each."""
         model = self.run.model
         texts = () if self.sharing is None else (self.sharing.in_words,)
         if self.run.is_prescribed and model.tree.loops and not model.motors:
@@ -247,7 +247,7 @@ class Solution:
 
     @property
     def outcomes(self) -> dict[str, Run]:
-        """How each analysis went, by its name."""
+        """Runs by the name of their analysis."""
         runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
         return {run.analysis.name: run for run in runs}
 
@@ -268,12 +268,12 @@ class Solution:
 
     @property
     def omissions(self) -> tuple[str, ...]:
-        """What a planar scene does not need, one line each."""
+        """Parts of the equations that a planar scene omits, one line each."""
         return tuple(omissions(self.scene, self.bodies)) if self.scene.is_planar else ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What links cannot do, and modes left out, one line each."""
+        """Notes on motions that links cannot perform, and on omitted modes, one line each."""
         left_out = (
             f"{name}: all modes but {modes_kept(body.spatial)}"
             for name, body in self.bodies.items()
@@ -283,7 +283,7 @@ class Solution:
 
     @property
     def link_notes(self) -> tuple[str, ...]:
-        """What links cannot do, and what their meshes leave out, one line each."""
+        """Notes on motions that links cannot perform, and on their meshes, one line each."""
         rigid = (
             f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
             for name, body in self.bodies.items()

@@ -75,7 +75,7 @@ def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Soluti
 
 
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
-    """What `solve_scene` does with everything prepared; analyses go on from where `solution.earlier` has them."""
+    """Run the analyses of a prepared solution; they resume from `solution.earlier` if present."""
     check_turning(solution.model)
     with Interruption(watcher) as interruption:
         judge = partial(_judged, replace(solution, earlier={}), interruption)

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 @struct
 class BodyInPieces:
-    """How a body of a scene is cut, and the names of its pieces as bodies, from the root to the tip."""
+    """Division of a body, and the names of its pieces as bodies, from root to tip."""
 
     cut: CutLink
     names: tuple[str, ...]
 
     def point(self, label: str) -> str:
-        """Where one of its points is, as PIECE.POINT."""
+        """Return the piece and name, PIECE.POINT, of one of the body's points."""
         piece, name = self.cut.places[label]
         return f"{self.names[piece]}.{name}"
 
@@ -85,7 +85,7 @@ def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
 
 
 def places_on_pieces(divided: Mapping[str, BodyInPieces]) -> dict[str, str]:
-    """Where each point "BODY.POINT" of the bodies in pieces is, as PIECE.POINT."""
+    """Map each point "BODY.POINT" of divided bodies to PIECE.POINT."""
     return {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
 
 

@@ -34,7 +34,7 @@ OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a l
 
 
 def remarks(scene: Scene) -> Iterator[str]:
-    """Of a scene that is valid, one line each: units of links, bodies and tools, angles, times of paths."""
+    """Yield remarks on a valid scene, one line each: units of links, bodies and tools, angles, times of paths."""
     links: dict[str, Link] = {}
     for body in scene.body:
         if body.link is not None:
@@ -196,7 +196,7 @@ def _voltages(scene: Scene) -> Iterator[str]:
 
 
 def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -> Iterator[str]:
-    """Of an analysis with so many outputs, where they may take more than half of the `available` bytes."""
+    """Yield a remark if that many outputs may take more than half of the `available` bytes."""
     if (needed := outputs * bodies * OUTPUT) > available / 2:
         yield (
             f"{label}: {outputs} outputs may take {needed / 1e9:.2g} GB of memory, of {available / 1e9:.2g} GB that"

@@ -57,7 +57,7 @@ class Candidate:
 
     @property
     def settled(self) -> float:
-        """When (s) the point stays within the tolerance of its final place; infinite where it does not."""
+        """Time (s) from which the point stays within the tolerance of its final position; infinite if never."""
         of = self.ride.settling
         return np.inf if of is None or np.isnan(of.time_to) else float(self.times[-1]) + of.time_to
 

@@ -23,7 +23,7 @@ CAUSES = ("jitter", "jump", "noise", "gap", "coarse", "resonance")
 
 @struct
 class Diagnosis:
-    """Of one stream of set points on one robot.
+    """Diagnosis of a stream of set points on a robot.
 
     Attributes:
         recording, ride: the stream, and the robot under it.
@@ -51,7 +51,7 @@ class Diagnosis:
         return 0.0 if settling is None or not self.frequencies.size else settling.residual
 
     def verdict(self, robot: Robot) -> str:
-        """In words what it is, and what causes it."""
+        """Return the fault and its cause as text."""
         kinds = list(dict.fromkeys(fault.kind for fault in self.faults))
         causes = [kind for kind in kinds if kind.startswith(CAUSES)]
         settling = self.ride.settling
@@ -96,7 +96,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
 
 
 def modes_along(robot: Robot, ride: Ride) -> list[Modes]:
-    """Of postures along the motion, the last of them its end."""
+    """Return modes at postures along the motion, the last one at its end."""
     return [robot.modes(ride.q[k]) for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
 
 

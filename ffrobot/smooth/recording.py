@@ -65,7 +65,7 @@ class Recording:
 
 
 def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> Recording:
-    """Of all joints of `scene` with motors, by their names, from a CSV table, a JointTrajectory, or a bag of ROS.
+    """Read positions of all joints with motors from a CSV table, a JointTrajectory, or a bag of ROS.
 
     Raises:
         InputError: a joint is missing, or has several coordinates; rows do not move; angles seem to be degrees.
@@ -95,7 +95,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
 
 
 def without_rest(recording: Recording) -> Recording:
-    """The same until it comes to its last place."""
+    """Return the recording up to the time at which it reaches its final position."""
     moving = np.flatnonzero(np.abs(recording.values - recording.values[-1]).max(axis=1) > STILL)
     last = min(int(moving[-1]) + 2, len(recording.times))
     rates = None if recording.rates is None else recording.rates[:last]
@@ -151,7 +151,7 @@ def _check_unit(path: Path, joints: Sequence[JointRecord], values: Array) -> Non
 
 @struct
 class Fault:
-    """What is wrong with a stream of set points: its `kind`, and in a line."""
+    """Fault of a stream of set points: its `kind`, and a line of text."""
 
     kind: str
     text: str
@@ -191,7 +191,7 @@ def is_even(recording: Recording) -> bool:
 
 
 def evened(recording: Recording) -> Recording:
-    """With rows at even times, where these make a smoother motion."""
+    """Return the recording with rows at even times, if these make a smoother motion."""
     if recording.rates is not None or not is_even(recording):
         return recording
     return replace(recording, times=np.arange(len(recording.times)) * recording.step)
@@ -221,7 +221,7 @@ class Limits:
 
 
 def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
-    """Those of joints with motors, and the given ones, rad/s² and rad/s³."""
+    """Return limits of joints with motors; `acceleration` and `jerk` are in rad/s² and rad/s³ (m/s², m/s³)."""
     joints = scene.motor_joints
     speed = [joint.motor_limits[0].speed for joint in joints]
     more = np.tile([[acceleration], [jerk]], len(joints))
@@ -229,7 +229,7 @@ def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
 
 
 def peaks(times: Array, values: Array) -> Array:
-    """(3, n) largest speed, acceleration and jerk of a motion (T, n) that rests before and after, by differences."""
+    """Return (3, n) peak speed, acceleration and jerk of a motion (T, n) from rest to rest, by differences."""
     found, usual = [], float(np.median(np.diff(times)))
     times = np.concatenate([[times[0] - usual], times, [times[-1] + usual]])
     values = np.vstack([values[:1], values, values[-1:]])

@@ -59,7 +59,7 @@ class Modes:
     driven: Array
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
-        """(m, n) amplitudes (m) at the point at the last of the times (T,), s, by `accelerations` (T, n) of motors."""
+        """Return amplitudes (m, n), m, at the point at the last of `times` (T,), s, by motor `accelerations` (T, n)."""
         poles = self.omega * (-self.ratio + 1j * np.sqrt(1.0 - self.ratio**2))
         widths = (np.append(0.0, np.diff(times)) + np.append(np.diff(times), 0.0)) / 2
         integral = (np.exp(np.outer(poles, times[-1] - times)) * widths) @ accelerations
@@ -99,7 +99,7 @@ class Robot:
         self._frequency: float | None = None
 
     def modes(self, q: Array) -> Modes:
-        """At the posture q (n_q,) of a run; of motions in which nothing vibrates none."""
+        """Return modes at the posture q (n_q,) of a run; none if nothing vibrates."""
         mechanism = self._linear.at(0.0, q, self._still, self._still)
         free = free_coordinates(mechanism, COMPLIANT if self.has_gears else LOCKED)
         squares, vectors = np.linalg.eigh((free.K + free.K.T) / 2)
@@ -114,7 +114,7 @@ class Robot:
         return Modes(omega, ratio, np.linalg.norm(J, axis=0)[:, None] * driven)
 
     def ride(self, times: Array, command: Array) -> Ride:
-        """Under set points (T, n) at `times` (T,), s, from rest; joints without a motor move as they can.
+        """Simulate set points (T, n) at `times` (T,), s, from rest; joints without motor move freely.
 
         Raises `SolveError` where the motion cannot be followed.
         """

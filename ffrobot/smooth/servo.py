@@ -18,14 +18,14 @@ PART = 0.5  # of 1/ω at most between the nodes of a motor's path: its quintics 
 
 @struct
 class Servo:
-    """Of n joints: natural frequencies ω (n,), rad/s, and the damping ratio ζ, 0 < ζ < 1, of their controllers."""
+    """Position controllers of n joints: natural frequencies ω (n,), rad/s, and damping ratio ζ, 0 < ζ < 1."""
 
     omega: Array
     ratio: float
 
     @property
     def settled(self) -> float:
-        """How long (s) the slowest controller takes until only `LEFT` of a step is left."""
+        """Time (s) until the slowest controller has reduced a step to `LEFT` of it."""
         return float(-np.log(LEFT) / (self.ratio * self.omega.min()))
 
     def motors(self, times: Array, command: Array) -> Piecewise:

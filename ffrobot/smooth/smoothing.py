@@ -30,7 +30,7 @@ from .servo import Servo
 
 @struct
 class Smoothed:
-    """What `smooth_motion` found.
+    """Result of `smooth_motion`.
 
     Attributes:
         robot: what was simulated.
@@ -44,7 +44,7 @@ class Smoothed:
 
     @property
     def verdict(self) -> str:
-        """In words what makes the robot vibrate."""
+        """Cause of the vibration as text."""
         return self.before.verdict(self.robot)
 
     @property
@@ -78,7 +78,7 @@ MAKERS: Mapping[str, Callable[[JointMotions], Content]] = {
 
 
 def maker_of(path: Path) -> Callable[[JointMotions], Content]:
-    """What makes the content of a file of motions. Raises `InputError` where its ending is not one of `MAKERS`."""
+    """Return the writer for a motion file by its suffix. Raises `InputError` unless it is one of `MAKERS`."""
     if path.suffix not in MAKERS:
         raise InputError(f'{path}: expected a name that ends in {either(MAKERS)}, found "{path.name}"')
     return MAKERS[path.suffix]

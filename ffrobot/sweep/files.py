@@ -164,7 +164,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
 
 
 def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
-    """What the scene, or for `links.BODY.…` the link file, has at `key`; None where it has nothing there.
+    """Return the value of `key` in the scene, or in a link file for `links.BODY.…`; None if absent.
 
     Raises `InputError`, with the `option` of the command that names the key, where that leads nowhere.
     """
@@ -172,7 +172,7 @@ def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
 
 
 def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
-    """The same of a number. Raises `InputError` where there is none."""
+    """Return the number at `key`; see `value_at`. Raises `InputError` without one."""
     tables, inner = _place(scene_path, key, option)
     value = value_of(tables, inner, key, option)
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -40,7 +40,7 @@ ALONE = {
 
 
 class Done(NamedTuple):
-    """Of a run: exit code, error messages, SHA-256 of the modules that the scene's Python files imported, by file."""
+    """End of a run: exit code, error messages, SHA-256 of modules that the scene's Python files imported, by file."""
 
     code: int
     messages: str
@@ -102,7 +102,7 @@ class Workers:
         weakref.finalize(self, _close, self._idle)
 
     def perform(self, arguments: list[str]) -> Done:
-        """As `Worker.perform`, by any of them; from several threads at once."""
+        """Perform a run as `Worker.perform`, by any idle worker; may be called from several threads."""
         worker = self._take()
         try:
             return worker.perform(arguments)
@@ -177,7 +177,7 @@ class SweepRun:
 
 @dataclass(frozen=True)
 class Row:
-    """What a run left: `status` is "completed", "wrong input", "failed" or "crashed", with the program's message.
+    """Row of a run: `status` "completed", "wrong input", "failed" or "crashed", with the program's message.
 
     `inputs` are the fingerprints of what it was made from: see `run.inputs`; among them those of the files `imported`
     by the scene's Python files, which nobody knows before the run.
@@ -192,7 +192,7 @@ class Row:
     imported: tuple[str, ...] = ()
 
     def changes(self, inputs: Mapping[str, str]) -> list[str]:
-        """What differs from the `inputs` of the same run now, by name: see `run.inputs.changed`."""
+        """Return names of inputs that have changed since the run; see `run.inputs.changed`."""
         return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 
@@ -224,7 +224,7 @@ _of_process = Workers()
 
 
 def perform_under_mpi(run: SweepRun) -> Row | None:
-    """As `perform`, by whichever process of `mpirun`."""
+    """Perform a run as `perform`, in a process of `mpirun`."""
     return perform(run, _of_process)
 
 
@@ -279,7 +279,7 @@ def by_dots(results: Results, datasets: Sequence[str]) -> dict[str, str]:
 
 
 def missing_columns(rows: Sequence[Row], requests: Sequence[str], folder: Path) -> Iterator[str]:
-    """What `--collect` asks for and no completed run in `folder` has, a line each."""
+    """Yield a line for each `--collect` request that no completed run in `folder` contains."""
     completed = [row for row in rows if row.status == "completed"]
     for request in requests:
         name, reduction = collected(request)

@@ -55,7 +55,7 @@ class Sweep:
 
     @property
     def keys(self) -> list[str]:
-        """What is varied, as the user writes it."""
+        """Varied keys as the user writes them."""
         return [variation.name for variation in self.variations]
 
     @property
@@ -70,14 +70,14 @@ class Sweep:
 
     @property
     def runs(self) -> list[SweepRun]:
-        """In the order of the table."""
+        """Runs in the order of the table."""
         return [
             SweepRun(k, values, self.folder / "runs" / self._name(k, values), self.collect, {}, self.allow_python)
             for k, values in enumerate(self.points, start=len(self.earlier))
         ]
 
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
-        """What is changed in the scene of one run, by key."""
+        """Return changed values of one run's scene, by key."""
         points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
         return {**self.fixed, **{key: value for v, value, own in points if value != own for key in v.keys}}
 

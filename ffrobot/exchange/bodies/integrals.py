@@ -37,7 +37,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ShapeIntegrals:
-    """Of a body with n modes; SI units, axes of the body.
+    """Inertia shape integrals of a body with n modes; SI units, axes of the body.
 
     Attributes:
         mass: m in kg.
@@ -71,7 +71,7 @@ class ShapeIntegrals:
 
     @property
     def I_bar(self) -> Array:
-        """(3, 3, n) ∫ρ x_k Φ_l dV at [k, l]: its symmetric part is in J_l, the other one in C_r0."""
+        """Return (3, 3, n) ∫ρ x_k Φ_l dV at [k, l], from the symmetric part in J_l and the other part in C_r0."""
         trace = np.einsum("aan->n", self.inertia_slope) / 4
         symmetric = trace * np.eye(3)[:, :, None] - self.inertia_slope / 2
         return symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
@@ -89,12 +89,12 @@ class ShapeIntegrals:
 
     @property
     def translational_mass(self) -> Array:
-        """(n, n) ∫ρ Φᵀ Φ dV: M_e less what sections have by turning."""
+        """Modal masses (n, n) ∫ρ Φᵀ Φ dV of translation: M_e without the rotation of sections."""
         return np.asarray(-0.5 * self.centrifugal_slope[:3].sum(axis=0))
 
     @property
     def S_bar_kl(self) -> Array:
-        """(3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l]: symmetric parts are in O_e, the others in C_r."""
+        """Return (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l], from symmetric parts in O_e and other parts in C_r."""
         n = self.n_modes
         S = np.zeros((3, 3, n, n))
         for k, (a, b) in enumerate(PAIRS):
@@ -112,7 +112,7 @@ class ShapeIntegrals:
         return as_floats(self.inertia - point_inertia(self.mass, self.first_moment / self.mass))
 
     def transformed(self, T: Array) -> ShapeIntegrals:
-        """The same in modal coordinates p, q = T p."""
+        """Return the integrals in modal coordinates p with q = T p."""
         return replace(
             self,
             S_bar=self.S_bar @ T,
@@ -127,7 +127,7 @@ class ShapeIntegrals:
 
 
 def integrals_of(body: ModalBody) -> ShapeIntegrals:
-    """Of a modal body, its inertia of sections about their axis included."""
+    """Return the integrals of a modal body, including the inertia of sections about their axis."""
     spatial = from_modal_body(body.name, body)
     spin_slope, centrifugal_slope = slopes(spatial.S_bar_kl)
     return ShapeIntegrals(
@@ -230,7 +230,7 @@ def nodes_of(body: ModalBody) -> tuple[dict[int, Interface], dict[str, int]]:
 
 
 def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
-    """What formats have no place for, as `noted` reads it back: reference condition, numbers of interfaces."""
+    """Return a comment for what formats lack, which `noted` reads: reference condition, numbers of interfaces."""
     return f"ffrobot: {body.reference_condition}; {', '.join(f'{name}={number}' for name, number in numbers.items())}"
 
 
@@ -256,7 +256,7 @@ def noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
 
 
 def interfaces_of(nodes: Nodes, numbers: Mapping[str, int]) -> dict[str, Interface]:
-    """By name: those of `numbers`, `root` (nearest to the origin), `tip` (farthest from it), else "node_NUMBER"."""
+    """Return interfaces by name: those of `numbers`, `root`, `tip` (nearest, farthest), else "node_NUMBER"."""
     by_distance = sorted(nodes, key=lambda number: float(np.linalg.norm(nodes[number].position)))
     ends = {"root": by_distance[0], "tip": by_distance[-1]}
     names = {number: name for name, number in reversed(ends.items())}

@@ -27,7 +27,7 @@ VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts
 
 @dataclass(frozen=True)
 class Unit:
-    """What an FMU says of itself.
+    """Names, variables and model of an FMU, for its description.
 
     Attributes:
         identifier: of C, in the name of the binary.
@@ -79,7 +79,7 @@ def model_description(unit: Unit, generator: str) -> bytes:
 
 
 def forward_description(unit: ForwardUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
-    """That of a forward motion under held inputs, in UTF-8; outputs follow the state alone, no input."""
+    """Return the model description (UTF-8) of a forward motion under held inputs; outputs follow the state."""
     about = "motion from the initial state under piecewise constant inputs; gravity and friction act as in the scene"
     root = _root(name, unit.data.guid, about, generator)
     _add(
@@ -180,7 +180,7 @@ def guid_of(numbers: str, variables: Iterable[Variable]) -> str:
 
 
 def identifier_of(scene: str, analysis: str) -> str:
-    """Of C, and in the name of the binary."""
+    """Return an identifier valid in C, also used in the name of the binary."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", f"{scene}_{analysis}")[:LONGEST]
     return plain if plain[0].isalpha() else f"robot_{plain}"[:LONGEST]
 

@@ -92,13 +92,13 @@ def _input(name: str, units: Mapping[str, str]) -> Variable:
 
 
 def motor(name: str, unit: str) -> Variable:
-    """Of a coordinate of a joint, which has this unit."""
+    """Return the input variable of the motor of a joint coordinate with this unit ("rad" or "m")."""
     what, of_force = ("force", "N") if unit == "m" else ("moment", "N.m")
     return Variable(f"joint/{name}/moment", of_force, f"{what} of the motor of {name}")
 
 
 def voltage(layout: str, number: int) -> Variable:
-    """Of a patch, the `number`-th of its layout."""
+    """Return the input variable of patch `number` of a layout, V."""
     return Variable(f"pzt/{layout}/{number}", "V", f"voltage of patch {number} of {layout}")
 
 
@@ -183,7 +183,7 @@ def _motors(model: Model) -> Iterator[Input]:
 
 
 def voltages_of_patches(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
-    """Of all layouts, by the body that carries them."""
+    """Yield the inputs of all patches: variable, and direction (n_v,) of a unit voltage."""
     for of_link in patches.values():
         directions = modal_directions(model, of_link.per_volt)
         for layout in of_link.arrays:

@@ -65,7 +65,7 @@ class JointMotions:
 
 
 def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> JointMotions:
-    """From the results file at `path`: of `analysis`, else of the first that has joints which move.
+    """Read joint motions from the results file at `path`; default: the first analysis with moving joints.
 
     Raises:
         InputError: there is no such analysis, or none of its joints moves.

@@ -45,7 +45,7 @@ class MergedLinks:
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Name of the link, with those fixed to it, for messages."""
         fixed = [name for name in self.members if name != self.top]
         return f'link "{shown(self.top)}"' + (f" with {quoted(fixed)} fixed to it" if fixed else "")
 

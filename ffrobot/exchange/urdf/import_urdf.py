@@ -140,7 +140,7 @@ TO_BE_APPENDED = """\
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import made.
+    """Result of an import.
 
     Attributes:
         robot: as read.

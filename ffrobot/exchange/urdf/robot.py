@@ -29,14 +29,14 @@ TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a frame stands in another: `xyz` (m), and `rpy` (rad) about the fixed axes x, y, z in this order."""
+    """Pose of a frame in another: `xyz` (m), and `rpy` (rad) about the fixed axes x, y, z in this order."""
 
     xyz: Numbers3 = (0.0, 0.0, 0.0)
     rpy: Numbers3 = (0.0, 0.0, 0.0)
 
     @property
     def place(self) -> Place:
-        """The same with its rotation matrix."""
+        """The pose with its rotation matrix."""
         return Place(np.array(self.xyz), of_rpy(*self.rpy))
 
 
@@ -64,7 +64,7 @@ class Inertial:
     inertia: Array
 
     def seen_from(self, place: Place) -> Inertial:
-        """The same in the frame in which that of the link has this place."""
+        """Return mass properties in the frame in which the link's frame has the pose `place`."""
         return Inertial(self.mass, place.d + place.C @ self.center, place.C @ self.inertia @ place.C.T)
 
     def __add__(self, other: Inertial) -> Inertial:
@@ -83,7 +83,7 @@ MASSLESS = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def inertial_of(body: Body, anchor: Array) -> Inertial:
-    """Of the undeformed body with what is attached to it; `anchor` (3,) is the link's frame in body axes, m.
+    """Return mass properties of the undeformed body with attached masses, in the link's frame at `anchor` (3,), m.
 
     J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
     """
@@ -168,7 +168,7 @@ class Robot:
     remarks: tuple[str, ...] = ()
 
     def joints_of(self, link: str) -> list[UrdfJoint]:
-        """Those whose parent is this link."""
+        """Return joints whose parent is this link."""
         return [joint for joint in self.joints.values() if joint.parent == link]
 
 

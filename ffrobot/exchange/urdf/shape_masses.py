@@ -30,7 +30,7 @@ NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh 
 
 @dataclass(frozen=True)
 class MeshMass:
-    """What the mesh of a link makes of its mass.
+    """Comparison of the mesh of a link with its <inertial>.
 
     Attributes:
         link: its name.
@@ -50,7 +50,7 @@ class MeshMass:
 
 
 def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
-    """Of every link with a mass and meshes (visual ones, else those for collisions); and remarks, a line each."""
+    """Compare meshes with <inertial> for all links that have both; also return remarks, a line each."""
     try:
         import trimesh
     except ModuleNotFoundError:
@@ -138,7 +138,7 @@ def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
 
 
 def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
-    """From the frame to each of `points` (3,), axes of the link; a sphere where there is none away from it."""
+    """Yield cylinders from the link's frame to `points` (3,), m, in its axes; one sphere if all coincide with it."""
     away = [point for point in points if np.any(point)]
     for point in away:
         rpy = rpy_of(smallest_turn(point))
@@ -149,7 +149,7 @@ def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
 
 @dataclass(frozen=True)
 class Filling:
-    """What fills the shapes of links without mass.
+    """Material that fills the shapes of links without mass.
 
     Attributes:
         density: kg/m³.

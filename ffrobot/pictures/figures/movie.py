@@ -41,7 +41,7 @@ TAKEN = COLORS[3]  # no color of a tool
 
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
-    """As `make_movie`, drawn by matplotlib."""
+    """Write a movie drawn by matplotlib; arguments and notes as in `make_movie`."""
     with style():
         return make_movie(results_path, path, options, _frames)
 

@@ -231,7 +231,7 @@ def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, result
 
 
 def is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
-    """Where values (T, n) are at one of the limits: (T, n). What goes beyond them passes them, and is at none."""
+    """Return (T, n) whether values are at one of the limits; values beyond all limits are at none."""
     near = np.isclose(values[..., None], limits or np.inf, rtol=NEAR, atol=0.0)
     is_within = np.abs(values).max(initial=0.0) <= (1.0 + NEAR) * np.abs(limits).max(initial=0.0)
     return np.asarray(near.any(axis=-1) & is_within)
@@ -390,7 +390,7 @@ def _formulas(label: str) -> Iterator[None]:
 
 
 def draw(record: FigureRecord, results: Results) -> Figure:
-    """Draw one figure."""
+    """Return the figure that `record` describes."""
     if record.kind in DRAW_WHOLE:
         picture = DRAW_WHOLE[record.kind](record, results)
     else:

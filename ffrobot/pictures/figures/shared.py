@@ -133,7 +133,7 @@ NO_DEFLECTION = 1e-6  # of the largest: points that the reference condition fixe
 
 
 def curves_of(results: Results, dataset: str, column: str = "", *, magnitude: bool = False) -> tuple[Curve, ...]:
-    """That dataset, or a column of it, of every analysis that has it."""
+    """Return curves of a dataset, or of its `column` such as "[0]", for every analysis that contains it."""
     names = ((analysis, f"{analysis}/{dataset}") for analysis in results.analyses)
     return tuple(Curve(data=name + column, label=a, magnitude=magnitude) for a, name in names if results.has(name))
 
@@ -173,7 +173,7 @@ def file_name(*parts: str) -> str:
 
 
 def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
-    """Of a curve over time (s), or over its `x`: x (T,), and `scale` times its values (T, columns)."""
+    """Return abscissa (T,), time (s) or the curve's `x`, and `scale` times its values (T, columns)."""
     values = results.data(curve.data)
     if curve.magnitude:
         values = np.linalg.norm(values, axis=1)[:, None]
@@ -206,7 +206,7 @@ POINTS = 60  # of that curve
 
 
 def motor_limits(results: Results, figure: FigureRecord) -> Array:
-    """What the motor of the joint of a torque-speed diagram can do, as `limit_curves`.
+    """Return the limit curves (n, 2) of the motor of a torque-speed diagram; see `limit_curves`.
 
     Of several coordinates of a joint each has its limits: those of the one that the first curve is of, "…/moment[1]".
     """
@@ -219,7 +219,7 @@ def motor_limits(results: Results, figure: FigureRecord) -> Array:
 
 
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
-    """Where |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max end: (n, 2) speeds and moments, NaN between pieces.
+    """Return the bounds |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max: (n, 2) speeds and moments, NaN between pieces.
 
     In all four quadrants; where no limit ends a curve, it goes as far as the data, `speed` and `moment` at most, ask
     for. Empty without limits.

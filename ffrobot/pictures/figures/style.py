@@ -131,24 +131,24 @@ DARKEST = 0.6  # how bright a cell is that the light passes along
 
 
 def projected(points: Array, view: View) -> Array:
-    """(…, 2) where points (…, 3) in m are on the page."""
+    """Return page coordinates (…, 2), m, of points (…, 3) in parallel projection."""
     return np.stack([points @ view.right, points @ view.up], axis=-1)
 
 
 def normals(points: Array, cells: Integers) -> Array:
-    """(c, 3) unit normals of triangles or quadrilaterals; zero where a cell has no area."""
+    """Return unit normals (c, 3) of triangles or quadrilaterals; zero for cells without area."""
     first = points[cells[:, 0]]
     areas = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
     return np.asarray(areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300))
 
 
 def sides(cells: Integers) -> Integers:
-    """(c v, 2) the sides of all cells: those that two cells share are listed twice."""
+    """Return the sides (c v, 2) of all cells as pairs of points; shared sides appear twice."""
     return np.asarray(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), dtype=np.int64)
 
 
 def lit(points: Array, cells: Integers, colors: Array, view: View) -> Array:
-    """(c, 3) colors (c, 3) of cells in a light that comes from above the viewer.
+    """Return colors (c, 3) of cells in a light that comes from above the viewer.
 
     Which way the normals of the cells point is unknown, and hidden cells are painted over.
     """

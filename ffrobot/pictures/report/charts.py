@@ -32,12 +32,12 @@ class AnalysisRun(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Its name on the page, unique."""
+        """Unique name of the run on the page."""
         return f"{self.source}: {self.analysis}" if self.source else self.analysis
 
 
 def sources(files: Sequence[Results]) -> list[str]:
-    """What tells the files apart: nothing for one, the names of their scenes, or where their paths differ."""
+    """Return labels that distinguish the files: "" for one, names of their scenes, or the differing parts of paths."""
     if len(files) == 1:
         return [""]
     names = [results.name for results in files]
@@ -154,7 +154,7 @@ def _limit_style() -> dict[str, Any]:
 
 
 def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
-    """Of the k-th curve of a chart: its width, so that none hides another, its color and its dashes.
+    """Return width, color and dashes of the k-th curve of a chart, such that no curve hides another.
 
     The k-th color unless `color` is that of a run, which then has `part` curves before this one.
     """
@@ -171,7 +171,7 @@ def shades(count: int) -> list[str]:
 
 
 def kept_outputs(values: Array) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """Which of many points (T,) a curve is drawn through: all, or the least and the largest of each stretch."""
+    """Return indices of points to draw, of (T,) values: all, or the smallest and largest of each stretch."""
     if len(values) <= MAX_POINTS or np.isnan(values).any():
         return np.arange(len(values))
     edges = np.linspace(0, len(values), MAX_POINTS // 2, dtype=np.intp)

@@ -37,7 +37,7 @@ SLOWEST = 1e-3  # the slider's end
 
 
 def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
-    """What the script of the page draws of several runs, and notes on what could not be drawn as it is.
+    """Return the moving bodies of several runs as data for the page's script, and notes on what could not be drawn.
 
     Each run has a color of its own; planar scenes are seen along z.
     """
@@ -194,7 +194,7 @@ def _charts(body: ModalBody, prefix: str) -> list[Chart]:
 
 
 def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
-    """What the script of the page draws; links whose surface is not known are left out."""
+    """Return surfaces with mode shapes as data for the page's script; links without known surface are omitted."""
     surfaces = [(link, body_surface(link.body)) for link in links]
     entries = [
         _entry(link, mesh.points, triangles_of(mesh.cells), mesh.mode_shapes)

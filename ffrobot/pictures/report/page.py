@@ -162,7 +162,7 @@ def _zeros_table(runs: Sequence[AnalysisRun]) -> Table:
 
 
 def placements_table(runs: Sequence[AnalysisRun]) -> Table:
-    """Where searches place patches, against as many spread evenly."""
+    """Return optimum and evenly spaced patch positions of placement analyses."""
     rows = []
     for run in runs:
         group = f"{run.analysis}/placement"

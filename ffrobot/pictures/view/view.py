@@ -224,7 +224,7 @@ FRAMES = 201  # of an animation, unless asked for otherwise
 
 @dataclass(frozen=True)
 class Options:
-    """What is to be seen.
+    """Options of grids and pictures.
 
     Attributes:
         analysis: of a results file; all if None.
@@ -336,7 +336,7 @@ def _step(grid: Grid, time: float | None, color: str) -> int:
 
 
 def visible_scale(grid: Grid, steps: Sequence[int]) -> float:
-    """How much larger deflections are drawn so that they can be seen at these steps."""
+    """Return the factor that makes deflections at these steps visible."""
     size = max(float(np.ptp(grid.points[step], axis=0).max()) for step in steps)
     deflection = np.linalg.norm(grid.point_data["deflection"][list(steps)], axis=2)
     return visible_exaggeration(size, float(deflection.max()))
@@ -345,7 +345,7 @@ def visible_scale(grid: Grid, steps: Sequence[int]) -> float:
 def motion_picture(
     results: Results, analysis: str, frames: Indices, grid: Grid, steps: tuple[int, ...], *, scale: float, color: str
 ) -> Picture:
-    """Of the steps of a grid, which shows the outputs `frames` of an analysis."""
+    """Return the picture of some steps of a grid, whose steps are the outputs `frames` of an analysis."""
     assert grid.time is not None
     name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
     braces = name.replace("{", "{{").replace("}", "}}")
@@ -384,7 +384,7 @@ def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
 
 
 def view_movie(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
-    """As `make_movie`, rendered by PyVista."""
+    """Write a movie rendered by PyVista; arguments and notes as in `make_movie`."""
     if is_modal_body_file(results_path):
         raise InputError(f"{results_path}: movie: expected a results file, found a modal body: it does not move")
     return make_movie(results_path, path, options, _rendered)
