@@ -67,7 +67,7 @@ class Fcid(TimedAnalysis):
         return self
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """The given shape."""
+        """Yield the functions of the given shape, with their labels."""
         for body, functions in (self.modal or {}).items():
             for k, function in enumerate(functions):
                 yield f"modal.{body}[{k}]", function, 2

@@ -131,13 +131,13 @@ def _replayed(context: Context, source: Run, analysis: Forward) -> Replayed:
 
 
 def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
-    """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
+    """Return the effect of a unit command of motors, on sections or frames, and of patches, on link modes."""
     of_volts = (row for of_link in patches.values() for row in modal_directions(model, of_link.per_volt))
     return (*motor_commands(model), *map(Command, of_volts))
 
 
 def numbers_of_motors(model: Model) -> dict[str, list[int]]:
-    """By joint with motors the numbers of its coordinates, one joint after the other."""
+    """Return indices of motor coordinates by joint, one joint after the other."""
     numbers = count()
     return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
 
@@ -174,13 +174,13 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
 
 
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """(2, inputs) smallest and largest moments of motors and voltages of patches, infinite where there is no limit."""
+    """Return limits (2, inputs), lowest and highest torques of motors and voltages of patches; infinite if none."""
     most = largest_moments(model, limits=True)
     return np.hstack([np.stack([-most, most]), joined(patches.values()).range])
 
 
 def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """(k, n_v) of all patches the current Φ_Vᵀ ṗ by v, A."""
+    """Return (k, n_v), the current Φ_Vᵀ ṗ of all patches by v, A."""
     rows = [modal_directions(model, of_link.per_volt) for of_link in patches.values()]
     return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
 
@@ -204,7 +204,7 @@ def _supplied(source: Run, most: Array, patches: Mapping[str, PatchedLink], anal
 
 
 def largest_moments(model: Model, *, limits: bool) -> Array:
-    """(motors,) N·m or N, infinite where limits do not count."""
+    """Return torque limits (motors,), N·m or N; infinite if `limits` is False."""
     joints = {joint.name: joint for joint in model.scene.joint}
     most = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
     return most if limits else np.full_like(most, np.inf)

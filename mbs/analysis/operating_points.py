@@ -154,7 +154,7 @@ def _growth(mechanism: LinearMechanism) -> float:
 
 
 def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = False) -> dict[str, str]:
-    """Where each point of the scene is in the model, of whose links some may be in pieces.
+    """Map points of the scene to points of the model, which may contain links in pieces.
 
     Where no `points` are given: those of trajectories, or else the tips of all bodies that have one; then tools, and
     where payloads and loads are if `loaded`.

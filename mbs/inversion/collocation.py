@@ -61,7 +61,7 @@ def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
 
 
 def bernstein_integral(scheme: Scheme) -> Array:
-    """(s + 1, s) Bernstein's coefficients on [0, 1] of the integral of the polynomial through values at c."""
+    """Return Bernstein coefficients (s + 1, s) on [0, 1] of the integral of a polynomial, by its values at c."""
     s = len(scheme.c)
     m = np.arange(s)
     powers = scheme.to_powers / (m[:, None] + 1)  # of ξ, ξ² …, ξ^s

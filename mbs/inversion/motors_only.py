@@ -50,7 +50,7 @@ REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
 @struct
 class AroundPath(Details):
-    """How long motors act before and after the path, s, and how the path was inverted for motors alone."""
+    """Pre- and post-actuation times of motors, s, and the inversion of the path."""
 
     _: KW_ONLY
     pre_actuation: float

@@ -68,23 +68,23 @@ class Servo:
 
     @cached_property
     def mode_sizes(self) -> Array:
-        """(n,) p of all modes that bend a link by about its length."""
+        """Modal coordinates p (n,) that bend a link by about its length."""
         return modal_sizes(node.body for node in self.model.tree.nodes)
 
     @property
     def mode_counts(self) -> list[int]:
-        """By body of the tree."""
+        """Number of modes by body of the tree."""
         return [node.body.n_modes for node in self.model.tree.nodes]
 
     @cached_property
     def doubt(self) -> str:
-        """What to say of the worst posture along the path; "" where all are fine."""
+        """Message on the worst posture along the path; empty if all are regular."""
         times, near = self.near_times[::EVERY], self.near[::EVERY]
         ratio, worst = worst_posture(self.model, times, near)
         return describe_posture(self.model, ratio, float(times[worst]), near[worst], is_end=False)
 
     def targets(self) -> Iterator[Target]:
-        """What the path follows."""
+        """Yield the functions that the path follows."""
         for path in self.model.scene.trajectory:
             for component, function in path.targets:
                 yield Target(path.name, component, function)
@@ -95,7 +95,7 @@ class Servo:
         return [target.function for target in self.targets()]
 
     def slowed(self, factor: float) -> Servo:
-        """The same path in `factor` times the time, by quintic Hermite pieces of what it is."""
+        """Return the path in `factor` times the time, by quintic Hermite pieces."""
         from scipy.interpolate import BPoly, PPoly
 
         times = self.end * np.linspace(0.0, 1.0, PIECES + 1)
@@ -113,7 +113,7 @@ class Servo:
 
     @cached_property
     def motion(self) -> PrescribedMotion:
-        """With p(t) given, the motors' coordinates as on the path with the deflections `factor` p + `offset`."""
+        """Return motor coordinates of the path for given p(t), with deflections `factor` p + `offset`."""
         path = fastest_mechanism(self.model)
         if isinstance(path, _core.SpatialDriven):
             return self.equations()
@@ -124,7 +124,7 @@ class Servo:
         return motion
 
     def equations(self) -> _core.SpatialPrescribedMotion:
-        """The same anew, in 3D."""
+        """Return a new copy of the 3D equations."""
         path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
         if self._is_redefined:
@@ -139,7 +139,7 @@ class Servo:
         return self.factor != 1.0 or bool(self.offset)
 
     def postures(self, times: Array) -> Array:
-        """Those along the path without deflections, (T, n_q), nearest to `times` (T,)."""
+        """Return postures (T, n_q) of the path without deflections, nearest to `times` (T,), s."""
         return self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
@@ -153,7 +153,7 @@ class Servo:
         return r
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """The same r (N, n), and what the motors do, τ (N, motors), N·m or N."""
+        """Return residuals r (N, n) and motor torques τ (N, motors), N·m or N."""
         states = self.motion.motion(as_list(times), p, v, a, self.postures(times))
         return states.left[:, self.of_modes], states.tau
 

@@ -120,12 +120,12 @@ class Linearisation:
 
     @cached_property
     def zeros(self) -> ComplexArray:
-        """Of the equations frozen at each time (N, 2n), 1/s."""
+        """Zeros (N, 2n) of the equations frozen at each time, 1/s."""
         return zeros(self.dynamics, self.scale)
 
     @cached_property
     def is_future(self) -> Booleans:
-        """Which of the zeros (N, 2n) belong to motions that the future tells.
+        """Whether zeros (N, 2n) belong to motions that the future determines.
 
         Those in the right half plane; but lightly damped vibrations, whose zeros may cross the imaginary axis along the
         path, only where they grow too far over all of it, by exp ∫ Re s dt. Else they start at rest and ring on: a jump
@@ -169,18 +169,18 @@ class Linearisation:
 
     @property
     def is_light(self) -> Booleans:
-        """Which of the zeros (N, 2n) are those of lightly damped vibrations, or lightly growing ones."""
+        """Whether zeros (N, 2n) are those of lightly damped or slowly growing vibrations."""
         return np.abs(self.zeros.real) <= LIGHT * np.abs(self.zeros)
 
     @property
     def singular_after(self) -> tuple[int, ...]:
-        """Which of the times are the last before a zero passes through infinity, where det M changes its sign."""
+        """Indices of the last times before a zero passes through infinity, where det M changes its sign."""
         sides = np.linalg.slogdet(self.dynamics.M)[0]
         return tuple(int(k) for k in np.flatnonzero(sides[1:] != sides[:-1]))
 
     @property
     def times(self) -> Array:
-        """From 0 to the end of the path (N,)."""
+        """Times (N,) from 0 to the end of the path, s."""
         return self.dynamics.times
 
 

@@ -36,7 +36,7 @@ class RobotModes:
 
     @property
     def frequency(self) -> Array:
-        """(f,) √(λ₁ λ₂)/2π, Hz: the undamped one; 0 where the robot moves without stiffness, or falls."""
+        """Undamped frequencies (f,) √(λ₁ λ₂)/2π, Hz; 0 for motion without stiffness, or falling."""
         omega = np.sqrt(self.poles.prod(axis=1).real.clip(min=0.0))
         return np.where(omega < RIGID * omega.max(initial=0.0), 0.0, omega) / (2 * np.pi)
 
@@ -48,7 +48,7 @@ class RobotModes:
 
     @property
     def damping_ratio(self) -> Array:
-        """(f,) −(λ₁ + λ₂)/2ω; nan where the frequency is 0."""
+        """Damping ratios (f,) −(λ₁ + λ₂)/2ω; NaN for frequency 0."""
         omega = 2 * np.pi * self.frequency
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio: Array = np.where(omega > 0.0, -self.poles.sum(axis=1).real / (2 * omega), np.nan)
@@ -98,7 +98,7 @@ class FreeCoordinates(NamedTuple):
 
 @struct
 class JointCondition:
-    """Of a robot at one instant, with its joints with motors locked, or the motors alone behind compliant gears."""
+    """Modes and compliance of a robot at one instant, with joints locked, or motors locked behind compliant gears."""
 
     modes: RobotModes  # of the robot, its coordinates s left free; `modes.frequency` in Hz, the lowest first
     # (k, k) by "BODY.POINT": translations (m) along the axes of the space, of a tool its own, then rotations (rad)
@@ -108,7 +108,7 @@ class JointCondition:
 
 
 class Stiffness(NamedTuple):
-    """Of a point: `along` each axis (d,) force over displacement, N/m; the `least` of all directions, and its (d,)."""
+    """Stiffness of a point, N/m: `along` each axis (d,), and the `least` of all directions with that one (d,)."""
 
     along: Array
     least: float
@@ -116,7 +116,7 @@ class Stiffness(NamedTuple):
 
 
 def translational_stiffness(compliance: Array) -> Stiffness | None:
-    """Of a point with this compliance (3, 3) in the plane or (6, 6); None where it is not fixed.
+    """Return the stiffness of a point from its compliance (3, 3), planar, or (6, 6); None if it can move freely.
 
     Directions whose compliance is round-off have infinite stiffness.
     """
@@ -132,13 +132,13 @@ def translational_stiffness(compliance: Array) -> Stiffness | None:
 
 
 def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
-    """By "locked", and by "compliant" where gears are compliant. `mechanism` has the points to be judged."""
+    """Return conditions "locked", and with compliant gears "compliant", for the points of `mechanism`."""
     has_gears = any(name.startswith("motor/") for name in mechanism.outputs)
     return {condition: _in_condition(mechanism, condition) for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]}
 
 
 def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
-    """What the condition lets joints and modes do."""
+    """Return the coordinates of joints and modes that the condition leaves free."""
     joints = [name for name in mechanism.inputs if name.startswith("joint/")]
     if condition == LOCKED:  # motors behind compliant gears stand still, too
         names = [*joints, *(name for name in mechanism.outputs if name.startswith("motor/"))]
@@ -152,7 +152,7 @@ def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordina
 
 
 def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
-    """(F, k) at `omega` (F,), rad/s: motion along each row of `J` (k, f) by a unit load along it."""
+    """Return (F, k) motion along each row of `J` (k, f) per unit load along it, at `omega` (F,), rad/s."""
     (N, K, D), w = free, omega[:, None, None]
     J = J @ N
     X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
@@ -175,7 +175,7 @@ def _largest_real(modes: RobotModes) -> RobotModes:
 
 
 def free_directions(R: Array) -> Array:
-    """(f, m) orthonormal directions z with R z = 0, of `R` (r, f), whose entries may depend on each other."""
+    """Return orthonormal directions (f, m) z with R z = 0, of `R` (r, f), whose rows may be dependent."""
     sizes = np.linalg.norm(R, axis=1, keepdims=True)
     return null_space(R / np.where(sizes > 0.0, sizes, 1.0), DEPENDENT)
 

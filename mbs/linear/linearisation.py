@@ -60,17 +60,17 @@ class LinearMechanism:
     names: tuple[str, ...]  # (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1
 
     def of_tool(self, point: str) -> Array:
-        """(k, f) as `points`, but in the axes of a point that has its own."""
+        """Return rows (k, f) as `points`, in the axes of a point that has its own."""
         J = self.points[point]
         return as_floats(self.tool_axes[point] @ J) if point in self.tool_axes else J
 
     def modal(self, body: str) -> list[int]:
-        """Where in s the modal coordinates of a body are."""
+        """Return indices in s of the modal coordinates of a body."""
         return [i for i, name in enumerate(self.names) if name.startswith(f"modal/{body}/")]
 
 
 class LinearEquations:
-    """What is the same at every posture: joints alone hold; given forces along s act, and loads.
+    """Posture-independent part of linearization: free mechanism, given forces along s, and loads.
 
     `model` has no rows of trajectories; its gears give where its tree has them. Independent are the motors' coordinates
     where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at

@@ -111,7 +111,7 @@ def newton(
 
 
 class Balance(NamedTuple):
-    """What meets at a posture, in natural sizes: N·m, rad, sizes of the robot and of modes."""
+    """Forces and equations at a posture, in natural sizes: N·m, rad, sizes of the robot and of modes."""
 
     load: Array  # (n_v,) Q
     left: Array  # (n_v,) Q − C_vᵀ λ
@@ -123,7 +123,7 @@ class Balance(NamedTuple):
 
 
 class Relief(NamedTuple):
-    """What is taken off loads and off equations, in natural sizes."""
+    """Reduction of loads and equations, in natural sizes."""
 
     load: Array | float = 0.0  # (n_v,)
     way: Array | float = 0.0  # (rows,)
@@ -348,12 +348,12 @@ def static_shapes(
 
 
 def modal_sizes(bodies: Iterable[Body]) -> Array:
-    """(n,) √J of the modes of all bodies, bent by about their length."""
+    """Return √J (n,) of the modes of all bodies: deflections of about their length."""
     return np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
 
 
 def natural_sizes(model: Model) -> Array:
-    """(n_v,) natural sizes: 1 rad or the robot's size of joints, √J of modes, bent by about their length."""
+    """Return natural sizes (n_v,): 1 rad or the robot's size for joints, √J for modes."""
     sizes = joint_scales(model)
     for node in model.tree.nodes:
         sizes[node.p_v] = np.sqrt(node.body.largest_moment)

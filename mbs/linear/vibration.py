@@ -27,7 +27,7 @@ RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spr
 
 
 class Vibrations(NamedTuple):
-    """Of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest; rigid motion is left out.
+    """Vibrations of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest, without rigid motion.
 
     frequency ω (n,) rad/s ascending; damping_ratio (n,); shape (n_v, n), M-orthonormal; springs K (n_v, n_v).
     """
@@ -44,7 +44,7 @@ def without_rows(model: Model) -> MultibodySystem:
 
 
 def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Array) -> Vibrations:
-    """Those about q (n_q,), with the constraint equations of `model`.
+    """Return vibrations about q (n_q,) under the constraint equations of `model`.
 
     M⁻¹ is what the core says that forces do to accelerations where `unconstrained`. K are the stiffnesses of links and
     gears, D their damping and viscous friction; neither gravity nor dry friction.
@@ -74,7 +74,7 @@ def _springs(model: Model, q: Array) -> tuple[Array, Array]:
 
 
 def strained(K: Array, free: Array) -> int:
-    """How many independent motions of those in the columns of `free` (n, m) strain springs K (n, n).
+    """Return the number of independent motions in the columns of `free` (n, m) that strain the springs K (n, n).
 
     Each spring counts by its own size: a soft link beside a stiff one vibrates, however slowly.
     """
@@ -96,7 +96,7 @@ class PathFrequencies:
 
 
 def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
-    """Of the `modes` lowest vibrations of the undeformed robot with its trajectories held, from `begin` to `end`, s.
+    """Return the `modes` lowest vibrations of the undeformed robot on its trajectories, from `begin` to `end`, s.
 
     Where motors follow them, compliant gears are among its springs. Joints that the paths leave free are free.
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.

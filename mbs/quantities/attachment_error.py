@@ -30,7 +30,7 @@ DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of t
 
 
 class ModesInMotion(NamedTuple):
-    """Of one flexible body: p and p̈ (T, n)."""
+    """Modal coordinates p and p̈ (T, n) of one flexible body."""
 
     body: Body
     p: Array
@@ -54,7 +54,7 @@ class Start(NamedTuple):
 
 
 class Vibrations(NamedTuple):
-    """Of a robot about its first configuration: ω² (m,), shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
+    """Vibrations in the first posture: ω² (m,), shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
 
     squares: Array
     shapes: Array
@@ -93,7 +93,7 @@ def _late(body: Body) -> Array:
 
 
 def start_jolt(start: Start) -> float:
-    """How much of a motion's deformation begins to ring at its start all at once, of the largest there is in it.
+    """Return the share of a motion's largest deformation that begins to vibrate at once at its start.
 
     The amplitudes of `start_vibrations` against the largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from
     equilibrium, 0.1 to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
@@ -102,7 +102,7 @@ def start_jolt(start: Start) -> float:
 
 
 def phase_error(start: Start) -> float:
-    """How far what rings from the start on gets out of step for too few modes, of the largest deformation.
+    """Return the phase error of initial vibrations for too few modes, relative to the largest deformation.
 
     With the attachment modes as late as `mode_error` has them, Rayleigh's quotient lowers the frequency ω_i of a
     vibration φ_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). Its phase is off by δω_i T at the end of the run, and
@@ -118,7 +118,7 @@ def phase_error(start: Start) -> float:
 
 
 def start_vibrations(start: Start) -> Vibrations:
-    """What the links begin to do at the start of a run, under its constraints.
+    """Return vibrations of the links that begin at the start of a run, under its constraints.
 
     The vibrations φ_i, ω_i have of the first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand
     z̈_i/ω_i² from where they vibrate about: their amplitudes are z̈_i/ω_i in √(2 J).
@@ -137,14 +137,14 @@ def _of_largest(start: Start, amplitudes: Array) -> float:
 
 
 def modes_in_motion(run: Run) -> Iterator[ModesInMotion]:
-    """Of the flexible bodies of a run."""
+    """Yield the modal motion of the flexible bodies of a run."""
     for node in run.model.tree.nodes:
         if node.body.n_modes:
             yield ModesInMotion(node.body, run.q[:, node.p_q], run.a[:, node.p_v])
 
 
 def start_of_motion(run: Run) -> Start:
-    """Of a run."""
+    """Return the initial state of a run for error estimates."""
     tree, n_v = run.model.tree, run.model.tree.n_v
     stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
     energy: Array = np.zeros(len(run.time))
@@ -190,7 +190,7 @@ class Ends(NamedTuple):
 
 
 def missed_by_pieces(pieces: Sequence[PieceInMotion]) -> Array:
-    """By how much the tip of the last piece is off (T, 3), m, global axes; pieces from the root on."""
+    """Return the position error (T, 3), m, global axes, of the tip of the last piece; pieces from the root."""
     end, missed = pieces[-1].tip.r, np.zeros_like(pieces[-1].tip.r)
     for piece in pieces:
         rod = rod_ends(piece.modal, piece.p @ piece.body.modal_transform.T)
@@ -202,14 +202,14 @@ def missed_by_pieces(pieces: Sequence[PieceInMotion]) -> Array:
 
 
 def ends_in_equations(body: Body, p: Array) -> Ends:
-    """As the equations of a piece have them at p (T, n)."""
+    """Return the ends of a piece as its equations contain them, at p (T, n)."""
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)
     return Ends(as_floats(back @ exponential(tip.phi)), as_floats(np.einsum("tij,tj->ti", back, tip.u - root.u)))
 
 
 def rod_ends(modal: ModalBody, p: Array) -> Ends:
-    """Of the rod with the strains of p (T, n of the file)."""
+    """Return the ends of the rod with the strains of p (T, n of the file)."""
     x = np.linspace(0.0, modal.length, 2 * INTERVALS + 1)  # with the middles of intervals
     places, h = [modal.interpolate(at) for at in x], x[2]
     phi, u = (

@@ -42,11 +42,11 @@ class BodyMotion:
 
     @property
     def datasets(self) -> dict[str, Array]:
-        """By their names in results files."""
+        """Arrays by their names in results files."""
         return _named(vars(self))
 
     def within(self, space: Space, angle: Array) -> BodyMotion:
-        """Of a motion in 3D what `space` has of it; in the plane `angle` (T,) stands for the quaternions."""
+        """Return the components of a 3D motion that `space` has; planar ones have `angle` (T,), not quaternions."""
         return replace(
             self,
             position=space.along(self.position),
@@ -69,11 +69,11 @@ class PointMotion:
 
     @property
     def datasets(self) -> dict[str, Array]:
-        """By their names in results files."""
+        """Arrays by their names in results files."""
         return _named({key: values for key, values in vars(self).items() if values is not None})
 
     def within(self, space: Space) -> PointMotion:
-        """Of a motion in 3D what `space` has of it."""
+        """Return the components of a 3D motion that `space` has."""
         turned = None if space.is_plane else self.orientation
         return PointMotion(space.along(self.position), space.along(self.deflection), turned)
 
@@ -92,7 +92,7 @@ def continuous(e: Array) -> Array:
 
 
 def motion_of_link(run: Run, link: LinkInPieces) -> BodyMotion:
-    """Of the frame of the one link, and of the modes of its file."""
+    """Return the motion of the frame of the whole link, and of the modes of its file."""
     x = link.modal.stations.position[:, 0]
     sections = _sections(run, link, x)
     root, tip = sections[int(np.argmin(x))], sections[int(np.argmax(x))]

@@ -27,21 +27,21 @@ from .supply import behind_gears
 
 @struct
 class LinkLoads:
-    """What acts on a link over a motion."""
+    """Loads on a link during a motion."""
 
     sizes: Mapping[str, Array]  # (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`)
     modal_force: Array  # (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Of each of `bodies`. Nothing where motors turn frames: what they do to a link acts at no interface."""
+    """Return the loads on `bodies`; empty if motors turn frames, as these act at no interface."""
     if run.model.scene.motors == "frame":
         return {}
     return _link_loads(run, bodies, _with_motors(run))
 
 
 def loads_in_equations(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Of each of `bodies`, as its equations of motion have them: forces along trajectories where these act."""
+    """Return the loads on `bodies` as in their equations, with trajectory forces where they act."""
     return _link_loads(run, bodies, acting_forces(behind_gears(run)))
 
 

@@ -39,7 +39,7 @@ def system_of(run: Run) -> MultibodySystem:
 
 @kept
 def acting_forces(run: Run) -> MotionForces:
-    """What bodies and joints do to each other."""
+    """Return the forces between bodies and in joints of a run."""
     return motion_forces(system_of(run), run, run.time, run.multipliers)
 
 
@@ -57,7 +57,7 @@ def cut_motions(run: Run) -> list[tuple[CutCoordinate, CutMotion]]:
 
 
 def constraint_violation(run: Run) -> Array:
-    """(T, 3) of C, Ċ, C̈: the largest of all rows over 1 + that of q, v, a; of an equilibrium, C alone."""
+    """Return (T, 3) of C, Ċ, C̈: largest row over 1 + that of q, v, a; of an equilibrium, C alone."""
     levels = [(constraint_rows(run)[0], run.q)]
     if not run.is_at_rest:
         C_dot = constraint_rates(run.model, run.q, run.v, run.time)

@@ -18,7 +18,7 @@ STILL = 0.5  # of a run, in which way points are over: the other part is rest
 
 
 def path_warnings(analysis: object, times: Array, paths: Iterable[Trajectory]) -> Iterator[str]:
-    """Of an `analysis` with outputs at `times` (T,), s, that follows `paths`: what these hide, a text each."""
+    """Yield warnings on features of `paths` that outputs at `times` (T,), s, of the `analysis` miss."""
     if not isinstance(analysis, TimedAnalysis) or np.count_nonzero((times >= 0.0) & (times <= analysis.end)) < 2:
         return  # it ended before the path began
     for path in paths:

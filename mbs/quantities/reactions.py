@@ -26,7 +26,7 @@ from .supply import behind_gears
 
 
 def reactions(run: Run) -> Mapping[str, Wrench]:
-    """By joint: force on its second side, and moment about where that side is, N and N·m.
+    """Return reactions by joint: force on its second side, N, and moment about that side, N·m.
 
     A joint of the tree carries what its body and its outboard subtree need, less what else acts there and what acts
     along its coordinates: motors, friction, loads, rotors. One that closes a loop has its multipliers.
@@ -36,7 +36,7 @@ def reactions(run: Run) -> Mapping[str, Wrench]:
 
 
 def reactions_of_loops(run: Run, forces: Array) -> Mapping[str, Wrench]:
-    """What forces (T, rows that close loops) along these rows are in `reactions`."""
+    """Return reactions of forces (T, loop rows) along the rows that close loops."""
     multipliers = np.zeros_like(run.multipliers)
     multipliers[:, run.model.loop_rows] = -forces
     return _carried(run, multiplier_forces(system_of(run), run.q, run.time, multipliers), run.q)
@@ -70,7 +70,7 @@ SAMPLES = 5  # outputs that are looked at: constraints that depend on each other
 
 @struct
 class Sharing:
-    """What redundant constraints of loops leave open."""
+    """Reactions that redundant loop constraints leave undetermined."""
 
     redundant: int  # how many constraints depend on others
     # by joint those of its reaction that nothing determines: x, y, z, mx, my, mz, global axes
@@ -78,7 +78,7 @@ class Sharing:
 
     @property
     def in_words(self) -> str:
-        """One sentence."""
+        """Statement in one sentence."""
         of_joints = "; ".join(f'"{joint}" ({", ".join(of)})' for joint, of in self.components.items())
         return (
             f"{self.redundant} constraints of kinematic loops are redundant: nothing determines how these reactions"

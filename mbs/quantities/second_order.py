@@ -28,7 +28,7 @@ AT_ONCE = 64  # outputs whose eigenvalues are found together
 
 
 class StiffnessChange(NamedTuple):
-    """Over a run: the largest |μ|, and how many times the loads under which the link buckles are reached.
+    """Largest |μ| over a run, and the ratio of loads to buckling loads.
 
     `buckling` is −μ of the lowest, exact from 1 on; 0 where no loads soften the link.
     """
@@ -60,13 +60,13 @@ class ModalLoads:
 
     @cached_property
     def relative(self) -> Array:
-        """(J, n, n) K_ff^-½ K K_ff^-½."""
+        """Matrices (J, n, n) K_ff^-½ K K_ff^-½."""
         root = 1 / np.sqrt(self.stiffness)
         return as_floats(self.K * root * root[:, None])
 
     @cached_property
     def squares(self) -> Array:
-        """(T,) squares of the Frobenius norms of K_ff^-½ S K_ff^-½."""
+        """Squared Frobenius norms (T,) of K_ff^-½ S K_ff^-½."""
         flat = self.relative.reshape(len(self.K), -1)
         return as_floats(np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0))
 
@@ -89,7 +89,7 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
 
 
 def stiffness_change(loads: ModalLoads) -> StiffnessChange:
-    """By the loads of a run."""
+    """Return the change of stiffness by the loads of a run."""
     largest, lowest = 0.0, 0.0
     for bound, mu in _eigenvalues(loads):
         largest, lowest = max(largest, float(np.abs(mu).max())), min(lowest, float(mu.min()))
@@ -141,7 +141,7 @@ class Rotations(NamedTuple):
 def missing_to_first_order(
     loads: ModalLoads, p: Array, stations: Array, places: Array, length: float, *, is_at_rest: bool
 ) -> Missing:
-    """What a link without geometric stiffening misses; infinite where its loads at rest buckle it.
+    """Return the errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
     p (T, n) and `stations` (k, 3, n), the translations of stations at `places` (k, 3), in the modes of the equations.
     """
@@ -183,7 +183,7 @@ def _carried(held: LoadedPoint, moved: Array, places: Array) -> Array:
 def missing_to_second_order(
     displacement: float, shortening: float, rotations: Rotations, stiffness_change: float
 ) -> Missing:
-    """What a link with geometric stiffening misses: of d and s, of its length, the rotations of sections, and μ."""
+    """Return the errors of a link with geometric stiffening, from d and s (of its length), rotations and μ."""
     if stiffness_change >= 1.0:
         return Missing(np.inf, np.inf)
     of_deflections = sum(angle**2 for angle in rotations) / 3 / (1 - stiffness_change) ** 2
@@ -191,7 +191,7 @@ def missing_to_second_order(
 
 
 def largest_rotations(link: ModalBody, p: Array) -> Rotations:
-    """Of sections over p (T, n) of the file."""
+    """Return the largest rotations of sections, rad, over p (T, n) of the file."""
     if not len(p):
         return Rotations(0.0, 0.0, 0.0)
     stations, x = link.stations, link.stations.position[:, 0]
@@ -201,7 +201,7 @@ def largest_rotations(link: ModalBody, p: Array) -> Rotations:
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
-    """Of stations over p (T, n) of the file, from the undeformed link, of its length."""
+    """Return the largest displacement of stations over p (T, n) of the file, relative to the length."""
     return _largest(p, link.stations.translation) / link.length
 
 

@@ -40,7 +40,7 @@ PARTS = 4  # of an interval between samples
 
 @struct
 class Settling:
-    """Of a point, by its distance from the final position; see the module."""
+    """Residual vibration of a point about its final position; see the module."""
 
     residual: float  # m, peak to peak: the largest distance of two places in the last period of `frequency`
     at_path_end: float  # m
@@ -53,7 +53,7 @@ class Settling:
 
 
 class Rest(NamedTuple):
-    """Where commands end."""
+    """Final commanded posture of a run."""
 
     model: Model  # the robot that they hold
     q: Array  # (n_q,)
@@ -62,7 +62,7 @@ class Rest(NamedTuple):
 
 
 def commanded_rest(commanding: Run) -> Rest | None:
-    """Of a run that follows paths; None where these move to its end, or leave the robot free to move.
+    """Return the final posture of a run on paths; None if paths last to its end, or the robot can move freely.
 
     And where the run did not complete, or no equilibrium is near its last posture.
     """
@@ -106,7 +106,7 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
 
 
 def end_of_paths(paths: Sequence[Trajectory], analysis: TimedAnalysis) -> float:
-    """When (s) the last target stays where it is for good."""
+    """Return the time (s) from which all targets are constant."""
     shapes = (function for _, function, _ in analysis.prescribed())
     ends = [_end(target, analysis.last_time, _breaks(path)) for path in paths for _, target in path.targets]
     return max([*ends, *(_end(function, analysis.last_time, function.switches()) for function in shapes)], default=0.0)
@@ -152,7 +152,7 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
 
 
 def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowest: float) -> dict[str, Settling]:
-    """Of each of the points of a `motion` that ends at rest; `lowest`: frequency (Hz) of the run, NaN for none."""
+    """Return the residual vibration of `points` in a run that ends at rest; `lowest` is its frequency, Hz, or NaN."""
     from scipy.interpolate import CubicHermiteSpline
 
     first = max(int(np.searchsorted(run.time, rest.since, side="right")) - 1, 0)

@@ -34,7 +34,7 @@ class PointStress:
 
 @struct
 class SurfaceStress:
-    """Where on the surface the von Mises stress is largest, over time."""
+    """Largest von Mises stress on the surface over time, and its position."""
 
     von_mises_max: Array  # (T,) Pa
     position_of_max: Array  # (T, 3) m, undeformed, in the link's frame
@@ -73,7 +73,7 @@ class SectionLoads:
     modal_force: Array  # (T, n) what they do to the modes of the modal body file, N/√kg
 
     def shares(self, x: Array) -> Array:
-        """(m, g) what each place counts for the sections at x (m,): straight lines between those under one patch."""
+        """Return weights (m, g) of places for sections at x (m,): linear interpolation below one patch."""
         shares = np.zeros((len(x), len(self.x)))
         for k, (start, end) in enumerate(self.edges):
             own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))
@@ -84,7 +84,7 @@ class SectionLoads:
 
 @struct
 class Recovery:
-    """What stresses of a body are computed from, one row per output."""
+    """Data for the stresses of a body, one row per output."""
 
     method: str  # one of `METHODS`
     modal: Array  # (T, n) p − p_s, in the modes of the modal body file
@@ -94,12 +94,12 @@ class Recovery:
 
     @property
     def cases(self) -> Array:
-        """(T, n + l + …) sizes of all that has a stress of its own: modes, loads, sections."""
+        """Sizes (T, n + l + …) of modes, loads and sections, each with its own stress."""
         sections = () if self.sections is None else (self.sections.moment, self.sections.force)
         return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
     def at(self, rows: Indices) -> Recovery:
-        """These outputs alone."""
+        """Return these outputs alone."""
         of = self.sections
         if of is not None:
             of = replace(of, moment=of.moment[rows], force=of.force[rows], modal_force=of.modal_force[rows])
@@ -107,14 +107,14 @@ class Recovery:
 
 
 def mode_displacement(p: Array) -> Recovery:
-    """From modal coordinates p (T, n) of the file alone."""
+    """Return the recovery from modal coordinates p (T, n) of the file alone."""
     return Recovery(METHODS[0], p, (), np.zeros((len(p), 0)))
 
 
 def mode_acceleration(
     body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None = None
 ) -> Recovery:
-    """With the static stresses of loads, as far as the file has them.
+    """Return the recovery with static stresses of loads that the file contains.
 
     `body` is as its file has it, p (outputs, n) in its modal coordinates, which are T (n, m) times those in the
     equations; `loads` are sizes (outputs,) of unit loads by name.
@@ -159,7 +159,7 @@ def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
 
 
 def surface_stress(body: ModalBody, recovery: Recovery) -> Array:
-    """(T, p, 6) everywhere on the surface of a body whose file has stresses there, Pa, in the body frame."""
+    """Return stresses (T, p, 6), Pa, body axes, on the surface of a body whose file has surface stresses."""
     assert body.surface_stress is not None
     cases = _cases(body, recovery, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
     return np.asarray(np.einsum("pin,tn->tpi", cases, recovery.cases, optimize=True))
@@ -183,7 +183,7 @@ def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: 
 
 
 def von_mises(stress: Array) -> Array:
-    """(…,) von Mises stress of (…, 6) stresses xx, yy, zz, yz, xz, xy."""
+    """Return von Mises stress (…,) of stresses (…, 6) xx, yy, zz, yz, xz, xy."""
     return np.asarray(np.linalg.norm(stress @ _distortion().T, axis=-1))
 
 

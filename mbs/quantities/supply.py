@@ -37,7 +37,7 @@ def followed_trajectories(run: Run) -> list[Trajectory]:
 
 @kept
 def actuator_forces(run: Run) -> MotorForces | None:
-    """What motors and modes supply, behind compliant gears what motors must do there; None where nothing is prescribed.
+    """Return forces of motors and modes, behind compliant gears those required there; None if nothing is prescribed.
 
     Modal forces of links in pieces follow by virtual work from those on their pieces.
     """
@@ -52,7 +52,7 @@ def actuator_forces(run: Run) -> MotorForces | None:
 
 
 def motor_moments(run: Run) -> Mapping[str, Array]:
-    """By joint (T, k), N·m or N: what motors do, or have to do in place of what is prescribed."""
+    """Return motor torques (T, k) by joint, N·m or N, acting or required for what is prescribed."""
     forces = actuator_forces(run)
     return run.commanded if forces is None else forces.moments
 
@@ -80,7 +80,7 @@ def gear_motions(run: Run) -> Mapping[str, GearMotion]:
 
 @kept
 def behind_gears(run: Run) -> Run:
-    """The same with motors as far ahead of compliant gears as they have to be; itself where gears give in it."""
+    """Return the run with motors ahead of compliant gears by the required twist; unchanged if gears give in it."""
     gears = gear_motions(run)
     if not gears:
         return run
@@ -90,7 +90,7 @@ def behind_gears(run: Run) -> Run:
 
 
 def gear_moment(run: Run, joint: str) -> Array | None:
-    """What a compliant gear transmits to the second side of its joint (T,), N·m; else None."""
+    """Return the torque (T,), N·m, of a compliant gear on the second side of its joint; None without one."""
     if joint in (gears := gear_motions(run)):
         return gears[joint].gear_moment
     for gear in run.model.tree.gears:
@@ -101,7 +101,7 @@ def gear_moment(run: Run, joint: str) -> Array | None:
 
 
 def motor_motion(run: Run, joint: str) -> tuple[Array, Array] | None:
-    """Angle and rate (T,), rad, rad/s, of the motor behind a compliant gear, reduced to its joint; else None."""
+    """Return angle and rate (T,), rad, rad/s, of the motor behind a compliant gear at its joint; None without one."""
     if joint in (gears := gear_motions(run)):
         return gears[joint].angle, gears[joint].rate
     for gear in run.model.tree.gears:

@@ -81,7 +81,7 @@ class Bending:
 
     @property
     def in_words(self) -> str:
-        """What was measured."""
+        """Deflection, rotation and change of stiffness as text."""
         stiffening = "with geometric stiffening" if self.is_stiffened else "geometric stiffening is off"
         times = f" and are {self.buckling:.3g} times those under which it buckles" if self.buckling >= 1.0 else ""
         return (
@@ -91,7 +91,7 @@ class Bending:
 
     @property
     def estimate(self) -> str:
-        """How wrong results may be."""
+        """Estimated errors of results as text."""
         if self.missing.of_length > USELESS:
             return "results may be entirely wrong"
         return (
@@ -101,7 +101,7 @@ class Bending:
 
     @property
     def advice(self) -> str:
-        """What to do about it."""
+        """Remedy as text."""
         if not self.is_stiffened and self.shortening <= SHORTENING_LIMIT[True]:
             return "consider geometric_stiffening = true"
         if not self.is_divisible:
@@ -112,7 +112,7 @@ class Bending:
 
 
 def enough_pieces(shortening: float, count: int) -> int:
-    """Into how many pieces to divide a link, of which now `count` lose that part of their length by bending.
+    """Return the number of pieces for a link that in `count` pieces shortens by that part of its length.
 
     It goes down with the square of their number.
     """
@@ -120,7 +120,7 @@ def enough_pieces(shortening: float, count: int) -> int:
 
 
 def link_bending(run: Run, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
-    """Of the flexible bodies of the equations by name; `links` are their modal bodies as their files have them."""
+    """Return the deflection measures of flexible bodies of the equations; `links` are their modal bodies."""
     loads = loads_in_equations(run, links) if len(run.time) else {}
     bendings = {}
     for name, link in links.items():
@@ -195,7 +195,7 @@ class LinkInRun(NamedTuple):
 
 
 def bending_of_link(link: ModalBody, run: LinkInRun, force: Array) -> Bending:
-    """Of one link; see `Bending`. `force` (T,) N: the largest at an interface."""
+    """Return the deflection measures of one link; `force` (T,), N, is the largest at an interface."""
     deflection, rotation, shortening = shape_from_chord(link, run.p)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
@@ -248,7 +248,7 @@ def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
 
 
 def deflection_warning(bodies: Mapping[str, Bending]) -> str:
-    """What to tell of links that bend too much; empty where none does."""
+    """Return the warning on links that bend too much; empty if none does."""
     worst = largest(bodies)
     if worst is None or not worst[1].is_beyond:
         return ""
@@ -265,7 +265,7 @@ LEAST = 1e-9  # of the robot's size, or rad: constraints that are off by less ar
 
 
 def doubts(run: Run, tolerance: float) -> Iterator[str]:
-    """Of a motion that was found to `tolerance`: constraints that are not met, turns and angles that are in doubt."""
+    """Yield doubts about a motion computed to `tolerance`: unmet constraints, ambiguous turns and angles."""
     yield from _violated(run, max(tolerance, LEAST))
     for one, of_cut in cut_motions(run):
         if not of_cut.is_counted:

@@ -24,15 +24,15 @@ class PatchedLink(Protocol):
 
     @property
     def per_volt(self) -> Mapping[str, Array]:
-        """(n, k) modal forces per volt."""
+        """Modal forces per volt (n, k), by body."""
 
     @property
     def amplifiers(self) -> Amplifiers:
-        """Of its patches."""
+        """Amplifiers of its patches."""
 
     @property
     def edges(self) -> Array:
-        """(k, 2) where patches begin and end, m from the root of the link."""
+        """Begin and end (k, 2) of patches, m from the root of the link."""
 
     @property
     def slowness(self) -> float:
@@ -40,17 +40,17 @@ class PatchedLink(Protocol):
 
     @property
     def to_reached(self) -> Mapping[str, Array]:
-        """(m, n) modal forces as `allocation` takes them, by those on the modes of the file."""
+        """Matrices (m, n), by body, from modal forces on the modes of the file to those of `allocation`."""
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """From modal forces to voltages, with the limits of the patches or without."""
+        """Return the map from modal forces to voltages, with limits of the patches or without."""
 
 
 class ActuationPoints(Protocol):
     """Points of one body for components of force."""
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """What `_core.point_reader` takes of their body: directions and positions (3, c), Φ (3 c, n), scale (6 + n)."""
+        """Return arrays for `_core.point_reader`: directions and positions (3, c), Φ (3 c, n), scale (6 + n)."""
 
 
 ForcesAtPoints = Callable[[Run], Mapping[str, Array]]
@@ -58,13 +58,13 @@ ForcesAtPoints = Callable[[Run], Mapping[str, Array]]
 
 
 def no_points(run: Run) -> Mapping[str, Array]:
-    """None."""
+    """Return None: a run without actuation points."""
     return {}
 
 
 @struct
 class WholeLinks:
-    """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it."""
+    """The robot with whole links, as scenes and controllers name it, of a model with links in pieces."""
 
     model: Model  # the robot with one body for each link
     divided: Mapping[str, DividedLink]  # the links in pieces by name
@@ -75,7 +75,7 @@ class WholeLinks:
 
 @struct
 class Context:
-    """What the run of an analysis starts from."""
+    """Data from which the run of an analysis starts."""
 
     _: KW_ONLY
     progress: Progress  # see `drive.Progress`
@@ -91,5 +91,5 @@ class Context:
 
 
 def place_of(whole: WholeLinks | None, point: Point) -> Point:
-    """Where a point of the scene is in the model, of whose links some are in pieces where there are `whole` ones."""
+    """Return the point of the model for a point of the scene; they differ on links in pieces."""
     return point if whole is None or point is None else whole.places.get(point, point)

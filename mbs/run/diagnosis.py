@@ -49,7 +49,7 @@ def _targets(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
 
 
 def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Callable[[], Array], t: float) -> str:
-    """Which of the targets, each with its label, is no number at t, or whether the accelerations there are none."""
+    """Return which labelled target is not finite at t (s), or that accelerations are not finite; else ""."""
     for label, target in targets:
         if not np.isfinite(target(t)).all():
             return f"{label} has no finite value, velocity or acceleration there"
@@ -88,7 +88,7 @@ def _loads(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
 
 
 def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
-    """Which of the loads, each with its label, jumps at t, or has no finite value from there on.
+    """Return which labelled load jumps at t (s), or has no finite value from there on; else "".
 
     Functions of Python may have values alone: the changes just before and just after t tell what is no jump.
     """

@@ -65,7 +65,7 @@ STATUS = {
 
 @struct
 class Control:
-    """What acts on motors and patches from sample to sample."""
+    """Commands to motors and patches from sample to sample."""
 
     commands: tuple[Command, ...]  # what a unit of each does
     first: Array  # (inputs,) before those of the first sample act

@@ -34,7 +34,7 @@ CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bod
 
 
 class Supplied(NamedTuple):
-    """What motors and modes supply in a motion of the links: see `supplied_through_gears`."""
+    """Forces of motors and modes in a motion of the links; see `supplied_through_gears`."""
 
     forces: MotorForces  # τ, of motors in front of compliant gears, and F_p
     gears: Mapping[str, GearMotion]  # by joint with such a gear
@@ -43,7 +43,7 @@ class Supplied(NamedTuple):
 def supplied_through_gears(
     model: Model, state: States, time: Array, wanted: Array, twists: Mapping[str, BSpline] | None = None
 ) -> Supplied:
-    """What carries the motion `state` at `time` (T,), for which rigid gears need `wanted` (T, n_v).
+    """Return motor and modal forces of the motion `state` at `time` (T,); rigid gears need `wanted` (T, n_v).
 
     Compliant gears let their rotors turn by N δ more. Then the rotor needs J N² δ̈ of its motor, and
     the body that carries it, which turns with Ω_a, the moment J N (δ̈ z + δ̇ Ω_a × z): the rate of J N δ̇ z. That is
@@ -184,7 +184,7 @@ class GearSpring(NamedTuple):
 def gear_motion(
     spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: BSpline | None = None
 ) -> GearMotion:
-    """Of a gear whose motor supplies `tau` (T,) where it is rigid, `rotor` (T,) of which its rotor takes, J N ψ̈.
+    """Return the motion of a gear from torque `tau` (T,) with a rigid gear, of which its rotor takes `rotor` (T,).
 
     `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t) where it is known.
     Raises `InputError` where damping holds it so long that its moments say nothing of its twist.
@@ -251,7 +251,7 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
 
 
 def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:
-    """What to tell of motors whose moments the outputs do not resolve."""
+    """Yield warnings on motors whose torques the outputs do not resolve."""
     for joint, motion in gears.items():
         if motion.unresolved > UNRESOLVED:
             yield (

@@ -76,7 +76,7 @@ class Choice(NamedTuple):
         return self.reason != ASKED_FOR
 
     def changed_in(self, run: _core.TreeRun) -> Choice:
-        """What it has become during `run`, which says when and why."""
+        """Return the choice with any change during `run`, with time and reason."""
         if not run.changes:
             return self
         names = {kind: name for name, kind in METHODS.items()}
@@ -121,7 +121,7 @@ def faster_of(
 
 
 def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.IntegrationControls:
-    """What the core integrates an analysis with."""
+    """Return the core's integration settings of an analysis."""
     candidates = choice.candidates or (Candidate(choice.name),)
     methods = [(METHODS[one.name], one.cost, one.pace) for one in candidates]
     controls = _core.IntegrationControls(
@@ -135,7 +135,7 @@ def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.
 
 
 def with_steps_of(analysis: IntegratedAnalysis, end: float, choose: Callable[[], Choice]) -> Choice:
-    """What `choose` chooses for a run up to `end` (s), unless it repeats steps. Where they are kept, none takes over.
+    """Return the choice for a run up to `end` (s), or the integrator whose steps it repeats.
 
     Raises `InputError` where the steps to repeat end elsewhere.
     """
@@ -173,7 +173,7 @@ def beyond_rounding(tolerance: float, rounding: float) -> str:
 
 
 def unmet(choice: Choice, run: _core.TreeRun) -> str:
-    """What the integrator saw where steps have become too short and no cause is found in loads or positions."""
+    """Return what the integrator saw when steps became too short without a cause in loads or positions."""
     if run.last_step == 0:
         return (
             "the first step would be too short to change the time: accelerations or frequencies are that large;"

@@ -43,7 +43,7 @@ ADVICE = {
 
 @struct
 class Statistics:
-    """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early.
+    """Statistics of a run; `cause` is the reason of an early end at `time_reached`, s.
 
     `warnings` are on what is left open. `step_ends` (N,), in s, with which the run can be repeated, if it was asked for
     them; see `fields.steps`.
@@ -61,7 +61,7 @@ class Statistics:
     warnings: tuple[str, ...] = ()
 
     def added_to(self, earlier: Statistics) -> Statistics:
-        """With the work of the run that this one went on from; ends of steps where those of all are known."""
+        """Return statistics that include the earlier part of a resumed run."""
         counts = ("steps", "rejected", "evaluations", "wall_seconds")
         whole = replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
         ends = np.concatenate([earlier.step_ends, self.step_ends])
@@ -70,7 +70,7 @@ class Statistics:
 
 @struct
 class Continuation:
-    """Where an integration resumes, its steps where a later analysis replays them, and states between outputs."""
+    """State from which an integration resumes, its recorded steps, and states between outputs."""
 
     checkpoint: _core.TreeCheckpoint
     recording: _core.Recording | None = None
@@ -79,7 +79,7 @@ class Continuation:
 
 @struct
 class GearMotion:
-    """What an elastic gear does in an inverse analysis, one row per output."""
+    """Motion of a compliant gear in an inverse analysis, one row per output."""
 
     gear_moment: Array  # (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body
     # angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad
@@ -158,7 +158,7 @@ class Run:
 
     @property
     def space(self) -> Space:
-        """That of the scene."""
+        """Axes of the scene."""
         return SPACES[self.model.scene.space]
 
     @property
@@ -168,7 +168,7 @@ class Run:
 
     @property
     def recording(self) -> _core.Recording | None:
-        """Its steps, where a later analysis replays them."""
+        """Recorded steps, if a later analysis replays them; else None."""
         return self.continuation.recording if self.continuation else None
 
     @property
@@ -177,7 +177,7 @@ class Run:
         return self if self.look_closer is None else self.look_closer()
 
     def with_look(self, at: Callable[[Array], Run]) -> Self:
-        """The same that looks closer at a motion along paths, which `at` has at any times (T,), s."""
+        """Return a run that can be sampled more closely along paths, by `at` for any times (T,), s."""
 
         @cache
         def look_closer() -> Run:
@@ -189,12 +189,12 @@ class Run:
 
     @property
     def status(self) -> str:
-        """How the run ended."""
+        """Status at the end, such as "completed"."""
         return self.statistics.status
 
     @property
     def time_reached(self) -> float:
-        """Where the last step ended, s; the last output where that is not known."""
+        """End of the last step, s; if unknown, the last output."""
         reached = self.statistics.time_reached
         if reached is not None:
             return reached
@@ -215,15 +215,15 @@ class Run:
             )
 
     def at(self, rows: slice | Sequence[int] | Indices) -> Self:
-        """These outputs alone."""
+        """Return these outputs alone."""
         return self._each(lambda x: x[rows])
 
     def with_rows_of(self, other: Run, order: Indices) -> Self:
-        """With the rows of the same run at other times behind these, all in another order."""
+        """Return the run with rows of `other`, at other times of the same motion, appended and reordered."""
         return self._each(lambda x, y: np.concatenate([x, y])[order], other)
 
     def after(self, earlier: Run) -> Self:
-        """With the rows of an earlier part of the same run before those that are beyond it."""
+        """Return the run with the earlier part of the same motion in front."""
         return self._each(lambda x, y: np.concatenate([y, x[len(y) :]]), earlier)
 
     def _each(self, change: Callable[..., Array], *others: Run) -> Self:

@@ -155,14 +155,14 @@ def motor_forces_of(run: Run) -> MotorForces:
 
 
 def supplied_in(run: Run) -> Array:
-    """What the paths of a run, or a prescribed shape, take along v (T, n_v)."""
+    """Return generalized forces (T, n_v) that the paths, or a prescribed shape, of a run require."""
     if run.required is not None:
         return run.required
     return path_forces(run.model, run.time, run.q, run.multipliers)
 
 
 def left_paths(source: Run, run: Run) -> Iterator[str]:
-    """Of a replay under the forces on all rows, which would move as `source` did: a warning where it does not."""
+    """Yield a warning if a replay under the forces of all rows leaves the motion of `source`."""
     now = (run.time >= 0.0) & (run.time <= source.time[-1])
     model, times, q = source.model, run.time[now], run.q[now]
     if not len(times):

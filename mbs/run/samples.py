@@ -121,7 +121,7 @@ def in_order(outputs: Array, samples: Array) -> Indices:
 def stops(
     times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool, is_replay: bool
 ) -> Array:
-    """(n,) s within `times`, at which steps of integrations end.
+    """Return times (n,), s, at which integration steps must end.
 
     Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
     and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far or conditions change.
@@ -206,7 +206,7 @@ def _parts(breaks: Array, chosen: Booleans) -> Array:
 
 
 def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: Iterable[TimeFunction] = ()) -> Array:
-    """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs.
+    """Return times (T,), s: outputs `times`, and enough times between for `paths` from 0 to `end` (s).
 
     `others`: loads, and whatever else is prescribed.
     """

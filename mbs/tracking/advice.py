@@ -69,7 +69,7 @@ def bounds_of_zeros(
 
 
 def enough_time(servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float) -> float:
-    """How much earlier (s) actuators must begin, and later end, for voltages within their limits; NaN where not found.
+    """Return the pre- and post-actuation (s) that voltages within limits need; NaN if not found.
 
     The least voltage falls about as e^{−s t}, s the slowest zero to the right (Zou and Devasia, 1999).
     """
@@ -175,7 +175,7 @@ def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
 
 
 def singular_times(linear: Linearisation) -> Iterator[str]:
-    """Where the inertia that motors leave to the modes changes its sign, and the cure."""
+    """Yield where the modal inertia with free motors changes its sign, and the remedy."""
     for k in linear.singular_after[:1]:
         yield (
             f"between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s a zero of the modes passes through"

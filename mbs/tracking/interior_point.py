@@ -29,7 +29,7 @@ BACK = 0.995  # of the way to the nearest bound
 
 @struct
 class Program:
-    """See above: H (N, s + r, s + r), g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i).
+    """Quadratic program: H (N, s + r, s + r), g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i).
 
     `start`, `end`: R (r, s) and e (r,).
     """
@@ -49,7 +49,7 @@ class Program:
         return np.hstack([x[:-1], x[1:, : self.g.shape[1] - x.shape[1]]])
 
     def objective(self, x: Array) -> float:
-        """At x (N+1, s)."""
+        """Return the objective at x (N+1, s)."""
         z = self.z(x)
         return float((z * (0.5 * _times(self.H, z) + self.g)).sum())
 

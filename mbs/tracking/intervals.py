@@ -35,7 +35,7 @@ def start_breaks(start: float, path_end: float, end: float, intervals: int) -> A
 
 
 def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool], near: Tracked) -> Tracked:
-    """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over.
+    """Return the solution on intervals halved until residual forces are below `tolerance` of the largest elastic one.
 
     Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
     """

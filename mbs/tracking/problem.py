@@ -48,7 +48,7 @@ ROUGH_GAP = 1e-6  # of the objective, there
 
 @struct
 class Limits:
-    """Of the m patches, and of motors (motors,) N·m or N; infinite where there are none."""
+    """Limits of m patches, V, and of motors (motors,), N·m or N; infinite if none."""
 
     patches: Amplifiers
     torque: Array
@@ -65,7 +65,7 @@ class Weights:
 
 @struct
 class Transition:
-    """What is asked for: `rest` are p at both ends, `is_free` whether V may begin and end at any value.
+    """Boundary conditions: `rest` is p at both ends; `is_free` whether V may start and end at any value.
 
     `rate` is that of the slowest zero, 1/s: voltages matter less by e^{−rate t} at the time t from the nearer end.
     """
@@ -129,7 +129,7 @@ class Tracked:
 
     @property
     def surely(self) -> float:
-        """What the share is at least by its doubt; 0 where nothing is known of that."""
+        """Lower bound of the share, within its uncertainty; 0 if that is unknown."""
         return max(0.0, self.share * (1.0 - self.doubt)) if np.isfinite(self.doubt) else 0.0
 
 

@@ -105,7 +105,7 @@ class Tracking(TimedAnalysis):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Where a path error is planned; else which kinds have the key."""
+        """Return the message for a key of other kinds, with the plan for path errors."""
         if key == "path_tolerance":
             return (
                 'expected no "path_tolerance": this kind follows its path exactly; torques without voltages plan a path'
@@ -181,7 +181,7 @@ class Tracking(TimedAnalysis):
 
 @struct
 class TrackedPath(AroundPath):
-    """How a path is carried."""
+    """Actuation with which a path is tracked."""
 
     _: KW_ONLY
     least_voltage: float  # V, the largest voltage that is needed at least, of the patch next to its limit
