@@ -78,7 +78,7 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Shift (T, 3), m, global axes, of points by modal forces r (T, n) of modal body files, where motors stand still.
+    """Shift (T, 3), m, global axes, of points under modal forces r (T, n) by body, motors held in place.
 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
     twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
@@ -209,7 +209,7 @@ class PatchFeasibility:
 
 @struct
 class Feasibility:
-    """Everything that one analysis asks of the actuators: motors by joint, patches by body.
+    """Requirements of one analysis on its actuators: motors by joint, patches by body.
 
     `unsupplied` where it asks for modal forces that no actuator is there for: then motors and patches cannot do it,
     whatever their limits.
@@ -226,7 +226,7 @@ class Feasibility:
 
     @property
     def factors(self) -> dict[str, float]:
-        """The largest ratio of what is required of each actuator to its limit, by its name in messages."""
+        """Largest ratio of requirement to limit of each actuator, by its name in messages."""
         motors = {f"motor {name}": float(motor.factor) for name, motor in self.motors.items()}
         return motors | {f"patches of {name}": float(np.max(of.factor)) for name, of in self.patches.items()}
 

@@ -67,11 +67,11 @@ class MotorFeasibility:
 
     @property
     def has_spike(self) -> bool:
-        """Whether the largest moment is more than a tenth above what is needed for 99 % of the time."""
+        """Whether the largest moment exceeds that of 99 % of the time by more than a tenth."""
         return self.moment > APART * self.usual_moment
 
     def spike_in_words(self, unit: str) -> str:
-        """Why a short peak is there and what helps; empty where there is none. `unit` of the moment."""
+        """Explain a short peak of the moment, given in `unit`, and its remedy; empty where there is none."""
         if not self.has_spike:
             return ""
         why = f": the {self.jump} of the path jumps there, so take a smoother path" if self.jump else ""

@@ -105,7 +105,7 @@ class PointSet:
 def make_point_set(
     scene_path: Path, layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space
 ) -> PointSet:
-    """The components that the scene asks for, or as many well-conditioned ones in `space` as are independent.
+    """Choose the components of points to follow: the scene's, or the independent ones that are best conditioned.
 
     Raises `InputError` for places that the body has not, for more components than coordinates, and for components that
     do the same to the body; in the plane for a body whose points cannot carry all its generalized forces.

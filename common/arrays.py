@@ -17,7 +17,7 @@ Booleans = NDArray[np.bool_]
 
 
 def as_floats(values: NDArray[np.floating[Any]]) -> Array:
-    """`values`, which are float64: the types of NumPy 2 do not say so of what linspace, inv or a quotient returns."""
+    """Declare `values` as float64 to the type checker, which NumPy 2 leaves open for linspace, inv and quotients."""
     return values.astype(np.float64, copy=False)
 
 

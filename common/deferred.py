@@ -20,7 +20,7 @@ USED: set[type[BaseModel]] = set()
 
 @dataclass(frozen=True)
 class Deferred:
-    """Marks the record of a table, or a union of records that the key `tag` tells apart.
+    """Annotation of a table's record that is imported on first use; for unions, `key` tells the members apart.
 
     `modules` has the records by the value of that key, "MODULE:RECORD", where no union does. A module is imported when
     a file has such a table.
@@ -45,7 +45,7 @@ class Deferred:
 
 @dataclass(frozen=True)
 class ReadBy:
-    """Marks a value that `function` makes of what a file says, which `written` is: a type, or "MODULE:TYPE".
+    """Annotation of a value that `function` makes from a file's entry of type `written` (or "MODULE:TYPE").
 
     Pydantic's PlainValidator would look up both whenever a command starts.
     """

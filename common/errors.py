@@ -24,7 +24,7 @@ class InputError(FfrobotError):
 
 
 class SolveError(FfrobotError):
-    """An analysis could not be completed: the message says where, why and what to try next."""
+    """An analysis could not be completed: the message tells where, why and what to try next."""
 
     __module__ = "ffrobot"
     exit_code = 1
@@ -37,7 +37,7 @@ class FfrobotWarning(UserWarning):
 
 
 class StoppedError(SolveError):
-    """A signal has ended a run, which has kept what it had computed."""
+    """A signal ended a run; its results until then are kept."""
 
     def __init__(self, message: str, number: int) -> None:
         super().__init__(message)
@@ -46,7 +46,7 @@ class StoppedError(SolveError):
 
 @contextmanager
 def of_file(name: object) -> Iterator[None]:
-    """Have errors that name no file say that they are about `name`; what fails numerically within becomes `SolveError`.
+    """Context that puts the file `name` on errors without one; numerical failures within become `SolveError`.
 
     NumPy and SciPy raise `LinAlgError` where matrices are singular or not finite, which valid but extreme numbers make.
     """
@@ -79,7 +79,7 @@ def is_own_fault(error: BaseException) -> bool:
 
 @contextmanager
 def blaming_file(problem: Callable[[Exception], str], where: str = "") -> Iterator[None]:
-    """Turn what a reader raises into `InputError`: `problem`(error) unless it is one already, after `where`.
+    """Context that turns a reader's exceptions into `InputError`: `where`, then the text `problem`(error).
 
     Faults of the program stay what they are. `where` names file and key.
     """
@@ -114,7 +114,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def quoted(words: Iterable[str]) -> str:
-    """`"a", "b"`, for the list of what is known; "none" when empty."""
+    """Join names for a message: `"a", "b"`; "none" when empty."""
     return ", ".join(f'"{word}"' for word in words) or "none"
 
 

@@ -104,7 +104,7 @@ def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
 
 
 def check_new_file(path: Path, *, replace: bool) -> None:
-    """Refuse an output of text that would cost another file, unless that is to be replaced. Raises `InputError`."""
+    """Raise `InputError` where an output would overwrite an input, or, unless `replace`, another file."""
     check_not_an_input(path)
     if path.exists() and not (replace and path.is_file()):
         raise InputError(f"{path}: output: expected a new name, or --force to replace it, found a file there")

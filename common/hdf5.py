@@ -109,7 +109,7 @@ def fields_in(found: Mapping[str, Any], record: type[DataclassInstance]) -> dict
 
 @contextmanager
 def blaming(*paths: Path) -> Iterator[None]:
-    """Turn what reading these files raises into `InputError`, where one is not known to be as ffrobot wrote it.
+    """Context that turns read errors of HDF5 files into `InputError`, as of files not written by ffrobot.
 
     With all of them sound an error is the program's own, and is left as it is, as are errors that no file raises.
     """

@@ -23,7 +23,7 @@ LABELS: Mapping[str, tuple[str, ...]] = MappingProxyType({
 
 
 class Meaning(NamedTuple):
-    """`unit` (empty: none) and a few words; what `columns` over time are of, {} for the second part of the name.
+    """Meaning of a stored quantity: `unit` (empty: none), a few words, and those on its columns over time.
 
     `record`: whose field of that name `write_record` writes; empty where the dataset has a writer of its own.
     """
@@ -347,7 +347,7 @@ def meaning(name: str, table: Mapping[str, Meaning] = RESULTS) -> Meaning | None
 
 
 def matches(name: str, pattern: str) -> bool:
-    """Whether a name is one of a pattern; * stands for a part of it, ** at the end for all below."""
+    """Whether a name fits a pattern: * for one part of it, ** at the end for everything below."""
     parts, wanted = name.split("/"), pattern.split("/")
     if wanted[-1] == "**":
         parts, wanted = parts[: len(wanted) - 1], wanted[:-1]
@@ -357,7 +357,7 @@ def matches(name: str, pattern: str) -> bool:
 
 
 def names_of(record: str) -> tuple[str, ...]:
-    """Names in files of what the tables have of a record, by the name of its class; of attributes with @."""
+    """Names in result files of the quantities of a record, given by its class's name; attributes begin with @."""
     every = (*RESULTS.items(), *MODAL_BODY.items())
     return tuple(pattern.rpartition("/")[2] for pattern, about in every if about.record == record)
 

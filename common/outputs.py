@@ -26,7 +26,7 @@ _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 @contextmanager
 def protected(paths: Iterable[Path]) -> Iterator[None]:
-    """Within its context nothing is written to these files, by whatever name, symbolic and hard links included."""
+    """Context in which these files cannot be overwritten, whether by symbolic link, hard link or another path."""
     token = _inputs.set((*_inputs.get(), *paths))
     try:
         yield

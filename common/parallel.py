@@ -60,7 +60,7 @@ def without_daemon() -> None:
 
 
 def environment_without_mpi() -> dict[str, str]:
-    """The environment for a process of its own: what a library's MPI has left in this one would make it join in."""
+    """Environment variables for a child process, without those by which it would join this process's MPI."""
     return {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PMI_", "PRTE_"))}
 
 

@@ -54,7 +54,7 @@ def check_python_file(path: Path, folder: Path) -> None:
 
 
 def count_imports(*folders: Path) -> None:
-    """Have modules in or below `folders`, and below what is allowed, count among `imported_files`."""
+    """Record imports from `folders`, and from below the allowed ones, in `imported_files`."""
     _folders.update(folder.resolve() for folder in (*folders, *_allowed.get()))
 
 

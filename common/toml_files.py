@@ -53,7 +53,7 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
 
 
 def parse_toml(text: str, path: Path, kind: str) -> dict[str, Any]:
-    """The tables in the `text` of the file at `path`. Raises `InputError` for what no file may hold."""
+    """Parse the `text` of the TOML file at `path`. Raises `InputError` for errors and values beyond all limits."""
     try:
         if TOO_DEEP.search(text):  # which would take tomllib the square of its length
             raise RecursionError
@@ -70,7 +70,7 @@ def parse_toml(text: str, path: Path, kind: str) -> dict[str, Any]:
 
 
 def check_limits(data: dict[str, Any], path: Path) -> None:
-    """Raise `InputError`, a line for each, for what no key of any file may hold: see `tables.beyond_limits`."""
+    """Raise `InputError`, a line each, for values that no file may hold: see `tables.beyond_limits`."""
     if found := list(beyond_limits(data)):
         raise InputError("\n".join(f"{path}: {line}" for line in found[:10]))
 

@@ -53,7 +53,7 @@ def space_of(info: ValidationInfo) -> str | None:
 
 
 def as_tuples(value: Any) -> Any:
-    """`value` with tuples for lists: what pydantic takes from validators that stand before those of a type."""
+    """Turn lists in `value` into tuples, for pydantic validators that run before those of a type."""
     if isinstance(value, dict):
         return {key: as_tuples(item) for key, item in value.items()}
     return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
@@ -154,7 +154,7 @@ def plain(value: Any, functions: dict[str, object] | None = None) -> Any:
 
 
 def check_texts(value: object, label: str) -> None:
-    """Raise `InputError`, which begins with `label`, for what is no list of texts: one text, too, whose letters are."""
+    """Raise `InputError`, beginning with `label`, for anything but a list of texts; a single text is refused too."""
     texts = value if isinstance(value, Collection) else ()  # generators can be read once
     is_list = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
     if not (is_list and all(isinstance(one, str) for one in texts)):

@@ -12,7 +12,7 @@ VERSION = "0.2.0"
 
 @cache
 def digest_of_code(folder: Path) -> str:
-    """SHA-256 of the Python files below `folder`: what another state of the program has made is not up to date."""
+    """SHA-256 of the Python files below `folder`, by which results of another state of the program are told."""
     digest = hashlib.sha256()
     for file in sorted(folder.rglob("*.py")):
         digest.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")

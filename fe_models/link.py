@@ -114,7 +114,7 @@ def _source(link: AnyPath | LinkTable | Mapping[str, Any]) -> LinkSource:
 
 
 def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> LinkOutcome:
-    """The modal body of a link: from an up-to-date LINK.h5 beside it, else from the user's cache, else computed.
+    """Return the modal body of a link: from LINK.h5 if up to date, else the user's cache, else computed.
 
     Cache entries are named by content: hashes of its modes and of all of it, under `ffrobot/links` in the XDG cache
     folder. A damaged entry is computed again. Raises `InputError` for a wrong link file, `SolveError` where the modes
@@ -130,7 +130,7 @@ def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> L
 
 
 def computed_modal_body(source: LinkSource) -> ModalBody:
-    """The modal body of a link by its finite element model alone, whatever was measured; kept nowhere.
+    """Compute the modal body of a link by finite elements alone, ignoring measured data and caches.
 
     Raises `InputError` for a wrong link file, `SolveError` where the modes cannot be computed.
     """
@@ -256,7 +256,7 @@ _AFTER_THE_MODES = ("name", "damping", "stress", "measured")
 
 
 def input_hash(link: Link) -> str:
-    """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the code that computes it.
+    """SHA-256 of all inputs of a modal body: the link with its defaults filled in, and the code that computes it.
 
     A part's file and a table of measured modes count by their content. Comments, the order of keys, 1 for 1.0, dates
     of files change nothing.
@@ -265,7 +265,7 @@ def input_hash(link: Link) -> str:
 
 
 def modes_hash(link: Link) -> str:
-    """SHA-256 of what the modes and their invariants depend on."""
+    """SHA-256 of the inputs of the modes and their invariants."""
     return _digest({key: value for key, value in _content(link).items() if key not in _AFTER_THE_MODES})
 
 
@@ -284,7 +284,7 @@ def _digest(record: Mapping[str, Any]) -> str:
 
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
-    """The modal body of `link` from one with the same modes; None where that has not all that `link` asks for."""
+    """Derive the modal body of `link` from one with the same modes; None where it lacks any requested data."""
     body = as_computed(body)
     stress = _stresses(body, link)
     if stress is None or (link.stress.surface and body.surface_static is None):

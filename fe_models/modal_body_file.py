@@ -87,7 +87,7 @@ def read_modal_body(path: AnyPath) -> ModalBody:
 
 
 def read_mass(path: Path) -> float:
-    """The mass of the modal body in the file at `path`, kg. Raises `InputError` likewise."""
+    """Read the mass, kg, of the modal body in the file at `path`. Raises `InputError` likewise."""
     return _read(path, lambda file: float(_array(file, _DATASETS["mass"])))
 
 
@@ -110,7 +110,7 @@ def _read(path: Path, reader: Callable[[h5py.File], Found]) -> Found:
 
 
 def is_modal_body_file(path: Path) -> bool:
-    """Whether the file says so; False for what cannot be read."""
+    """Whether the file is a modal body file; False where it cannot be read."""
     try:
         with open_checked(path) as file:
             return bool(file.attrs.get("format") == FORMAT)

@@ -36,7 +36,7 @@ KEPT = ("ffrobot.", "scipy.")  # packages of which the next run finds what one h
 
 
 def main() -> None:
-    """Answer requests until there are no more, or SIGTERM, which the run under way has first."""
+    """Answer requests until there are no more or SIGTERM arrives, which first ends the current run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: runs have it, whoever asks for them decides
     requests, answers = _private_streams()
     report = TemporaryFile()  # noqa: SIM115 (as long as the worker)

@@ -172,7 +172,7 @@ def _robot(context: ActuatedContext, source: Run) -> ControlledRobot:
 def loop_models(
     model: Model, time: Array, reference: MotorCoordinates, patches: Mapping[str, LinkPatches], read: Sequence[Signal]
 ) -> tuple[LinearModel, ...]:
-    """The robot at rest on its reference at start, middle and end, with what signals read among its outputs.
+    """Linearize the robot at rest on its reference at start, middle and end; the signals `read` are outputs.
 
     None where it is singular, or has none yet.
     """

@@ -151,7 +151,7 @@ class ComputedTorqueControl:
 
 
 class PythonControl:
-    """Calls what `factory` makes, and checks what it returns. Raises `SolveError` where that fails."""
+    """Controller from a user's `factory`; checks what it returns and raises `SolveError` where that fails."""
 
     bandwidth = 0.0
 
@@ -215,7 +215,7 @@ def make_controllers(records: Sequence[Record], setup: Setup) -> list[Controller
 
 
 def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
-    """The controller of one table of the scene, acting with those `beside`.
+    """Make the controller of one table of the scene; `beside`: the tables of all that act together.
 
     Raises `InputError` where it does not fit the robot.
     """

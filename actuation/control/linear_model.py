@@ -122,7 +122,7 @@ def state_space(
     voltages: Mapping[str, Array],
     readings: Mapping[str, tuple[Array, Array, Array]] = MappingProxyType({}),
 ) -> LinearModel:
-    """The state space of a linear mechanism; `voltages`: what a unit of each does along s (f,), by name.
+    """Return the state space of a linear mechanism; `voltages` by name: generalized forces (f,) of 1 V along s.
 
     `readings`: changes (f,) of each sensor's by s, ṡ and s̈, which are outputs too.
     """

@@ -27,7 +27,7 @@ MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion
 
 
 def gains(model: SampledModel, Q: Array, R: Array) -> Array:
-    """K of u = −K x with least Σ xᵀQx + uᵀRu; Q of the states, commands on their way cost what they cost as inputs.
+    """Return K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, the rest are delays.
 
     Raises `ValueError` where the Riccati equation has no stabilizing solution.
     """
@@ -43,7 +43,7 @@ def gains(model: SampledModel, Q: Array, R: Array) -> Array:
 
 
 class LqrControl:
-    """u = −K x, x the joint errors, the lowest modes of the links and their rates, and the commands on their way."""
+    """Feedback u = −K x of joint errors, the links' lowest modes, their rates, and the commands not yet in effect."""
 
     def __init__(self, record: Lqr, setup: Setup, beside: Sequence[JointPid] = ()) -> None:
         model = design_model(record, setup, beside if record.inputs == "patches" else ())

@@ -40,7 +40,7 @@ RIGID = 1e-6  # of the fastest eigenvalue: slower ones are rounding of motion wi
 
 @struct
 class Feedback:
-    """ξ(k+1) = A ξ + B y, u = C ξ + D y: what controllers command for readings off their reference."""
+    """Discrete law of all controllers: ξ(k+1) = A ξ + B y, u = C ξ + D y, for deviations y from the reference."""
 
     A: Array
     B: Array
@@ -77,7 +77,7 @@ class Margins:
 
     @property
     def is_stable(self) -> bool:
-        """Whether the linear model says so."""
+        """Whether the closed loop of the linear model is stable."""
         return self.radius <= STABLE
 
 

@@ -113,7 +113,7 @@ def watched(end: float, window: float, lowest: float) -> Array:
 
 
 def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
-    """Peak to peak (m) of `error` (T, d) in the last period of `lowest` (Hz), where it is largest, less what is slower.
+    """Peak-to-peak vibration (m) of `error` (T, d), its slow part removed, in the last period of `lowest` (Hz).
 
     That is found over the last `window` (s) of `time` (T,), which should have the times `watched`.
     """

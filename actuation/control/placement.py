@@ -119,7 +119,7 @@ def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalRe
 
 
 def link_modes(link: PatchableLink, count: int) -> ModalReach:
-    """The lowest modes of the link itself: what the voltages of a path have to serve."""
+    """The lowest `count` modes of the link itself, which the voltages of a path must reach."""
     chosen = np.argsort(link.stiffness)[:count]
     return ModalReach(
         np.sqrt(link.stiffness[chosen]) / (2 * np.pi), np.eye(len(link.stiffness))[chosen], np.ones(len(chosen))
@@ -269,7 +269,7 @@ class PatchPlacement(InstantAnalysis):
         yield from self.placement.references()
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """Whether what it is about gives what the criterion judges by."""
+        """Check that the analysis placed for has the modal forces or the model that the criterion needs."""
         if not self.is_over_path:
             if self.instants is not None and len(self.instants) != 1:
                 yield f"times: expected one time to place patches for, found {len(self.instants)}"
@@ -284,7 +284,7 @@ class PatchPlacement(InstantAnalysis):
         yield from super().problems(among)
 
     def run(self, context: ActuatedContext) -> Run:
-        """The operating point, or those of the path, with what was `Placed`.
+        """Solve for the operating points, and place the patches by them; returned with the centers as `Placed`.
 
         Of several layouts of a link the others stay where they are. Raises `InputError` where it does not say which one
         is placed, and for a link without room for the patches.

@@ -442,7 +442,7 @@ class SampledAnalysis(ActuatedAnalysis):
                 yield f"disturbance no. {k}: {component}", function, 0
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Whether `source` found what is to be fed forward, and is there when a controller is designed."""
+        """Check that `source` has the inputs to feed forward, and exists before a controller is designed."""
         for k, record in enumerate(self.controller, 1):
             if isinstance(record, Lqr) and record.time > source.last_time * (1 + 1e-9):
                 yield (

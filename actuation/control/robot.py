@@ -204,7 +204,7 @@ class ControlledRobot:
     def linear(
         self, row: int, points: Mapping[str, str] = MappingProxyType({})
     ) -> tuple[LinearMechanism, Mapping[str, Array]]:
-        """About output `row` of the motion, and what a unit of each voltage does along its s; with gears that give.
+        """Linearize about output `row` of the motion: the mechanism, and forces of 1 V along s by voltage name.
 
         `points` as in `LinearEquations`.
         """
@@ -231,7 +231,7 @@ def estimate(volts: Array, count: int) -> Array:
 
 
 def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
-    """Sensors without which the `controllers` of an analysis could not act; ideal unless the scene gives them."""
+    """Sensors that the `controllers` of an analysis need; ideal ones where the scene has none."""
     for record in controllers:
         if isinstance(record, JointPid):
             for joint in record.joints:
@@ -258,7 +258,7 @@ def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) ->
 
 
 def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
-    """Ideal ones of what an observer estimates: the tip, all coordinates and rates, and what `controllers` need."""
+    """Ideal sensors of all that an observer estimates: the tip, coordinates, rates, and the controllers' readings."""
     model = robot.model
     subjects = [{"joint": one.name} for one in model.scene.joint if one.units and one.name in model.tree.carried]
     subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]

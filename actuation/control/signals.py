@@ -43,7 +43,7 @@ class Signal:
 
     @property
     def order(self) -> int:
-        """The place of what is measured in `ORDERS`."""
+        """Order of the time derivative that is measured: 0, 1 or 2 (from `ORDERS`)."""
         return ORDERS[self.sensor.measure]
 
 
@@ -170,7 +170,7 @@ def make_signals(
 
 
 def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
-    """A, B, C, D from samples every T of what sensors are exposed to, to what they read: high-pass, then delay.
+    """Discrete A, B, C, D (step T, s) from true values to sensor readings: high-pass filters, then delays.
 
     A high-pass filter is exact for what changes as a straight line between samples.
     """
@@ -215,7 +215,7 @@ class Filter:
 
 
 def merged(given: Iterable[Signal], needed: Iterable[Signal]) -> tuple[Signal, ...]:
-    """The sensors of the scene, and ideal ones for what controllers need besides."""
+    """Join the scene's sensors and the ideal ones that controllers need; the scene's win where names are equal."""
     by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
     return tuple(by_name.values())
 

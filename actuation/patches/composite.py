@@ -246,7 +246,7 @@ class StructureEffect:
 
 
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
-    """The link, or a piece of it, with mass and stiffness of patches, as far as layouts say so; it keeps all modes.
+    """Add mass and stiffness of patches to a link or a piece of it, as the layouts ask; all modes are kept.
 
     Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
     stiffness is that of the `composite` section.

@@ -51,7 +51,7 @@ class Reach:
 
     @property
     def unreached_modes(self) -> Indices:
-        """Numbers (from 0) of the modes that take part in what no voltages can produce."""
+        """Numbers (from 0) of the modes with forces that no voltages can produce."""
         left, sizes, _ = np.linalg.svd(self.Phi_V[: self.served])
         rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
         return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
@@ -125,7 +125,7 @@ OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
 
 @struct
 class ReachedModes:
-    """The modes of a link that moves in some of its families alone, with what it carries."""
+    """Modes of a link that moves in some families of modes only, in coordinates that decouple them."""
 
     rows: Indices  # (m,) numbers (from 0) of the modes of the modal body in these families
     # (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of the

@@ -42,7 +42,7 @@ class Fibres(NamedTuple):
 
 @lru_cache
 def plain_lamina(modulus: float, d31: float, thickness: float) -> Lamina:
-    """A ceramic alike in all directions of its plane, between electrodes `thickness` (m) apart: γ is left to the link.
+    """Lamina of a ceramic isotropic in its plane, its electrodes `thickness` (m) apart; γ is computed from the link.
 
     Its free strain is alike in all directions, too, so that it never shears, at whatever angle it lies.
     """

@@ -93,7 +93,7 @@ def link_sections(body: ModalBody) -> LinkSections:
 
 
 def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
-    """Raise `InputError` where the modal body does not say what patches on faces with that normal need to know."""
+    """Raise `InputError` where the modal body lacks the section data for patches on faces with that normal."""
     if np.isnan(link_sections(body).extent(normal)).any():
         raise InputError(
             f"{key}: expected a modal body file with the width of the link (stations/width), found one of an earlier"

@@ -71,7 +71,7 @@ def beam_stresses(
 
 
 def stress_loads(link: BeamLink, interfaces: Mapping[str, Interface]) -> tuple[str, ...]:
-    """Names of the unit loads of static stresses; none where no point is asked for."""
+    """Names of the unit loads whose static stresses are stored; none without stress points."""
     return tuple(unit_load_names(interfaces)) if link.stress.points else ()
 
 

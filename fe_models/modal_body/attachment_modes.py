@@ -120,7 +120,7 @@ def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> ModeSe
 
 
 def ascending(omega2: Array, family: Integers) -> Integers:
-    """Order (n,) of modes by ω² (n,), equal ones by the number of their family (n,): rounding has no say."""
+    """Order (n,) of modes by ω² (n,), ties by family number (n,), so that round-off cannot decide."""
     order = np.argsort(omega2, kind="stable")
     steps = np.diff(omega2[order]) > ALIKE * omega2[order][1:]
     level = np.concatenate([[0], np.cumsum(steps)])[: len(order)]

@@ -49,7 +49,7 @@ class Product(Protocol):
 
 
 class KrylovSchur:
-    """The search, which goes on from where it is when more modes are asked for.
+    """Search for the lowest eigenpairs; continues from where it stands when more are needed.
 
     Of vectors that several processes share each has its own m `rows`; all take part in everything: `comm` are these
     processes, `total` sums an array over them. F (m, m) is symmetric, of a `rank`; M (m, m) positive definite.

@@ -52,7 +52,7 @@ def lump_weights(mass: float, inertia: Iterable[float]) -> Array:
 
 
 def lumps(records: Iterable[InterfaceRecord], interfaces: Mapping[str, Interface]) -> list[Lump]:
-    """The lumps of a link: every record with mass or inertia, and what the modes do at its interface."""
+    """Collect the lumps of a link: every record with mass or inertia, and the modes at its interface."""
     return [
         Lump(record.name, interfaces[record.name], record.mass, np.array(record.inertia))
         for record in records
@@ -61,7 +61,7 @@ def lumps(records: Iterable[InterfaceRecord], interfaces: Mapping[str, Interface
 
 
 def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invariants:
-    """The integrals (meaning and shapes as in `ModalBody`) of the link together with what is attached to it.
+    """Return the integrals (names and shapes of `ModalBody`) of the link with its lumped masses added.
 
     Raises `InputError` for moments of inertia that no body has, where they outweigh those of the link.
     """

@@ -26,7 +26,7 @@ FARTHEST = 2.0  # times the computed frequency: beyond it the rows are of other 
 
 
 def with_measured(body: ModalBody, link: Link) -> ModalBody:
-    """The modal body with what was measured of `link`; unchanged where nothing was.
+    """Return the modal body with measured values of `link` put in; unchanged where there are none.
 
     Rows of modes that the body does not have are left out. Raises `InputError` where no row is of a mode of the body,
     or a frequency is far from the computed one.

@@ -126,7 +126,7 @@ class SolidModel:
 
 
 class MassMatrix:
-    """M, with what is attached to interfaces: M u + Σ Bᵀ diag(w) B u.
+    """Mass operator M u + Σ Bᵀ diag(w) B u: the mesh, and masses attached to interfaces.
 
     `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
     """

@@ -30,7 +30,7 @@ Reader = Callable[[Array], SectionShapes]
 
 
 def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: Reader, where: str) -> ModeSet:
-    """The modes that `link.modes` asks for; collective.
+    """Compute the modes that `link.modes` selects; collective.
 
     The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
     share of wanted ones so far. Raises `InputError` for more than the mesh has, or than can be found in reasonable

@@ -100,7 +100,7 @@ def _about_machine() -> dict[str, object]:
 
 
 def load() -> float:
-    """Processes that want to run, mean of the last minute: beside the numbers it says how quiet the machine was."""
+    """Number of runnable processes, mean of the last minute; tells how quiet the machine was during timing."""
     return os.getloadavg()[0]
 
 
@@ -156,7 +156,7 @@ class Campaign:
         self.machine = _about_machine()
 
     def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> Swept | None:
-        """Run time against error of a scene, and where its error comes from. Returns the sweep where asked for one."""
+        """Measure work and precision, and the parts of the error, of a scene; returns the sweep where there is one."""
         scene = load_scene(path)
         analysis = find_analysis(scene, analysis_name)
         swept = self.work_precision(scene, analysis.name, folder) if "work-precision" in parts else None

@@ -295,7 +295,7 @@ def measure_points(
     budget: float,
     display: Watcher,
 ) -> list[Point]:
-    """Every integrator at every tolerance, `repeat` times in turn, so that a busy machine harms all of them alike.
+    """Time every integrator at every tolerance, `repeat` times in turn, so that disturbances hit all equally.
 
     What does not complete is kept with its status and tried once. An integrator that took a hundred times as long as
     the best one before it is not asked for tighter tolerances.

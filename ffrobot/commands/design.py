@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def study_options(folder: str, figures: str) -> Callable[[F], F]:
-    """Give a command its scene and the options of all studies: `figures` says what these are."""
+    """Decorator: add the scene argument and the options of all studies; `figures`: help text of that option."""
     return together(
         logging_options,
         python_option,

@@ -21,7 +21,7 @@ POSITIVE = FiniteRange(0.0, min_open=True)
 
 
 def processes_option(text: str) -> Callable[[F], F]:
-    """Give a command `-j`."""
+    """Decorator: add option `-j`, the number of processes."""
     return click.option(
         "-j",
         "--processes",
@@ -33,7 +33,7 @@ def processes_option(text: str) -> Callable[[F], F]:
 
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
-    """Give a command `-j`, `--retry` and `-o`, by default `folder`; `of`: what is in it."""
+    """Decorator: add `-j`, `--retry` and `-o` (default `folder`); `of`: help text on the content of that folder."""
     return together(
         click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} next to the input]."),
         click.option("--retry", is_flag=True, help="Repetition of failed runs."),
@@ -42,7 +42,7 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
 
 
 def options_of(function: Callable[..., object], *names: str) -> Callable[[F], F]:
-    """Give a command parameters of a function as options, with types, defaults and texts (see `design.studies`)."""
+    """Decorator: add a function's parameters as options, with types, defaults and help (see `design.studies`)."""
     parameters = inspect.signature(function).parameters
     args = (inspect.getdoc(function) or "").partition("Args:\n")[2].partition("\n\n")[0]
     entries = dict(re.findall(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", args, re.MULTILINE))

@@ -167,7 +167,7 @@ class Design:
             return tuple(goal.read(results) for goal in goals)
 
     def follow(self, goals: Sequence[Goal], readings: Sequence[Reading]) -> tuple[Followed, ...]:
-        """The goals beside a design with these `readings`; nothing where this one failed."""
+        """Goals computed besides those solved for, from a design's `readings`; empty where the design failed."""
         if not self.completed:
             return ()
         with self.results() as results:
@@ -231,7 +231,7 @@ class Designs:
         return design
 
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
-        """The designs at `points`, failed ones too, with these `changes` beside; none is run twice in one folder.
+        """Solve the designs at `points` with `changes` in addition, failed ones included; none twice in one folder.
 
         Raises `InputError` where the scene or its files are others than at first, `SpentError` where designs would be
         too many.

@@ -40,7 +40,7 @@ from .variables import DesignSpace, Place
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A design at a place: the `readings` of all goals, none where it failed, for which `failure` says why.
+    """Design at one point: `readings` of all goals, or none and the `failure` that tells why.
 
     `again`: changes of scenes beside it with which runs take its steps again; None where they choose their own.
     """
@@ -63,7 +63,7 @@ class Evaluated:
 
 
 class Evaluations:
-    """All designs that a search has asked for. The first that completes gives the objective's size."""
+    """All designs evaluated by a search; the first complete one sets the scale of the objective."""
 
     def __init__(self, designs: Designs, space: DesignSpace, problem: DesignProblem) -> None:
         self.designs, self.space, self.problem = designs, space, problem
@@ -93,7 +93,7 @@ class Evaluations:
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
     ) -> list[tuple[Followed, ...]]:
-        """Goals at places beside `base`, peaks at their time there; nothing where the design failed.
+        """Goals of neighbours of `base`, peaks taken at its peak times; empty where a design failed.
 
         `again`: changes with which runs take the steps of the base.
         """

@@ -37,7 +37,7 @@ class TextTable(NamedTuple):
 
 
 class CsvFile(NamedTuple):
-    """A table of numbers: the file's name, what messages call it, columns, rows."""
+    """Table of numbers for a CSV file: file name, name in messages, columns, rows."""
 
     name: str
     what: str
@@ -128,7 +128,7 @@ def numbers(values: Iterable[float]) -> Numbers:
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:
-    """Python's own numbers; 0 for what is not finite."""
+    """Convert to Python floats; 0 where not finite."""
     return tuple(float(value) if np.isfinite(value) else 0.0 for value in values)
 
 

@@ -286,7 +286,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class DesignProblem:
-    """The objective shall be least (`sense` 1) or largest (−1), within the `limits`; `scale` is its size."""
+    """Optimization problem: minimize (`sense` 1) or maximize (−1) the objective within `limits`; `scale`: its size."""
 
     objective: Goal
     sense: float
@@ -349,7 +349,7 @@ def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequenc
 
 
 def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:
-    """The problem with goals of motors by the variables that are such; within their limits, unless one says others."""
+    """Add the motors' limits as constraints where variables are motor data, unless the user gave other limits."""
     chosen = tuple(variable for variable in space.variables if variable.motors)
 
     def bound(goal: Goal) -> Goal:

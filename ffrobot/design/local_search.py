@@ -37,7 +37,7 @@ GTOL, XTOL = 1e-7, 1e-9  # of trust-constr
 
 
 class ReachedError(Exception):
-    """The gradient says that this is an optimum, or a design keeps the limits where no more is wanted."""
+    """Signals that a search is done: the gradient vanishes, or a feasible design is found and no more is wanted."""
 
 
 class StuckError(Exception):
@@ -219,7 +219,7 @@ BEYOND = "no smaller excess was found near this one: --starts searches from othe
 
 @dataclass(frozen=True)
 class Local:
-    """One search: where it began, the best of its designs, how that stands, and why it ended where not there.
+    """One local search: its start, best design and that one's status, and the reason if it ended early.
 
     `spent`: whether it wanted more runs than there were.
     """

@@ -83,7 +83,7 @@ class Followed:
 
 
 class Goal:
-    """One scalar; `text` is what the user calls it."""
+    """One scalar result to optimize or limit; `text` is the user's name for it."""
 
     text: str
     name: str = ""

@@ -100,7 +100,7 @@ def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Indices:
-    """Sobol indices (g, k) with bootstrap errors: `first`, what a key does alone, and `total`, with all others."""
+    """Sobol indices (g, k) with bootstrap errors: `first` order (a key alone) and `total` (with interactions)."""
 
     first: Array
     first_error: Array
@@ -138,7 +138,7 @@ WIDE = 2.0  # standard deviations of a normal key within which scenes have to ma
 
 @dataclass(frozen=True)
 class Spread:
-    """One key: all values within `half` of `mean` alike, or normal with the standard deviation `deviation`.
+    """Distribution of one key: uniform within `half` of `mean`, or normal with the standard deviation `deviation`.
 
     `text` is what the user wrote, `own` the value of the scene.
     """

@@ -97,7 +97,7 @@ SMALL = 1e-3  # of the range: numbers near 0 take steps of this times the relati
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """All `variables`; `own` is what the scene has at their keys, in order."""
+    """All design `variables`; `own`: the scene's values at their keys, in order."""
 
     variables: tuple[DesignVariable, ...]
     own: Point
@@ -108,7 +108,7 @@ class DesignSpace:
         return tuple(key for variable in self.variables for key in variable.keys)
 
     def point(self, place: Place) -> Point:
-        """The values of all keys; those that the scene has are its very own, not a rounding beside them."""
+        """Values of all keys at a point; exactly the scene's own where they equal them up to round-off."""
         return tuple(value for v, u in zip(self.variables, place, strict=True) for value in v.values(u))
 
     def start(self) -> tuple[float | None, ...]:

@@ -136,7 +136,7 @@ def export_file(
 
 
 def write_content(target: Path, content: Content, *, force: bool) -> None:
-    """Refuse what would cost another file; what is there already, as a command that was ended leaves it, may stay."""
+    """Write all files, refusing to overwrite others; identical ones, left by an interrupted command, may stay."""
     if isinstance(content, str | bytes):
         data = content.encode() if isinstance(content, str) else content
         check_new_file(target, replace=force or holds(target, data))
@@ -200,7 +200,7 @@ LIMITS = ("moment_limit", "speed_limit", "viscous_friction", "coulomb_friction")
 
 
 def print_import(imported: Imported, console: Console) -> None:
-    """A line on the whole, tables of joints and of what meshes say, remarks, files."""
+    """Print a summary line, tables of joints and meshes, remarks, and the files written."""
     robot, scene = imported.robot, imported.scene
     moving = [joint for joint in scene["joint"] if joint["type"] != "weld"]
     mass = sum(body["rigid"]["mass"] for body in scene["body"] if "rigid" in body)
@@ -225,7 +225,7 @@ def print_import(imported: Imported, console: Console) -> None:
 
 
 def print_export(exported: Exported, console: Console) -> None:
-    """Print remarks on what the format does not contain, and the file."""
+    """Print the file written, and remarks on what its format cannot hold."""
     for remark in exported.remarks:
         console.print(f"note       {remark}", soft_wrap=True)
     console.print(f"written    {exported.path}: {exported.what}", soft_wrap=True)

@@ -84,7 +84,7 @@ class LinkTarget:
         return body.family[: body.eigenmode_count], body.frequency[: body.eigenmode_count]
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
-        """The text of the new link file, by where it goes."""
+        """Texts of the new link files, by path."""
         return {_beside(self._path, output): with_values(read_text(self._path, "link file"), dict(changes))}
 
 

@@ -25,7 +25,7 @@ VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 @dataclass(frozen=True, kw_only=True)
 class MovingBody:
-    """A body over T outputs; global axes but where it says so.
+    """Motion of a body at T outputs, in global axes unless stated otherwise.
 
     Attributes:
         name: in the scene.

@@ -124,7 +124,7 @@ def _clustered(points: Array, triangles: Integers, size: Array) -> tuple[Indices
 
 
 def visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array, Integers] | None:
-    """Points (p, 3), m, in the body's axes, and triangles (t, 3); None where nothing is drawn, as `notes` then say."""
+    """Points (p, 3), m, body axes, and triangles (t, 3) of a visual shape; None, with a line in `notes`, if hidden."""
     body = next(entry for entry in results.scene["body"] if entry["name"] == name)
     entries = body.get("rigid", {}).get("visual", ())
     if not entries:

@@ -75,7 +75,7 @@ class Display(Watcher):
             self._progress.stop()
 
     def stage(self, title: str) -> None:
-        """Replace what is shown by `title`, with a pulse until a time is known."""
+        """Show `title` in place of the last stage, with a pulse until a time is known."""
         logger.info("%s", title)
         self._title = title
         if self._progress is None:
@@ -86,7 +86,7 @@ class Display(Watcher):
         self._task = self._progress.add_task(title, total=None)
 
     def stopping(self, number: int) -> None:
-        """Say so at once: evaluating and writing what was computed may take a while."""
+        """Announce at once that the run is stopping, since evaluating and writing may take a while."""
         self.signal = number
         # not by way of Python's streams, which the signal may have found in the middle of something
         os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
@@ -157,7 +157,7 @@ def ready_streams() -> None:
 
 
 def without_output() -> None:
-    """Forget what is still to be printed where it cannot be, so that Python does not try again at its end."""
+    """Discard unprinted output after a broken pipe, so that Python does not retry at exit."""
     try:
         sys.stdout.flush()
     except OSError:

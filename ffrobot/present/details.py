@@ -32,7 +32,7 @@ OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a r
 
 
 def print_details(solution: Solution, results: Results, console: Console) -> None:
-    """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
+    """Print tables of analyses and their findings, wall time per stage, skipped parts, and the results' paths."""
     verdict = results.verdict
     rows = ((one.name, analysis_cells(results, one)) for one in verdict.analyses)
     shown = ((name, {key: text for key, text in cells.items() if key not in OF_FILE}) for name, cells in rows)

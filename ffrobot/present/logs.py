@@ -45,7 +45,7 @@ LOGGER.addHandler(logging.NullHandler())
 
 
 def together(*options: Callable[[F], F]) -> Callable[[F], F]:
-    """Give a command all of these options."""
+    """Decorator: add several options to a command."""
 
     def add(command: F) -> F:
         for option in options:

@@ -80,7 +80,7 @@ UNITS = {"revolute": ("°", 180 / np.pi), "prismatic": (" m", 1.0)}
 
 
 def chosen_posture(results: Results, model: Model) -> str:
-    """Joints and branch at the start of a run, where a point follows a path and nothing says which posture; else ""."""
+    """Describe the start posture (joints, branch) chosen for a path that leaves it open; "" where given."""
     scene = results.scene
     initial = scene.get("initial", {})
     named = any(initial.get(key) for key in ("angles", "joints", "branch"))

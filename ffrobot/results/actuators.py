@@ -130,7 +130,7 @@ def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
 
 
 def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
-    """tracking/ of an analysis: what it made small, and what that takes.
+    """Write tracking/ of an analysis: the errors made small, and the effort for it.
 
     Work (J) and largest power (W) of motors and of patches, what each zero asks for (V), prices of limits.
     """

@@ -69,7 +69,7 @@ def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator
 
 
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:
-    """The largest of all columns, or of one, and when it is, s; by outputs where the file does not know it.
+    """Largest value of all columns, or of one, and its time, s; from the outputs where the file stores no peak.
 
     That is so of a component of a vector, whose length has a peak, and of files without peaks.
     """

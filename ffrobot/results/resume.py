@@ -130,7 +130,7 @@ def write_input_files(file: h5py.File, scene: Scene) -> None:
 
 
 def input_files(scene: Scene) -> dict[str, str]:
-    """SHA-256 of the files that a scene names besides links and modal bodies, by what messages call them."""
+    """SHA-256 of a scene's input files other than links and modal bodies, by their name in messages."""
     tables, folder = tomllib.loads(scene.text), scene.path.parent
     waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}
     calls = {folder / name: f"the waypoints {name}" for name in waypoints}
@@ -220,7 +220,7 @@ def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Kee
 
 
 def write_state(file: h5py.File, solution: Solution) -> None:
-    """Add to a results file, where the run was stopped, what `resume_scene` needs."""
+    """Add the state of an interrupted run to its results file, for `resume_scene`."""
     write_input_files(file, solution.scene)
     is_kept = stopped(solution) is not None or left_out(solution)
     for name, run in solution.outcomes.items() if is_kept else ():

@@ -53,7 +53,7 @@ def solve_and_keep(
 
 
 def check_ended(solution: Solution, watcher: Watcher, again: str, scene_file: Path) -> None:
-    """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end.
+    """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal interrupted it.
 
     `again`: the command that resumes the run; empty without a file. `scene_file`: the scene, as it was named.
     """

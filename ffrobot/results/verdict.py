@@ -27,7 +27,7 @@ def millimeters(value: float, digits: int = 4) -> str:
 
 @struct
 class ToolError:
-    """The largest distance of a point from its path in an analysis, m; None where the analysis does not ask for it.
+    """Largest distance (m) of a point from its path in an analysis; None where no path is given.
 
     Attributes:
         controlled: with joints position-controlled on the computed angles, or in a closed loop; of analyses that

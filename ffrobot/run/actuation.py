@@ -86,7 +86,7 @@ def given_voltages(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator
 
 
 def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:
-    """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it.
+    """Find voltages for the modal forces of a motion, as nearly as patches can, and the requirements on actuators.
 
     Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
     """

@@ -174,7 +174,7 @@ def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> Lo
 
 
 def with_structure(body: LoadedBody, placed: Sequence[PlacedLayout]) -> LoadedBody:
-    """A link, or a piece of one, with the mass and stiffness of patches, as far as layouts say so."""
+    """Add mass and stiffness of patches to a link or a piece of it, as its layouts ask."""
     if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body
     from ..actuation.patches.composite import patched_body, structure_effect_of

@@ -34,7 +34,7 @@ KEPT = 1.0 + 1e-9  # times a limit
 
 @dataclass
 class Search:
-    """Motions that were tried, by their stretch: the largest ratio of what is required to a limit, and of what."""
+    """Tried motions by stretch: the largest ratio of requirement to limit, and the actuator it belongs to."""
 
     scene: Scene
     analysis: TimedAnalysis
@@ -54,7 +54,7 @@ class Search:
 
 
 def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
-    """The scene with its paths stretched by the least factor that keeps all limits, to 0.5 %, and what was found.
+    """Stretch the scene's paths by the least factor (to 0.5 %) that keeps all limits; returned with the findings.
 
     Raises `InputError` where nothing has a limit, no analysis can judge, or the run is too short for any such motion.
     """
@@ -102,7 +102,7 @@ def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: flo
 
 
 def stretched(scene: Scene, stretch: float) -> Scene:
-    """The scene with the paths that are to be fastest slowed down by a factor."""
+    """Slow down the paths that are to be fastest by a factor."""
     paths = [one.changed(stretch=stretch, fastest=False) if one.fastest else one for one in scene.trajectory]
     return scene.model_copy(update={"trajectory": tuple(paths)})
 
@@ -153,7 +153,7 @@ Notes = tuple[str, ...]
 
 
 def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, Notes]:
-    """The scene with shapers for the robot's own frequencies, stretched as far as `fastest` asks for; what was found.
+    """Give the scene shapers for its own frequencies, and paths stretched to be `fastest`; returned with findings.
 
     `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """

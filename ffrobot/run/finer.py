@@ -42,7 +42,7 @@ TIGHTEST = 1e-5  # tolerance: what is looked for is larger
 
 
 def with_finer_check(solution: Solution, prepare: Prepare, watcher: Watcher) -> Solution:
-    """The solution with completed analyses replayed on finer links where the scene asks for that."""
+    """Return the solution with its analyses replayed on links with more modes, where the scene wants that check."""
     wanted = [name for name, run in solution.outcomes.items() if run.analysis.is_checked and run.status == "completed"]
     if not wanted:
         return solution

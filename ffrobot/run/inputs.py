@@ -47,7 +47,7 @@ def python_files(tables: Mapping[str, Any], folder: Path) -> list[Path]:
 
 
 def read_tables(path: Path) -> dict[str, Any]:
-    """The content of a TOML file; empty where it cannot be read, which others tell."""
+    """Read a TOML file; empty where it cannot be read, an error reported elsewhere."""
     try:
         return parse_toml(read_text(path, "file"), path, "file")
     except InputError:
@@ -75,7 +75,7 @@ def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
 
 
 def digest_of_tables(tables: Mapping[str, Any]) -> str:
-    """SHA-256 of the content of a TOML file, whatever the order of its keys."""
+    """SHA-256 of the content of a TOML file, independent of the order of keys."""
     return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
 
 

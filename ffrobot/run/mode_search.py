@@ -65,7 +65,7 @@ class ErrorEstimate:
     ratio: float | None = None
 
     def add(self, reported: Mapping[str, Reported]) -> None:
-        """Take in the next solve, by analysis."""
+        """Add the results of the next solve, by analysis."""
         before, self.differences = self.differences, {}
         if self.last:
             self.differences = {name: difference(of, self.last[name]) for name, of in reported.items()}
@@ -78,7 +78,7 @@ class ErrorEstimate:
         }
 
     def meets(self, tolerances: Mapping[str, float]) -> bool:
-        """Whether all errors are well within the tolerances, by analysis; one difference does not tell."""
+        """Whether all errors, by analysis, are well within tolerance; needs at least two differences."""
         return self.ratio is not None and self._excess(tolerances) <= MARGIN
 
     def is_hopeless(self, tolerances: Mapping[str, float], more: int) -> bool:
@@ -134,7 +134,7 @@ class ModeSearch:
         return self._levels[self._level]
 
     def add(self, reported: Mapping[str, Reported] | None, *, last: bool) -> None:
-        """Take in, by analysis, what a solve with `bodies` found; None where not all of them completed.
+        """Add the results, by analysis, of a solve with `bodies`; None where some of them did not complete.
 
         It is the `last` one in any case where that is said.
         """

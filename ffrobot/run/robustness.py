@@ -46,7 +46,7 @@ class Deviations:
 
 
 def robust(scene: Scene) -> Scene:
-    """The scene with robustness asked of all analyses that can state it."""
+    """Return the scene with robustness turned on for all analyses that support it."""
     changed = [
         one.model_copy(update={"robustness": Robustness()}) if getattr(one, "robustness", one) is None else one
         for one in scene.analysis

@@ -175,7 +175,7 @@ class AnalysisResult:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
+        """Reasons to doubt the results, one text each, most serious first."""
         bent, run = deflection_warning(self.bending), self.run
         texts = [bent] if bent else []
         texts += [*self._doubts, *run.statistics.warnings, *unresolved_gears(gear_motions(run)), *run.details.warnings]

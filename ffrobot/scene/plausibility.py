@@ -205,7 +205,7 @@ def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -
 
 
 def memory() -> float:
-    """Bytes of this machine; infinite where the system does not say."""
+    """Memory of this machine in bytes; infinite where unknown."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):

@@ -27,7 +27,7 @@ Value: TypeAlias = Any
 
 @dataclass(frozen=True)
 class Variation:
-    """A key of the scene, or of a link file (`links.BODY.…`), or several alike, and the values taken.
+    """Varied key of the scene or a link file (`links.BODY.…`), or several varied together, and its values.
 
     Attributes:
         keys: parts of each key, `("links", "link1", "geometry", "section", "height")`.

@@ -80,11 +80,11 @@ class Worker:
         return self._process.poll() is None
 
     def stop(self) -> None:
-        """Ask the run under way to end, or the worker itself."""
+        """Ask the current run to end, or, without one, the worker itself."""
         self._process.terminate()
 
     def close(self) -> None:
-        """End it, with nothing under way."""
+        """End the idle worker."""
         with suppress(BrokenPipeError):
             self._requests.close()
         self._answers.close()
@@ -113,7 +113,7 @@ class Workers:
                     self._idle.append(worker)
 
     def stop(self) -> None:
-        """Ask all runs under way to end."""
+        """Ask all current runs to end."""
         with self._lock:
             for worker in self._busy:
                 worker.stop()
@@ -165,7 +165,7 @@ OF_MODES = {"linear", "joints_locked", "joints_compliant"}
 
 @dataclass(frozen=True)
 class SweepRun:
-    """One combination of values: where its files are, what is collected of its results, and what it is made from."""
+    """One combination of values: the paths of its files, the quantities to collect, and its input."""
 
     number: int
     values: tuple[Any, ...]
@@ -197,7 +197,7 @@ class Row:
 
 
 def perform(run: SweepRun, workers: Workers) -> Row | None:
-    """Solve the scene in the run's folder; None where a signal has asked it to stop.
+    """Solve the scene in the run's folder; None where a signal interrupted it.
 
     Earlier results are replaced in one step: another command in the same folder may be reading them.
     """

@@ -60,7 +60,7 @@ class Sweep:
 
     @property
     def collected(self) -> list[str]:
-        """Columns of the table that `collect` asks for."""
+        """Names of the table's columns with collected quantities."""
         return [" ".join(collected(request)) for request in self.collect]
 
     @property
@@ -152,7 +152,7 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
 
 
 def stale_rows(sweep: Sweep) -> str:
-    """Drop rows of other input than there is now; one line on what has changed, empty where nothing has."""
+    """Drop rows whose input has changed since; returns one line on the changes, empty if none."""
     stale: dict[str, None] = {}
     count = 0
     for run in sweep.runs:
@@ -273,7 +273,7 @@ def _write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
 def print_table(
     path: Path, keys: Sequence[str], rows: Sequence[Row], collected: Sequence[str], console: Console
 ) -> None:
-    """Keys, status and what was asked for, or a few quantities; the file at `path` has the rest."""
+    """Print keys, status and the collected or a few default quantities; the file at `path` has them all."""
     quantities = [name for name in _quantities(rows) if not name.endswith((" steps", " wall_seconds"))]
     shown = quantities[:SHOWN] if not collected else [name for name in quantities if name in collected]
     while len(shown) > 1 and sum(_width(header) + GAP for header in ("run", *keys, "status", *shown)) > console.width:

@@ -123,7 +123,7 @@ class Missing(NamedTuple):
     of_deflections: float
 
     def grown_to(self, worst: Missing) -> Missing:
-        """With the error of deflections of the `worst` link; of points in proportion, at most its error of points."""
+        """Scale to the `worst` link's error of deflections; that of points in proportion, but no more than its own."""
         if not 0.0 < self.of_deflections < worst.of_deflections:
             return self
         in_proportion = self.of_length / self.of_deflections * worst.of_deflections

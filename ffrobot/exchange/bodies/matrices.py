@@ -29,7 +29,7 @@ REMARKS = (
 
 
 def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
-    """The .npz file of a body, its nodes in the order of the remark, and what it does not carry."""
+    """Return the .npz content of a body, nodes in the order stated in its remark, and remarks on what is lost."""
     nodes, numbers = nodes_of(body)
     arrays = reduced_order(integrals_of(body)) | {
         "modeBasis": np.concatenate([at.translation for at in nodes.values()]),

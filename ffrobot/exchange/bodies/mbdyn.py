@@ -48,7 +48,7 @@ REMARKS = (
 
 
 def fem_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
-    """The .fem file of a body, and what to know of it."""
+    """Return the text of a body's MBDyn .fem file, and remarks on what the format cannot hold."""
     integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
     n, S = integrals.n_modes, integrals.S_bar_kl
     x, y, z = np.array([at.position for at in nodes.values()]).T[:, :, None]

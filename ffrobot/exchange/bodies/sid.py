@@ -40,7 +40,7 @@ SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest; rad
 
 
 def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
-    """The SID_FEM file of a body, and what it does not carry."""
+    """Return the text of a body's SID_FEM file, and remarks on what the format cannot hold."""
     integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
     lines = [f"{len(nodes):5d}{integrals.n_modes:5d}    : nodes, modes : {body.name} : {note(body, numbers)}", " part"]
     lines += ["      new modal                        =", "           refmod"]

@@ -90,7 +90,7 @@ COMPILERS = ("cc", "gcc", "clang")
 
 
 def numbers(model: LinearModel) -> str:
-    """The matrices as C, with the scale of the states that balances A (what A is in units of the scale)."""
+    """Return the matrices as C source, and the scale of the states that balances A."""
     _, (scale, _) = matrix_balance(model.A, permute=False, separate=True)
     arrays = {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "SCALE": scale[None, :]}
     return "\n".join(_array(name, values) for name, values in arrays.items())

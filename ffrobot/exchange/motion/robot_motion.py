@@ -52,7 +52,7 @@ class JointMotion:
 
 @dataclass(frozen=True, eq=False)
 class JointMotions:
-    """The joints of an analysis with their coordinates, at `time` (T,) s; `remarks` say what to know of it.
+    """Joints of an analysis with their coordinates at `time` (T,), s; `remarks` on restrictions.
 
     `side`: of compliant gears, whose positions a JointTrajectory has.
     """
@@ -116,7 +116,7 @@ def csv_text(motion: JointMotions) -> str:
 
 
 def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The message, of joints with a motor on the motion's side of compliant gears; and remarks on what it leaves out.
+    """Return a ROS JointTrajectory of the motor side of compliant gears, and remarks on what it leaves out.
 
     Accelerations stay empty, as the message allows: results have none of joints. Where no joint has a motor, all are
     taken, without effort.

@@ -33,7 +33,7 @@ class MergedLinks:
     inertial: Inertial = MASSLESS
 
     def add(self, robot: Robot, link: str, place: Place) -> None:
-        """Take in a link."""
+        """Merge one link into the body."""
         self.members[link] = place
         if (inertial := robot.links[link].inertial) is not None:
             self.inertial = self.inertial + inertial.seen_from(place)

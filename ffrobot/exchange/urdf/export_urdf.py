@@ -80,7 +80,7 @@ def steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array
 def conversion_losses(
     scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree, size: float
 ) -> Iterator[str]:
-    """A line for each; `size` of the robot (m) stands for ranges that URDF wants and the scene does not give."""
+    """List losses, a line each; `size` of the robot (m) replaces ranges that URDF needs and the scene lacks."""
     if flexible := [name for name, body in loaded.items() if body.modal is not None]:
         yield f"{quoted(flexible)}: rigid in the URDF, undeformed"
     if scene.payload:
@@ -126,7 +126,7 @@ def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
 
 
 def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
-    """Text of the URDF, a few words on it, and what it does not carry.
+    """Return the text of the URDF, a summary, and remarks on what it cannot hold.
 
     Raises:
         InputError: the scene is wrong, or planar.

@@ -137,7 +137,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint: the child's frame stands at `origin` in the parent's where the coordinate is zero.
+    """Joint of a URDF; `origin`: pose of the child's frame in the parent's at coordinate zero.
 
     `axis` is in axes of the child. `limits` are those attributes of <limit> that are there (lower, upper, effort,
     velocity), `dynamics` those of <dynamics> (damping, friction).

@@ -31,7 +31,7 @@ ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
 
 
 class SceneOfRobot:
-    """A scene made from a robot: `keys` of the file, and `remarks` on what it does not keep of the URDF."""
+    """Scene made from a URDF: `keys` of the file, and `remarks` on what it could not keep."""
 
     def __init__(
         self, robot: Robot, mechanism: Mechanism, flexible: Mapping[str, FlexibleLink], meshes: Mapping[str, str]

@@ -196,7 +196,7 @@ class SceneAxes:
         self.axes.plot(*seen.T, *style, **options)
 
     def body(self, points: Array, cells: Integers, color: Any, width: float = 1.5) -> None:
-        """Points (p, 3) and cells on them: lines, or a surface, which shows what it covers."""
+        """Draw points (p, 3) and their cells: lines, or an opaque surface."""
         self.drawn.append(seen := projected(points, self.view))
         if cells.shape[1] == 2:
             self._lines(seen[cells], color, width)

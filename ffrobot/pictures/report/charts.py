@@ -24,7 +24,7 @@ from ..projection import COLORS, LIMIT
 
 
 class AnalysisRun(NamedTuple):
-    """One analysis of one results file; `source` tells the file, and is empty where there is only one."""
+    """One analysis of one results file; `source` names the file, empty where there is only one."""
 
     results: Results
     analysis: str
@@ -45,7 +45,7 @@ def sources(files: Sequence[Results]) -> list[str]:
 
 
 def distinct_parts(paths: Sequence[Path]) -> list[str]:
-    """Each path without what all have at start and end: `beam` and `solid` of `c/beam/r.h5` and `c/solid/r.h5`.
+    """Strip the common start and end of all paths: `c/beam/r.h5`, `c/solid/r.h5` give `beam`, `solid`.
 
     The same file twice gets numbers.
     """

@@ -85,7 +85,7 @@ def _bending_table(runs: Sequence[AnalysisRun]) -> Table:
 
 
 def peaks_table(runs: Sequence[AnalysisRun]) -> Table:
-    """The largest absolute value of what a reader asks for first, in every run."""
+    """Table of the largest absolute values of the most read quantities, in every run."""
     rows = [(run.label, what, value, f"{at:.4g}") for run in runs for what, value, at in _peaks(run)]
     return Table(("analysis", "largest", "value", "at (s)"), rows)
 

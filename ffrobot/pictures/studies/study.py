@@ -148,7 +148,7 @@ class Progress(Drawing):
 
 
 class Band(Drawing):
-    """A history with the band that keys which are spread make of it, at `time` (s)."""
+    """History with its band under spread keys, at `time` (s)."""
 
     kind: Literal["band"] = "band"
     y_label: str

@@ -56,7 +56,7 @@ class Grid:
 
 
 def vtkhdf_image(grid: Grid) -> bytes:
-    """The file as bytes; the same grid always gives the same. Numbers of points have 7 digits."""
+    """Serialize a grid as VTKHDF bytes, reproducibly; points are rounded to 7 digits."""
     with in_memory() as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0])
@@ -243,7 +243,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Viewed:
-    """The files written, and notes on what could not be drawn."""
+    """Files written, and notes on what could not be drawn."""
 
     paths: list[Path]
     notes: list[str]
