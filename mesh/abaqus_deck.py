@@ -18,7 +18,7 @@ _OPTIONS = ("COMBINE", "ELSET", "GENERATE", "INPUT", "INSTANCE", "LIBRARY", "NAM
 
 @dataclass
 class Keyword:
-    """`*NAME, OPTION=value, …` in upper case (values as they are), where it stands, and its data lines."""
+    """Keyword line `*NAME, OPTION=value, …`, upper case but for values, with its position and data lines."""
 
     name: str
     options: Mapping[str, str]
@@ -127,7 +127,7 @@ class Sets:
         self.members.setdefault(name.upper(), []).extend(entries)
 
     def read(self, keyword: Keyword, name: str) -> None:
-        """Add what the data lines of *NSET or *ELSET say."""
+        """Add the members that data lines of *NSET or *ELSET list."""
         instance = keyword.options.get("INSTANCE", "").upper()
         if "GENERATE" not in keyword.options:
             self.add(name, ((instance, entry, place) for row, place in keyword.rows() for entry in row if entry))

@@ -37,7 +37,7 @@ _OF_THE_LINK = (
 
 @dataclass
 class Scope:
-    """A part, an instance, or the assembly: what it has by number, and sets.
+    """Content of a part, an instance or the assembly: nodes and elements by number, and sets.
 
     `nodes` are coordinates, `solids` (type, nodes), `surfaces` corners, `others` the type of all that are no solids,
     `masses` the node of each of type MASS.
@@ -62,7 +62,7 @@ class Scope:
         )  # fmt: skip
 
     def read(self, keyword: Keyword) -> bool:
-        """Take in what `keyword` says of a mesh; whether it says any."""
+        """Read the mesh data of a `keyword`; returns whether it has any."""
         readers: dict[str, Callable[[Keyword], None]] = {
             "NODE": self._nodes, "ELEMENT": self._elements, "SYSTEM": self._system, "NSET": self._nset,
             "ELSET": self._elset, "SURFACE": self._surface,

@@ -46,7 +46,7 @@ def check_size(size: float, volume: float, where: str) -> float:
 
 
 def check_count(count: float, found: str, where: str, hint: str = "") -> None:
-    """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `found` says what makes so many."""
+    """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `found` explains the number."""
     if count > MOST_CELLS:
         raise InputError(
             f"{where}: expected a mesh.size that fits the part, found {found}: about {count:.2g} cells,"
@@ -112,9 +112,9 @@ def check_connected(part: PartMesh, where: str) -> None:
 
 
 def check_boundary(part: PartMesh, where: str) -> None:
-    """Raise `InputError` unless what lies just outside the facets that only one cell has is outside the part.
+    """Raise `InputError` where the part lies on both sides of a facet that only one cell has.
 
-    Else elements overlap, or nodes at one place are not one, which is a crack.
+    There elements overlap, or nodes at one place are not joined, which is a crack.
     """
     facets, owner = boundary_facets(part)
     _, normal, area = facet_geometry(part.points, facets)

@@ -56,7 +56,7 @@ else:
 
 
 def assembly() -> str:
-    """Name and versions of what assembles the matrices."""
+    """Name and versions of the library that assembles the matrices."""
     return f"dolfinx {dolfinx.__version__}, UFL {ufl.__version__}"
 
 

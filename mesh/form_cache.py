@@ -38,7 +38,7 @@ _sound: set[str] = set()  # folder and name of the forms that this process has c
 
 @contextmanager
 def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
-    """The folder in which FFCx finds what has been compiled before and compiles the rest; collective on `comm`.
+    """Folder of FFCx for compiled forms, where it reuses or adds them; collective on `comm`.
 
     `compiler` names its version. Where the cache cannot be written, forms are compiled for this process alone.
     """

@@ -14,7 +14,7 @@ Kind = Literal["rectangular", "cylindrical", "spherical"]
 
 @struct
 class Frame:
-    """Axes `C` (3, 3; columns are the axes) at `origin` (3,), both in global axes, and what coordinates mean in them.
+    """Coordinate system with axes `C` (3, 3; columns) at `origin` (3,), both in global axes; `kind`: its coordinates.
 
     Cylindrical ones are r, θ, z; spherical ones r, θ from the z axis, φ about it from the x axis (Nastran); degrees.
     """

@@ -32,7 +32,7 @@ _ATTEMPTS = ((1, 1.0), (1, 0.94), (1, 0.88), (2, 0.5), (4, 0.25))
 
 @contextmanager
 def gmsh_session() -> Iterator[Callable[[], str]]:
-    """An empty gmsh model; reproducible: one thread, no settings files. Returns what libraries have printed so far."""
+    """Context of an empty, reproducible gmsh model (one thread, no settings files); yields a reader of its output."""
     interrupt = signal.getsignal(signal.SIGINT)
     with _stdout_captured() as printed:
         gmsh.initialize([], False)

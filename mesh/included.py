@@ -65,7 +65,7 @@ def text_of(file: Path) -> str:
 
 
 def included(name: str, file: Path, first: Path) -> Path | None:
-    """The file that `file` calls `name`: beside it, or beside the `first` one of the deck; None where it is not.
+    """Resolve a file `name` included by `file`: beside it, or beside the `first` of the deck; None where missing.
 
     Names may have backslashes between folders, as Windows writes them.
     """

@@ -44,7 +44,7 @@ _MOST_GROUPS = 1000
 
 
 def read_mesh(path: Path, where: str) -> RawMesh:
-    """The mesh in `path`, whose ending tells the format; `where` (file and key) begins the messages of `InputError`."""
+    """Read the mesh in `path`, its format given by the ending; `where` (file and key) begins errors' messages."""
     ending = path.suffix.lower()
     try:
         if ending == ".inp":

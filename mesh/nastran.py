@@ -31,7 +31,7 @@ _CONTROL = re.compile(r"\s*CEND\b", re.IGNORECASE)
 
 @dataclass
 class Card:
-    """A card: its `name` in upper case, where it stands, and its fields after the name, over all its lines."""
+    """Bulk data card: `name` in upper case, position, and fields after the name, continuation lines included."""
 
     name: str
     place: str

@@ -41,7 +41,7 @@ _STEP = (".step", ".stp")
 
 
 def kept_or_new(tables: PartTables, progress: Progress, *, remesh: bool) -> PartMesh:
-    """`part_mesh`, or what it made of the same part before, where gmsh would have to make it and not `remesh`."""
+    """Return `part_mesh`, or its cached result where gmsh would mesh the part again and not `remesh`."""
     if not _is_meshed(tables):
         return part_mesh(tables, progress)
     kept = kept_path(tables)
@@ -84,7 +84,7 @@ def _is_meshed(tables: PartTables) -> bool:
 
 
 def is_step(file: Path) -> bool:
-    """Whether the ending says so."""
+    """Whether the file's ending is one of STEP."""
     return file.suffix.lower() in _STEP
 
 

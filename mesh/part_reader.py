@@ -33,7 +33,7 @@ _is_apart = False  # whether this is such a process
 
 
 def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: object) -> Found:
-    """`read(*arguments)` in a process of its own: a function of a module; what it takes and returns can be pickled.
+    """Call `read(*arguments)` in a separate process; a module's function, arguments and result are pickled.
 
     `size` (bytes) is that of the file, by which the time allowed grows. Raises `InputError`, which begins with `where`
     (file and key), where `read` has raised it, or its process has crashed, or has not ended in the processor time

@@ -38,7 +38,7 @@ _COINCIDENT = 1e-6
 
 @struct
 class Surface:
-    """Triangles on the boundary of the whole part, the same on every process, and which points each process knows."""
+    """Boundary triangles of the whole part, equal on all processes, with the points that each process knows."""
 
     points: Array  # (p, 3) in m; the order does not depend on the number of processes
     triangles: Integers  # (t, 3) rows of `points`, counter-clockwise seen from outside
@@ -188,7 +188,7 @@ def solid_mesh(
 
 
 def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> SolidMesh:
-    """The distributed mesh of `part`, which rank 0 gives and all others pass as None."""
+    """Distribute the mesh of `part`, given on rank 0 and None elsewhere, over all processes."""
     known, count, size, keys = comm.bcast(_known_to_all(part) if part is not None else None)
     own = known if part is None else part
     mesh = create_solid_mesh(comm, known.cell, known.degree, own.cells, own.points)

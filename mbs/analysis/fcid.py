@@ -141,7 +141,7 @@ def sampled(shape: Shape, times: Array) -> Array:
 
 
 def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
-    """The expressions of the scene; by way of a spline where the modes were made anew (payloads, patches)."""
+    """Modal motions from the scene's expressions, by body; as splines where payloads or patches changed the modes."""
     given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
     shape: Shape = []
     for body in bodies:

@@ -96,13 +96,13 @@ class Forward(ActuatedAnalysis):
         return run
 
     def needs(self) -> Iterator[Need]:
-        """Patches or points for what is applied by them."""
+        """The patches or points that its forces act through."""
         table = {"joints+pzt": "pzt", "points": "actuation_points"}.get(self.apply or "")
         if self.apply is not None and table is not None:
             yield Need("apply", self.apply, table)
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Whether `source` found what is to be applied."""
+        """Check that `source` computes the forces to apply."""
         if source.applicable and self.apply not in source.applicable:
             more = f': "{source.name}" takes more than the forces on its trajectories'
             why = more if self.apply == "trajectory" else ""

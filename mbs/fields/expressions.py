@@ -47,7 +47,7 @@ _WORDS = [*_NAMES, *_FUNCTIONS, "where"]
 
 
 class ExpressionError(ValueError):
-    """An expression is not in the grammar; the message says where (`position`, from 1) and what to write instead."""
+    """An expression violates the grammar; the message gives the position, from 1, and the remedy."""
 
     def __init__(self, text: str, position: int, problem: str, hint: str = "") -> None:
         start = max(0, position - 40)

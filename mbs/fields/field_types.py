@@ -144,7 +144,7 @@ Kind = Literal["body", "flexible body", "patches", "patched body", "joint", "ela
 
 @dataclass(frozen=True)
 class Reference:
-    """One reference: `key` of the record where it stands, `name` "BODY", "BODY.POINT" or the joint's.
+    """Reference to another table: the `key` that holds it, and its `name` "BODY", "BODY.POINT" or a joint's.
 
     "patches" are a layout of them, a "patched body" has some, an "elastic joint" has stiffness. Forces of the mechanism
     act at a point that is `loaded`.

@@ -158,7 +158,7 @@ def law_within(distance: float, limits: Limits, profile: Profile, smoothness: in
 
 
 def check_durations(durations: Sequence[float], total: float) -> None:
-    """Raise `ValueError` for parts of a motion (s) some of which vanish beside its `total`, s."""
+    """Raise `ValueError` where parts of a motion (s) are negligibly short beside its `total`, s."""
     if not SHORTEST * total < min(durations) <= max(durations) < inf:
         raise ValueError(
             f"expected limits and times that fit each other in size, found a motion of {total:.3g} s with parts of"
@@ -243,7 +243,7 @@ class Legs:
 
 
 def path_of(legs: Legs) -> Piecewise:
-    """The motion; where legs overlap, all of them are slowed down as far as the limits ask for."""
+    """Return the motion; where legs overlap, all are slowed down equally until the limits hold."""
     motion = _joined(legs)
     if not legs.blend or legs.durations is not None:
         return motion

@@ -41,7 +41,7 @@ def _reader(spelling: Any) -> TypeAdapter[Any]:
 
 @dataclass(frozen=True)
 class Spelled:
-    """Marks a field that planar scenes write as `spelling`, and what that is in 3D."""
+    """Annotation of a field that planar scenes write as type `spelling`; `in_3d` converts such values to 3D."""
 
     spelling: Any
     in_3d: Callable[[Any], Any]
@@ -90,7 +90,7 @@ class TaggedInPlane:
 
 
 def as_written(value: Any) -> Any:
-    """A value that 3D scenes may write in the same way."""
+    """Return a value unchanged, for fields that planar and 3D scenes write equally."""
     return value
 
 

@@ -282,7 +282,7 @@ def _accelerations(times: Array, values: Array) -> Array:
 
 
 def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
-    """Times half-way between rows (T, columns), and the rates (T − 1, columns) there."""
+    """Return midpoints (T − 1,) of `times` (T,), s, and the mean rates (T − 1, columns) of `values` there."""
     return (times[1:] + times[:-1]) / 2, np.diff(values, axis=0) / np.diff(times)[:, None]
 
 

@@ -36,7 +36,7 @@ class Boundary(NamedTuple):
 
 
 class Scheme(NamedTuple):
-    """Points c (s,) on [0, 1] and what integrals of the polynomial through values there are: once, twice."""
+    """Collocation points c (s,) on [0, 1], and weights of single and double integrals of the interpolant."""
 
     c: Array
     to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …

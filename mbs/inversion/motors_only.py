@@ -172,7 +172,7 @@ class MotorsOnly(TimedAnalysis):
 
     @property
     def times(self) -> Array:
-        """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
+        """Output times (T,), s: from 0 to `end`, extended by pre- and post-actuation where these are given."""
         return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
 
     def run(self, context: Context) -> Run:
@@ -275,7 +275,7 @@ def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
 
 
 def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
-    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says.
+    """Choose the output to follow the path: the scene's, or the minimum-phase one nearest to the point itself.
 
     `make` gives the output of a factor.
     """

@@ -31,7 +31,7 @@ MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
 
 
 class Stopped(Exception):  # noqa: N818 (nothing is wrong)
-    """Whoever watches asked for an end."""
+    """An observer of the solution asked to stop."""
 
 
 class Target(NamedTuple):

@@ -9,7 +9,7 @@ from .moving_joint import AxialJoint
 
 
 class CylindricalJoint(AxialJoint):
-    """The second side turns about `axis` and slides along it. Coordinates: angle (rad), way (m)."""
+    """Joint that turns about `axis` and slides along it. Coordinates: angle (rad), displacement (m)."""
 
     type: Literal["cylindrical"]
     only_in = SPATIAL

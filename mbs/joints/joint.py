@@ -58,7 +58,7 @@ Angles = tuple[Quantity, Quantity, Quantity]
 
 
 class LoopEquation(NamedTuple):
-    """One of what a joint holds where it closes a loop; axes 0, 1, 2 of the inner triad (`f`) and the outer one (`g`).
+    """One equation of a loop-closing joint, between axes 0, 1, 2 of its inner triad (`f`) and outer triad (`g`).
 
     "point": three components of the way; "slide": the way along f; "dot": f and g are square.
     """
@@ -191,11 +191,11 @@ class JointRecord(Record):
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:
-        """Q (q_count,) from the numbers by which the scene gives its place."""
+        """Coordinates q (q_count,) from the scene's values of the position."""
         return coordinates
 
     def velocity(self, rates: Array) -> Array:
-        """V (freedoms,) from the numbers by which the scene gives its rates."""
+        """Velocities v (freedoms,) from the scene's values of the rates."""
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
@@ -210,7 +210,7 @@ class JointRecord(Record):
 
     @property
     def asks_for_motor(self) -> bool:
-        """Whether the scene says in so many words that it has a motor."""
+        """Whether the scene explicitly gives the joint a motor."""
         return False
 
     @property
@@ -220,12 +220,12 @@ class JointRecord(Record):
 
     @property
     def given_gear_ratio(self) -> float | None:
-        """The ratio of its gear where the scene gives one."""
+        """Gear ratio; None where the scene gives none."""
         return getattr(self, "gear_ratio", None) if "gear_ratio" in self.model_fields_set else None
 
     @property
     def position_limits(self) -> tuple[tuple[float, float], ...]:
-        """Least and largest value of each coordinate; infinite where the scene gives none."""
+        """Least and largest value of each coordinate (rad or m); infinite where not given."""
         return ((-np.inf, np.inf),) * len(self.units)
 
     @property
@@ -235,6 +235,6 @@ class JointRecord(Record):
 
     @property
     def asks_for_coordinate(self) -> tuple[str, ...]:
-        """Keys that ask for its coordinate in the tree; where a loop is cut there is only that of a rotor."""
+        """Keys that require its coordinate in the tree; where it closes a loop only a rotor's exists."""
         keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
         return tuple(key for key in keys if getattr(self, key, None))

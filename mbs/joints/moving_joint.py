@@ -74,7 +74,7 @@ class MovingJoint(JointRecord):
 
     @property
     def asks_for_motor(self) -> bool:
-        """Whether the scene says `motor = true`."""
+        """Whether the scene sets `motor = true`."""
         return bool(self.motor)
 
     @property
@@ -87,7 +87,7 @@ class MovingJoint(JointRecord):
 
     @property
     def position_limits(self) -> tuple[tuple[float, float], ...]:
-        """Least and largest value of each coordinate; infinite where the scene gives none."""
+        """Least and largest value of each coordinate (rad or m); infinite where not given."""
         return self._ranges() or super().position_limits
 
     @property

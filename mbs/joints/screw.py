@@ -28,5 +28,5 @@ class ScrewJoint(AxialJoint):
 
     @property
     def rise(self) -> float:
-        """The way h along the axis, m/rad."""
+        """Displacement per angle h, m/rad."""
         return self.lead / (2 * np.pi)

@@ -27,5 +27,5 @@ class SphericalJoint(JointRecord):
         return quaternions(exponential(coordinates))
 
     def velocity(self, rates: Array) -> Array:
-        """The angular velocity, which the scene gives in the axes of the second side."""
+        """Angular velocity (3,), rad/s, in axes of the second side."""
         return as_floats(self.orientation @ rates)

@@ -28,7 +28,7 @@ FREE = 1e-12  # of the largest stiffness: less lets the robot move
 
 
 class PoseEvaluator:
-    """Judges undeformed postures of one robot: motors keep their coordinates, links and gears give under loads.
+    """Evaluates undeformed postures of a robot with motors locked; links and compliant gears deform under loads.
 
     Attributes:
         motors: names of the coordinates of motors, as `torque` has them.

@@ -75,7 +75,7 @@ class Amplifiers:
 
 
 class Driven(Protocol):
-    """Protocol of what has amplifiers."""
+    """Protocol of objects with patch amplifiers."""
 
     @property
     def amplifiers(self) -> Amplifiers:

@@ -11,7 +11,7 @@ from .._core import ForceSource, TimeFunction
 
 
 class Drive(NamedTuple):
-    """A force of time on what it drives, by direction: generalized (n_v,)."""
+    """Force that is a function of time, and its generalized direction (n_v,)."""
 
     direction: Array
     size: TimeFunction
@@ -35,7 +35,7 @@ class Command(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """Numbers that an earlier analysis found, and what they do in another run."""
+    """Time-dependent inputs found by an earlier analysis, and the generalized forces that each produces."""
 
     source: ForceSource  # of the numbers, at any time
     commands: tuple[Command, ...]  # what a unit of each does; of those at points nothing
@@ -47,7 +47,7 @@ class Replayed(NamedTuple):
 
 
 class Drives(NamedTuple):
-    """All that acts in a run beside the loads of the scene."""
+    """All forces acting in a run in addition to the loads of the scene."""
 
     along: tuple[Drive, ...] = ()
     at_points: tuple[PointDrive, ...] = ()

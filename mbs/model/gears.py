@@ -36,7 +36,7 @@ def elastic_joints(model: Model) -> list[Node]:
 
 
 def with_compliance(model: Model) -> Model:
-    """The robot with compliant gears where the scene says so; motors and moments on joints act before these gears.
+    """Return the robot with the scene's compliant gears; motors and joint moments act on the motor side.
 
     The output of such a gear is a body of the tree without inertia. It turns on the first side of the joint by θ_m, the
     rotor N times as fast (M. W. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).

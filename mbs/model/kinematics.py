@@ -203,7 +203,7 @@ class PostureSearch(NamedTuple):
 
 
 class Kinematics:
-    """The core's model of a tree without loads, with the sections and rows that may be asked for."""
+    """Kinematic model of a tree in the core, without loads, for given sections and constraint rows."""
 
     def __init__(
         self, nodes: Sequence[Node], sections: Sequence[Section] = (), rows: Sequence[ConstraintRow] = ()
@@ -253,7 +253,7 @@ class Kinematics:
     def postures(
         self, q: Array, times: Array, search: PostureSearch, beside: Array | None = None
     ) -> tuple[Array, Array]:
-        """Q (T, n_q) moved onto C = `beside` (T, rows), by default 0, at `times` (T,); what is left of it (T,).
+        """Project q (T, n_q) onto C = `beside` (T, rows), default 0, at `times` (T,); returned with residuals (T,).
 
         By Newton's method with the least steps; what is left is in terms of the sizes, NaN where it is not finite.
         """

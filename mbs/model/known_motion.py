@@ -156,18 +156,18 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
 
 
 def required_forces(model: Model, state: States, times: Array) -> Array:
-    """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
+    """Inverse dynamics M v̇ − Q (T, n_v) along v; Q: gravity, elasticity, friction and the scene's loads."""
     system = MultibodySystem(model)
     return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
 
 
 def row_accelerations(system: MultibodySystem, state: States, times: Array) -> Array:
-    """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
+    """Acceleration error C̈ (T, rows) of constraints and their targets at `times` (T,), s; 0 where they hold."""
     return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
 
 
 def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
-    """M (T, n_v, n_v) at q (T, n_q): what unit accelerations take more than none."""
+    """Mass matrices M (T, n_v, n_v) at q (T, n_q), from required forces of unit accelerations."""
     T, n = len(q), model.tree.n_v
     system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a

@@ -30,7 +30,7 @@ def turns_as_a_body(scene: MechanismKeys, payload: Payload) -> bool:
 
 
 def welded_payloads(scene: MechanismKeys) -> Iterator[tuple[Body, WeldJoint]]:
-    """The payloads on links that turn as bodies, each with what holds it; names that no body of a scene can have."""
+    """Payloads modelled as rigid bodies, each with the weld to its link; their names are none a scene can use."""
     rigid = {body.name for body in scene.body if body.rigid is not None}
     for k, payload in enumerate(scene.payload, 1):
         if turns_as_a_body(scene, payload) and payload.point.partition(".")[0] not in rigid:
@@ -43,7 +43,7 @@ UNCOUPLED = 1e-12  # of the geometric mean of two modes' own terms: what couples
 
 
 def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Array) -> Body:
-    """The body with a mass (kg) whose center is at `center` (3,) m from a section and goes with it, axes of the body.
+    """Add a mass (kg) rigidly attached to a section of the body; `center` (3,), m, in the body's axes.
 
     `inertia` J (3, 3) in kg·m² about that center: ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J.
     """
@@ -62,7 +62,7 @@ def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Ar
 
 
 def with_line_masses(body: Body, points: Sequence[BodyPoint], masses: Array, spins: Array, stiffness: Array) -> Body:
-    """The body with masses (kg) on its axis at sections, and more stiffness (n, n): what lies along a beam.
+    """Add masses (kg) at sections on the body's axis, and stiffness (n, n): strips along a beam, for instance.
 
     They have moments of inertia `spins` (kg·m²) about the axis alone, as a line of mass has: J_s, h_s, S_s.
     """

@@ -99,7 +99,7 @@ class Model:
         return behind.get(row.coordinate, self.tree.nodes[row.b.body].joint.name)
 
     def measures_way(self, row: ConstraintRow) -> bool:
-        """Whether a row measures a way, m; others measure angles, rad, or cosines of these."""
+        """Whether a constraint row is a length, m; others are angles, rad, or their cosines."""
         if row.kind == "coordinate":
             return self.tree.nodes[row.b.body].joint.units == ("m",)
         return row.kind in ("point", "slide")
@@ -109,7 +109,7 @@ class Model:
         return self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]
 
     def sign(self, joint: str) -> float:
-        """−1 where the tree has a joint's coordinates the other way round."""
+        """−1 where the tree traverses the joint from its second side to its first, else 1."""
         return self.driven(joint).sign
 
     def driven(self, joint: str) -> Node:
@@ -142,7 +142,7 @@ def _in_order(node: Node) -> Array:
 
 
 def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
-    """Check that points exist, and lay out tree and rows. Raises `InputError` for what does not exist or fit."""
+    """Lay out tree and constraint rows of a scene. Raises `InputError` for missing points or inconsistent rows."""
     _check_points(scene, {body.name: body for body in bodies})
     carried = list(welded_payloads(scene))
     joints = (*scene.joint, *(weld for _, weld in carried))

@@ -18,7 +18,7 @@ from .system import MultibodySystem
 
 @struct
 class MotorForces:
-    """τ (T, k) by joint, N·m or N, on its second side, and F_p (T, n) by body, what patches would have to supply.
+    """Motor forces τ (T, k) by joint, N·m or N, on its second side, and modal forces F_p (T, n) by body, of patches.
 
     F_p belongs to the modes of the modal body file.
     """
@@ -33,7 +33,7 @@ def driven_system(model: Model) -> MultibodySystem:
 
 
 def driven_mechanism(model: Model, *, has_motors: bool = True) -> _core.SpatialDriven:
-    """The model in the core, under the loads of its scene, with its motors where asked for."""
+    """Build the core's mechanism under the loads of its scene, with its motors unless `has_motors` is false."""
     system = driven_system(model)
     driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
     if has_motors:
@@ -73,7 +73,7 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
-    """−C_sᵀλ_s (T, n_v): what the forces on the paths do along v at q (T, n_q) and `times` (T,), with λ (T, rows)."""
+    """Generalized forces −C_sᵀλ_s (T, n_v) of path constraints at q (T, n_q), `times` (T,), multipliers λ (T, rows)."""
     signs = np.array([row.sign for row in model.rows])
     return driven_mechanism(model).path_forces(as_list(times), q, multipliers * signs)
 

@@ -52,7 +52,7 @@ class Node:
 
     @property
     def sign(self) -> float:
-        """−1 where the tree has the joint's coordinates the other way round."""
+        """−1 where the tree traverses the joint from its second side to its first, else 1."""
         return -1.0 if self.backwards else 1.0
 
     def coordinates(self, q: Array) -> Array:

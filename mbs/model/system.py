@@ -34,7 +34,7 @@ class Derivatives(NamedTuple):
 
 
 class Integrated(NamedTuple):
-    """A mechanism of the core, what acts on it and what its rows follow: those of the model with these numbers."""
+    """Mechanism of the core, its loads and targets, and the numbers of its rows in the model."""
 
     core: _core.PlanarModel | _core.SpatialModel
     scene: _core.TreeScene

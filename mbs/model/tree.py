@@ -54,7 +54,7 @@ class CompliantGear(NamedTuple):
 
 
 class KinematicTree:
-    """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order.
+    """Spanning forest of bodies on their joints; `loops`: the loop-closing joints, in the scene's order.
 
     `tools` are the points "BODY.POINT" with axes of their own, (3, 3) columns in those of the body. `gears` are between
     its joints: none where they are taken for rigid (see `gears.with_compliance`).
@@ -96,7 +96,7 @@ class KinematicTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array = AXES, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """The triad, in the axes of what it is on: "BODY.POINT", the frame of "BODY" or "ground" `at` (m)."""
+        """Triad of "BODY.POINT", of the frame of "BODY", or of "ground" `at` (m), in its body's axes."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")

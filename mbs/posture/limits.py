@@ -65,7 +65,7 @@ def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
 
 
 def left_ranges(model: Model, found: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
-    """A warning for each coordinate that left its position_limit: when it first did, and how far it goes.
+    """Yield a warning for each coordinate outside its position_limit: the first time, and the largest excess.
 
     `found` is what the core has seen of `watched`, None of a motion without the core; the others are looked at in
     outputs at `times` (T,): `q` (T, n_q), `v` (T, n_v).

@@ -224,7 +224,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
 
 
 def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
-    """Warnings on what paths and motors leave open at q.
+    """Yield warnings on freedoms that neither paths nor motors determine at q.
 
     Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, a singular posture, and a
     path that jumps before `end` (s).

@@ -38,7 +38,7 @@ class ModesInMotion(NamedTuple):
 
 
 class Start(NamedTuple):
-    """First state of a run, and what then counts: M (n_v, n_v), C_q (rows, n_v), accelerations (n_v,).
+    """Initial state of a run, with M (n_v, n_v), C_q (rows, n_v) and accelerations (n_v,) there.
 
     K (n_v,), D (n_v, n_v) and `late` (n_v,) of `mode_error`, s², are those of modal coordinates, and 0 of others.
     """

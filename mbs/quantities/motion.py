@@ -69,7 +69,7 @@ def constraint_violation(run: Run) -> Array:
 
 
 def reported_points(run: Run) -> dict[str, tuple[str, ...]]:
-    """Names of the sections of each body, in the scene's order; links stand where their first pieces do."""
+    """Names of the reported sections of each body, in the scene's order; divided links at their first piece."""
     first = {link.names[0]: name for name, link in run.links.items()}
     others = {name for link in run.links.values() for name in link.names[1:]}
     points = {}

@@ -88,7 +88,7 @@ class Sharing:
 
 
 def shared_evenly(run: Run) -> tuple[Run, Sharing | None]:
-    """The motion with the least sum of squares of all joints' forces, and moments over the robot's size; what is open.
+    """Make redundant loop reactions unique by their least sum of squares; moments are divided by the robot's size.
 
     None where nothing is: then the motion is as it was.
     """

@@ -38,7 +38,7 @@ class StiffnessChange(NamedTuple):
 
 
 class LoadedPoint(NamedTuple):
-    """An interface at `position` (3,): what modes do there (6, n), and K (6, n, n) of forces and moments there."""
+    """Interface at `position` (3,), m, with mode shapes (6, n) and stiffness K (6, n, n) by unit load there."""
 
     position: Array
     by_modes: Array

@@ -42,7 +42,7 @@ class SurfaceStress:
 
 @struct
 class BodyStress:
-    """Stresses of one body in one analysis, as far as its modal body file has modal stresses, and what of."""
+    """Stresses of one body in one analysis, at the points and surface for which its file has modal stresses."""
 
     points: Mapping[str, PointStress]
     surface: SurfaceStress | None

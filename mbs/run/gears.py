@@ -130,7 +130,7 @@ def _in_motor_coordinates(compliant: Model, state: States, gears: Mapping[str, G
 
 
 class MotorCoordinates(NamedTuple):
-    """A motion in the coordinates of a robot whose gears give."""
+    """Motion in the coordinates of a robot with compliant gears."""
 
     # q, v, a: (T, n_q), (T, n_v), (T, n_v)
     q: Array
@@ -141,7 +141,7 @@ class MotorCoordinates(NamedTuple):
 
 
 def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
-    """The motion of `run` in the coordinates of `model`: where its gears give, motors as far ahead as they have to be.
+    """Return the motion of `run` in coordinates of `model`, its motors advanced by the twist of compliant gears.
 
     Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle goes with their moments.
     """
@@ -160,7 +160,7 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
 
 
 def with_motors(model: Model, rigid: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:
-    """Q, v, a (T, …) of `model`, whose gears give, from those of a robot with `rigid` gears, and of its motors."""
+    """Q, v, a (T, …) of `model`, which has compliant gears, from those with `rigid` gears and the gears' motions."""
     known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
     more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
     return [np.hstack(pair) for pair in zip(rigid, more, strict=True)]
@@ -173,7 +173,7 @@ SLOWEST = 1e4  # s, of a gear to give way, per second of the analysis: beyond, s
 
 
 class GearSpring(NamedTuple):
-    """k(δ) (N·m), c (N·m·s/rad), and J N² (kg·m²) of the rotor in front of it; `where` messages say it is."""
+    """Compliant gear: spring k(δ) (N·m), damping c (N·m·s/rad), rotor inertia J N² (kg·m²); `where`: its name."""
 
     spring: TwistSpring
     damping: float

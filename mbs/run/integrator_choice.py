@@ -27,7 +27,7 @@ TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few 
 
 
 def integrator_of(model: Model, name: str) -> str:
-    """The method that stands behind a name in scenes, where none takes over from another.
+    """Resolve the name of an integrator in a scene to a method, without switching during the run.
 
     "auto" is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
     links that explicit steps take nanoseconds; else DOP853.

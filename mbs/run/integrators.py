@@ -41,7 +41,7 @@ CHANGED, IN_ALL = " from t = ", "; changed "  # in reasons
 
 
 class Candidate(NamedTuple):
-    """An integrator for a run: what a step of it costs, and how far it is expected to get for that, s per cost."""
+    """Integrator considered for a run: cost of a step, and expected progress, s per cost."""
 
     name: str
     cost: float = 1.0

@@ -93,7 +93,7 @@ class GearMotion:
 
 
 class Details:
-    """Base of what only one kind of analysis finds; itself what a kind has that finds nothing besides."""
+    """Findings of one kind of analysis beyond the motion; this base class for kinds without any."""
 
     # pre_actuation, post_actuation: s for which motors act before and after the path
     pre_actuation: float = 0.0
@@ -202,7 +202,7 @@ class Run:
 
     @property
     def failed(self) -> bool:
-        """Whether the run did not do what it was for; of some kinds an early end is a finding."""
+        """Whether the run missed its purpose; some kinds may end early without failing."""
         return self.status not in ("completed", *self.analysis.findings)
 
     def check_completed(self, how_to_go_on: str = "") -> None:

@@ -40,7 +40,7 @@ Reader = Callable[[Any], Any]
 
 
 def replay_times(source: Run, analysis: TimedAnalysis) -> Array:
-    """Output times (T,), s, of a run under what `source` found: with what it does before t = 0, and after the path."""
+    """Output times (T,), s, of a replay of `source`, with its pre- and post-actuation."""
     after = source.details.post_actuation if analysis.end == source.analysis.last_time else 0.0
     return output_times(analysis.end, analysis.output_step, source.details.pre_actuation, after)
 

@@ -35,7 +35,7 @@ class Surroundings(NamedTuple):
     kinds: Callable[[], Sequence[type["Analysis"]]]
 
     def replayable(self, way: str | None = None) -> str:
-        """The kinds whose findings forward runs can apply, in this `way` or in any: `"pcid" or "fcid"`."""
+        """Kinds that forward runs can replay, for one value of `apply` (`way`) or any, as `"pcid" or "fcid"`."""
         kinds = [kind for kind in self.kinds() if (way in kind.applicable if way else kind.applicable)]
         return either(kind.kind_name() for kind in kinds)
 
@@ -91,12 +91,12 @@ class Analysis(Referring):
 
     @property
     def times(self) -> Array:
-        """Output times (T,), in s: 0 alone unless a kind says otherwise."""
+        """Output times (T,), s; by default 0 alone."""
         return np.zeros(1)
 
     @property
     def last_time(self) -> float:
-        """The time (s) at which the run is over as far as the scene says."""
+        """Time (s) at which the run ends, as far as the scene determines it."""
         return float(self.times[-1])
 
     @property
@@ -106,7 +106,7 @@ class Analysis(Referring):
 
     @property
     def is_checked(self) -> bool:
-        """Whether what it finds is to be replayed on links with more modes."""
+        """Whether its results are to be checked by a replay on links with more modes."""
         return getattr(self, "check", None) is not None
 
     def run(self, context: Any) -> Any:
@@ -205,7 +205,7 @@ class IntegratedAnalysis(TimedAnalysis):
 
 
 class ActuatedAnalysis(IntegratedAnalysis):
-    """A run forward in time, under what the earlier analysis `actuation` found."""
+    """Forward simulation under the inputs found by the earlier analysis `actuation`."""
 
     end: Positive = 0.0
     """End time, s; by default that of `actuation`."""

@@ -21,7 +21,7 @@ class Space:
 
     @property
     def is_plane(self) -> bool:
-        """Whether one angle says how a body stands."""
+        """Whether the space is a plane, where one angle is a body's orientation."""
         return len(self.rotations) == 1
 
     def along(self, vectors: Array) -> Array:

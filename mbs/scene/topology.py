@@ -32,7 +32,7 @@ class Carrier(NamedTuple):
 
 @struct
 class Topology:
-    """The spanning forest of a mechanism, and what is beside it."""
+    """Spanning forest of a mechanism, and the joints that close its loops."""
 
     # of each body the joint on the way to the root of its tree, None of a root; bodies stand in an order in which each
     # comes after its parent, those on the ground first

@@ -176,7 +176,7 @@ class Trajectory(MotionKeys):
 
     @cached_property
     def path(self) -> Piecewise | None:
-        """The motion of the place, or of the joint, where it is made of polynomials; None where expressions give it."""
+        """Polynomial motion of the point or joint; None where expressions give it."""
         if self.via is not None:
             return self.through(self._places[:, :3])
         if self.waypoints is None:

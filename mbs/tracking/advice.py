@@ -103,7 +103,7 @@ def enough_path_time(
 
 
 def check_within_reach(servo: Servo, linear: Linearisation, bounds: Bounds | None, share: float) -> None:
-    """Raise `SolveError` where a zero, or what is sure of a least voltage, is a `share` far beyond the limits.
+    """Raise `SolveError` where a lower bound of the least voltage exceeds the limits by the factor `share`.
 
     What would do follows from how the bound of the zero falls: as e^{−s t}, and as T^−m.
     """

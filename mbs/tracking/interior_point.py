@@ -146,7 +146,7 @@ class _Newton:
 
 
 def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:
-    """The minimum within `gap` of its value, by way of that of a program `near` in changes from its minimum."""
+    """Minimize to within `gap` of the value, starting from the solution `near` of a similar program."""
     way = _CentralPath(program, gap, near)
     halfway = way.slack, way.z, way.unknown
     for _ in range(MOST_ITERATIONS):

@@ -58,7 +58,7 @@ Around = NotNegative | Literal["auto"]
 
 
 class EffortWeights(Record):
-    """Sizes that count alike in the effort that is made small."""
+    """Sizes of moments, voltages and voltage rates that weigh equally in the effort to minimize."""
 
     moment: Positive | None = None
     """Torque, N·m or N, by default half the range of quasi-static torques."""
@@ -99,7 +99,7 @@ class Tracking(TimedAnalysis):
 
     @property
     def times(self) -> Array:
-        """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are numbers."""
+        """Output times (T,), s: from 0 to `end`, extended by pre- and post-actuation where these are numbers."""
         before, after = (0.0 if value == "auto" else value for value in (self.pre_actuation, self.post_actuation))
         return output_times(self.end, self.output_step, before, after)
 
