@@ -112,7 +112,7 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
 
 
 def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
-    """−K x̂ of an observer. Raises `InputError` for gains of another size."""
+    """Make the controller u = −K x̂ on an observer's estimates. Raises `InputError` for gains of wrong size."""
     K = np.zeros((len(setup.inputs), len(setup.outputs)))
     states = [k for k, name in enumerate(setup.outputs) if name.startswith("estimate/state/")]
     gain, size = np.array(record.gain), (len(record.inputs), len(states))

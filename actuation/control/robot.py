@@ -144,7 +144,7 @@ class PatchSignals:
 
 @struct
 class ControlledRobot:
-    """A robot about the motion of an inverse analysis."""
+    """Robot with motors and patches along the motion of an inverse analysis, about which it is linearized."""
 
     model: Model  # its constraint equations are those of loops alone, its gears do not give: see `linear`
     of_links: Mapping[str, LinkPatches]  # patches by link
@@ -182,7 +182,7 @@ class ControlledRobot:
 
     @cached_property
     def links(self) -> Mapping[str, FlexibleLink]:
-        """Flexible ones by name."""
+        """Flexible links of the model, by name."""
         bodies = [node.body for node in self.model.tree.nodes if node.body.n_modes]
         return {body.name: FlexibleLink(body.mass, body.length or 1.0, body.stiffness) for body in bodies}
 

@@ -277,7 +277,7 @@ class PztLayout(Record):
         return Amplifiers(range, each(of.slew), each(of.current), capacitance, each(of.bandwidth), each(of.delay))
 
     def with_one_limit(self, **changes: object) -> Self:
-        """The layout with these changes and the same limits for each patch, in number as may be."""
+        """Return a changed copy with one limit for all patches, whose number may change."""
         limit = min(self.limit) if isinstance(self.limit, tuple) else self.limit
         of_all = {"limit": limit, "amplifier": self.amplifier and self.amplifier.for_any()}
         return self.model_copy(update={**of_all, "allocation": "least-squares", **changes})

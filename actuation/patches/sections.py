@@ -187,7 +187,7 @@ def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
 
 
 def load_per_volt(layout: PztLayout, extent: Array, lever: Array) -> Array:
-    """Moment (k,) c per volt, N·m/V, of a link held straight; the layers' own stiffness takes of it: see `composite`.
+    """Moment (k,) per volt, N·m/V, of patches on a link held straight; see `composite` for the layers' stiffness.
 
     Of bending, E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, twice that on both: the layers' arms,
     t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shabana 2022. Of twist, the shear force per

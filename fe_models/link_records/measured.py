@@ -107,7 +107,7 @@ def _number(where: str, name: str, text: str) -> float | None:
 
 
 def paired(rows: list[MeasuredMode], family: tuple[str, ...]) -> Iterator[tuple[int, MeasuredMode]]:
-    """The rows whose modes are among those of `family` (their families, the lowest first), with their number there."""
+    """Yield the measured modes of `family`, each with its number (from 0) among the computed modes of that family."""
     for row in rows:
         candidates = [k for k, name in enumerate(family) if not row.family or name == row.family]
         if row.number <= len(candidates):

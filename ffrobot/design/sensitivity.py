@@ -158,7 +158,7 @@ def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], .
 
 
 def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
-    """Keys by number with an entry whose error is above `AIM`, and least with the smallest steps, or the largest."""
+    """Numbers of keys with an error above `AIM`, where the least error is that of the smallest (or largest) step."""
     rough, rows = set(), entries(base, samples)
     for g, row in enumerate(rows):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)

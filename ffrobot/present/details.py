@@ -220,7 +220,7 @@ def _placement(name: str, placed: Placed) -> Rows:
 
 
 def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
-    """Meaning of columns of closed loops, damping ratios, zeros, modes out of reach, places of patches: a line each."""
+    """Explain closed loops, a line each: columns, damping ratios, zeros, unreached modes, places of patches."""
     loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
     if loops:
         yield f"closed-loop control: {DEFINITIONS}"

@@ -24,7 +24,7 @@ PROGRAM = "ffrobot"
 
 
 def named_files(data: Any, folder: Path) -> Iterator[Path]:
-    """The files that tables read from a file in `folder` name, and those that link files among them name in turn."""
+    """Collect the files that tables from a file in `folder` name, and those named by link files among them."""
     for key, file in _named(data, folder):
         yield from files_with_included(file)
         if key == "link":  # whose own links, which are none, are not followed: they might lead in a circle

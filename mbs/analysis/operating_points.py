@@ -123,7 +123,7 @@ def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[
 
 
 def linear_states(model: Model, source: Run, rows: Sequence[int]) -> OperatingPoints:
-    """The states of some outputs of a motion, of the robot that follows nothing and whose gears are compliant."""
+    """States at outputs `rows` of an earlier motion, for a robot without trajectories and with compliant gears."""
     model = with_compliance(without_paths(model))
     q, v, a = with_motor_coordinates(source, model)[:3]
     at = list(rows)

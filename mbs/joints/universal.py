@@ -54,7 +54,7 @@ class UniversalJoint(AxialJoint):
         return first, self.orientation.T @ first
 
     def outward_triads(self, backwards: bool) -> tuple[Array, Array]:
-        """Backwards, the axes change places: x is that of the inner side."""
+        """Triads of both sides from root to tip; if `backwards` its axes change places: x is the inner side's."""
         inner, outer = super().outward_triads(backwards)
         return (inner @ EXCHANGED, outer @ EXCHANGED) if backwards else (inner, outer)
 

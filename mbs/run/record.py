@@ -163,7 +163,7 @@ class Run:
 
     @property
     def is_prescribed(self) -> bool:
-        """Whether trajectories hold in it, motors their angles, or all is given with the forces that it takes."""
+        """Whether the run follows trajectories or a given motion, instead of answering to forces alone."""
         return any(row.is_trajectory for row in self.model.rows) or self.required is not None
 
     @property

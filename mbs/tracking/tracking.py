@@ -114,7 +114,7 @@ class Tracking(TimedAnalysis):
         return super().refuse_key(key, others)
 
     def needs(self) -> Iterator[Need]:
-        """Something to follow, and patches."""
+        """The trajectories and patches that the analysis requires."""
         yield Need("kind", self.kind, "trajectory")
         yield Need("kind", self.kind, "pzt")
 

@@ -116,7 +116,7 @@ def _array(name: str, values: Array) -> str:
 
 
 def binary(unit: Unit, files: Mapping[str, str]) -> tuple[str, bytes] | str:
-    """Name within the FMU and content of the library for this platform; why there is none, where there is none.
+    """Compile the FMU's library for this platform: its path within the FMU and content, or the reason for none.
 
     It is compiled by the environment's CC, else by the first of `COMPILERS` on the path.
     """
