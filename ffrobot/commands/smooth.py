@@ -15,13 +15,13 @@ from .options import POSITIVE, protect
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option("--path", "motion", metavar="MOTION", type=FILE, help="Recorded motion [trajectories of the scene].")
 @click.option(
-    "--bandwidth",
-    metavar="HZ|JOINT=HZ",
+    "--servo",
+    metavar="[JOINT=]HZ|FILE|NUM/DEN",
     multiple=True,
-    help="Natural frequency of position controllers; repeatable by joint.  [default: 20]",
+    help="Position controllers: natural frequency, CSV of a measured response, or polynomials.  [default: 20]",
 )
 @click.option(
-    "--damping-ratio", type=POSITIVE, default=0.8, show_default=True, help="Damping ratio of position controllers."
+    "--damping-ratio", type=POSITIVE, default=0.8, show_default=True, help="Damping ratio of controllers given by HZ."
 )
 @click.option(
     "--point", metavar="BODY.POINT", help="Point whose vibration counts.  [default: a tool, or of the last body]"
@@ -45,7 +45,7 @@ from .options import POSITIVE, protect
 def smooth(
     scene_file: Path,
     motion: Path | None,
-    bandwidth: tuple[str, ...],
+    servo: tuple[str, ...],
     damping_ratio: float,
     point: str | None,
     settled: float,
@@ -76,7 +76,7 @@ def smooth(
     maker_of(target)  # its ending is known to be wrong before a robot is simulated
     with Display() as display:
         found = smooth_motion(
-            scene_file, motion, bandwidth=_bandwidth(bandwidth), damping_ratio=damping_ratio, point=point,
+            scene_file, motion, servo=_servo(servo), damping_ratio=damping_ratio, point=point,
             settled=settled, acceleration=acceleration or float("inf"), jerk=jerk or float("inf"),
             degrees=degrees, rate=rate, watcher=display,
         )  # fmt: skip
@@ -92,13 +92,10 @@ def smooth(
     console.print(f"report     {page}", soft_wrap=True)
 
 
-def _bandwidth(texts: tuple[str, ...]) -> float | dict[str, float]:
+def _servo(texts: tuple[str, ...]) -> str | dict[str, str]:
     """Of all joints, or by joint."""
     pairs = [text.rpartition("=") for text in texts] or [("", "", "20")]
-    try:
-        values = {name: float(value) for name, _, value in pairs}
-    except ValueError:
-        values = {}
+    values = {name: value for name, _, value in pairs}
     if len(values) < len(pairs) or ("" in values and len(values) > 1):
-        raise InputError(f"--bandwidth: expected HZ, or JOINT=HZ for each joint, found {', '.join(texts)}")
+        raise InputError(f"--servo: expected one for all joints, or JOINT=… for each, found {', '.join(texts)}")
     return values.get("", values)

@@ -8,7 +8,7 @@ with the linear models of postures along the path; what they find is simulated.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import TypeVar
 
@@ -16,13 +16,13 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.structs import struct
-from ..mbs.fields.paths import Kind, impulses, polynomial_law
+from ..mbs.fields.paths import Kind, Piecewise, impulses, polynomial_law
 from ..mbs.fields.waypoints import interpolated
 from .diagnosis import Diagnosis, modes_along
 from .recording import Limits, evened, peaks
-from .robot import Ride, Robot, accelerations
+from .robot import Modes, Ride, Robot, accelerations
 
-SMOOTHNESS = 5  # of the law that averages: inversion differentiates four times
+SMOOTHNESS = 5  # of the law that averages: inversion differentiates twice what strains gears
 LEAST = 8  # set points over which are averaged at least
 LONGER = 1.2  # of one duration to the next one that is tried
 MOST = 24  # durations
@@ -44,7 +44,7 @@ class Candidate:
         moments: (T, n) torques of motors for feed-forward, of inverted motions; None of others.
         ride: the robot under it.
         off_path: rad or m, of the joints together from the path of the record.
-        excess: largest of speed, acceleration and jerk by their limits; 0 without limits.
+        excess, torque: largest of speed, acceleration and jerk by their limits, and of torques; 0 without limits.
     """
 
     name: str
@@ -54,6 +54,7 @@ class Candidate:
     ride: Ride
     off_path: float
     excess: float
+    torque: float
 
     @property
     def settled(self) -> float:
@@ -74,7 +75,7 @@ def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float) -> 
     """
     search = _Search(robot, before, limits, step)
     found = [search.simulated(*motion) for motion in search.motions()]
-    return sorted(found, key=lambda one: (one.excess > 1.0, one.settled, one.residual))
+    return sorted(found, key=lambda one: (max(one.excess, one.torque) > 1.0, one.settled, one.residual))
 
 
 Motion = tuple[str, Array, Array, Array | None]
@@ -84,10 +85,9 @@ Motion = tuple[str, Array, Array, Array | None]
 class _Search:
     def __init__(self, robot: Robot, before: Diagnosis, limits: Limits, step: float) -> None:
         self.robot, self.limits, self.step, self.tolerance = robot, limits, step, robot.tolerance
-        self.modes, (self.times, self.values) = (
-            modes_along(robot, before.ride),
-            evened(before.recording).dense(step / 2),
-        )
+        self.sag, (self.times, self.values) = before.ride.sag, evened(before.recording).dense(step / 2)
+        self.modes = modes_along(robot, before.ride)
+        self.of_links = modes_along(robot, before.ride, of_links=True) if robot.has_gears else []
         self.periods = [1 / f for f in before.frequencies.mean(axis=0)]
 
     def motions(self) -> Iterator[Motion]:
@@ -107,8 +107,8 @@ class _Search:
             yield self._inverted(kept)
 
     def _inverted(self, averaged: Sequence[tuple[float, Array]]) -> Motion:
-        """Of the shortest that would leave little with a wrong stiffness; of a longer one while limits are exceeded."""
-        least, _ = self._first(averaged, 1 / WRONG)
+        """Of the shortest that leaves little, also with wrong stiffness; of a longer one while limits are exceeded."""
+        least, _ = self._first(averaged, self._left_inverted)
         for motion in [motion for motion in averaged if motion[0] >= least][:TRIALS]:
             inverse = self._inverse(*motion)
             if self._excess(inverse[1]) <= 1.0:
@@ -120,11 +120,9 @@ class _Search:
         smooth = np.vstack([values, values[-1:]])
         times = as_floats(self.step * np.arange(len(smooth)))
         blend = polynomial_law(SMOOTHNESS).sample(times / times[-1])
-        command, _ = self.robot.inverted(times, interpolated(times, smooth))
-        sag = smooth - command
-        command, moments = self.robot.inverted(times, interpolated(times, smooth + sag[0] + blend * (sag[-1] - sag[0])))
-        off = smooth - command  # of second order
-        command = command + off[0] + blend * (off[-1] - off[0])
+        links = smooth + (1 - blend) * self.sag[0] + blend * self.sag[1]
+        command, moments = self.robot.inverted(times, interpolated(times, links))
+        command[[0, -1]] = values[[0, -1]]
         return f"inverted, averaged over {1e3 * span:.3g} ms", command, smooth, moments
 
     def simulated(self, name: str, values: Array, smooth: Array, moments: Array | None) -> Candidate:
@@ -134,7 +132,9 @@ class _Search:
         times = self.step * np.arange(len(values))
         fine = np.linspace(0.0, self.times[-1], 4 * len(self.times))
         off = float(cKDTree(_between(fine, self.times, self.values)).query(smooth)[0].max())
-        return Candidate(name, times, values, moments, self.robot.ride(times, values), off, self._excess(values))
+        ride = self.robot.ride(times, values)
+        torque = float((ride.torque / self.limits.sizes[3]).max())
+        return Candidate(name, times, values, moments, ride, off, self._excess(values), torque)
 
     def _along(self, factor: float) -> Array:
         """Set points of the record, in `factor` times the time."""
@@ -160,25 +160,36 @@ class _Search:
                 shaped = np.tensordot([one.share for one in sequence], before, 1)
             yield f"{kind} for {', '.join(f'{1 / period:.3g} Hz' for period in self.periods[:count])}", shaped
 
-    def _first(self, motions: Sequence[tuple[T, Array]], times: float = 1.0) -> tuple[T, Array]:
-        """The first that the linear models find good enough, `times` the tolerance; else the best of all."""
+    def _first(
+        self, motions: Sequence[tuple[T, Array]], left: Callable[[Array], float] | None = None
+    ) -> tuple[T, Array]:
+        """The first that the linear models find good enough; else the best of all."""
         found = list[float]()
         for motion in motions:
-            found.append(self._left(motion[1]))
-            if found[-1] <= times * SHARE * self.tolerance:
+            found.append((left or self._left)(motion[1]))
+            if found[-1] <= SHARE * self.tolerance:
                 return motion
         return motions[int(np.argmin(found))]
 
     def _left(self, values: Array) -> float:
         """Residual vibration (m, peak to peak) by the linear models of all postures, the worst of them."""
-        path = self.robot.servo.motors(self.step * np.arange(len(values)), values)
-        driving = accelerations(path)
-        return max(float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in self.modes)
+        return _worst(self.modes, self.robot.servo.motors(self.step * np.arange(len(values)), values))
+
+    def _left_inverted(self, values: Array) -> float:
+        """That of gears with another stiffness, and of links, whose joints follow the motion itself."""
+        links = interpolated(self.step * np.arange(len(values)), values)
+        return max(WRONG * self._left(values), _worst(self.of_links, links))
 
     def _excess(self, values: Array, orders: int = 3) -> float:
         """The largest part of a limit that the first so many derivatives take."""
-        shares = peaks(self.step * np.arange(len(values)), values) / self.limits.by_order
+        shares = peaks(self.step * np.arange(len(values)), values) / self.limits.sizes[:3]
         return float(shares[:orders].max())
+
+
+def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
+    """Residual vibration (m, peak to peak) of the worst posture, driven along the path."""
+    driving = accelerations(path)
+    return max(float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in modes)
 
 
 def _between(at: Array, times: Array, values: Array) -> Array:

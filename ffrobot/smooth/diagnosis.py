@@ -83,7 +83,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     left = modes[-1].left(*accelerations(path))
     grid = np.linspace(0.0, ABOUT[1] * (frequencies[:, 0].max() if kept else 10.0), GRID)
     spectrum = _spectrum(path, grid)
-    faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits)]
+    faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits, ride.torque)]
     if kept:
         even = evened(recording)
         of_even = spectrum if even is recording else _spectrum(robot.servo.motors(even.times, even.values), grid)
@@ -95,9 +95,9 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     )  # fmt: skip
 
 
-def modes_along(robot: Robot, ride: Ride) -> list[Modes]:
+def modes_along(robot: Robot, ride: Ride, *, of_links: bool = False) -> list[Modes]:
     """Return modes at postures along the motion, the last one at its end."""
-    return [robot.modes(ride.q[k]) for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
+    return [robot.modes(ride.q[k], of_links=of_links) for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
 
 
 def _spectrum(path: Piecewise, frequencies: Array) -> Array:

@@ -18,7 +18,7 @@ from .diagnosis import Diagnosis
 from .drawn import picture
 from .smoothing import Smoothed
 
-MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit")
+MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit", "torque")
 COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by it alone (mm)")
 
 
@@ -63,16 +63,17 @@ def _tables(found: Smoothed) -> list[Table]:
 
 
 def _lines(found: Smoothed) -> list[tuple[str, str]]:
-    before, servo = found.before, found.robot.servo
-    bandwidth = " ".join(dict.fromkeys(f"{omega / (2 * np.pi):.3g}" for omega in servo.omega))
+    before = found.before
+    words = [axis.words for axis in found.robot.servo.axes]
+    each = [f"{joint}: {of}" for joint, of in zip(found.robot.joints, words, strict=True)]
     return [
         ("motion", f"{len(before.recording.times)} set points of {len(before.recording.joints)} joints over"
          f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
-        ("servo", f"{bandwidth} Hz, damping ratio {servo.ratio:.3g}"),
+        *(("servo", of) for of in (each if len(set(words)) > 1 else words[:1])),
         *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),
         *(("note", remark) for remark in before.recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
-        ("settling", _settling(found)),
+        *([("settling", _settling(found))] if before.frequencies.size else []),
     ]  # fmt: skip
 
 
@@ -87,11 +88,22 @@ def _motions(found: Smoothed) -> Iterator[tuple[str, ...]]:
     before = found.before
     last, settling = float(before.recording.times[-1]), before.ride.settling
     assert settling is not None
-    yield "as it is", f"{last:.4g}", _time(last + settling.time_to), f"{1e3 * before.residual:.3g}", "0", ""
+    yield (
+        "as it is",
+        f"{last:.4g}",
+        _time(last + settling.time_to),
+        f"{1e3 * before.residual:.3g}",
+        "0",
+        "",
+        _part(found.torque),
+    )
     for one in found.candidates:
-        limit = f"{100 * one.excess:.3g} %" if one.excess else ""
-        numbers = (f"{1e3 * one.residual:.3g}", f"{one.off_path:.2g}", limit)
+        numbers = (f"{1e3 * one.residual:.3g}", f"{one.off_path:.2g}", _part(one.excess), _part(one.torque))
         yield one.name, f"{one.times[-1]:.4g}", _time(one.settled), *numbers
+
+
+def _part(of_limit: float) -> str:
+    return f"{100 * of_limit:.3g} %" if of_limit else ""
 
 
 def _time(value: float) -> str:

@@ -197,8 +197,11 @@ def evened(recording: Recording) -> Recording:
     return replace(recording, times=np.arange(len(recording.times)) * recording.step)
 
 
-def faults_of_motion(recording: Recording, limits: Limits) -> Iterator[Fault]:
-    """Jumps, noise, and limits that are exceeded; of rows at even times where these are the smoother ones."""
+def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Iterator[Fault]:
+    """Jumps, noise, and limits that are exceeded; of rows at even times where these are the smoother ones.
+
+    `torque` (n,) is what the motion takes of motors.
+    """
     motion = evened(recording)
     times, values = motion.dense(motion.step / 4)
     for k, name in enumerate(motion.joints):
@@ -206,7 +209,10 @@ def faults_of_motion(recording: Recording, limits: Limits) -> Iterator[Fault]:
         for bound, beyond in zip(limits.positions[k], (values[:, k].min(), values[:, k].max()), strict=True):
             if not limits.positions[k, 0] <= beyond <= limits.positions[k, 1]:
                 yield Fault("limit", f"{name}: position {beyond:.4g} beyond its limit of {bound:.4g}")
-    for word, found, of in zip(("speed", "acceleration", "jerk"), peaks(times, values), limits.by_order, strict=True):
+    of_motion = zip(
+        ("speed", "acceleration", "jerk", "torque"), (*peaks(times, values), torque), limits.sizes, strict=True
+    )
+    for word, found, of in of_motion:
         for name, peak, limit in zip(motion.joints, found, of, strict=True):
             if peak > limit * (1 + KEPT):
                 yield Fault("limit", f"{name}: {word} of up to {peak:.4g}, beyond its limit of {limit:.4g}")
@@ -214,18 +220,17 @@ def faults_of_motion(recording: Recording, limits: Limits) -> Iterator[Fault]:
 
 @struct
 class Limits:
-    """Ranges of positions (n, 2); by_order (3, n) of speed, acceleration and jerk; infinite where there is none."""
+    """Ranges of positions (n, 2); `sizes` (4, n) of speed, acceleration, jerk and torque; infinite without a limit."""
 
     positions: Array
-    by_order: Array
+    sizes: Array
 
 
 def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
     """Return limits of joints with motors; `acceleration` and `jerk` are in rad/s² and rad/s³ (m/s², m/s³)."""
     joints = scene.motor_joints
-    speed = [joint.motor_limits[0].speed for joint in joints]
-    more = np.tile([[acceleration], [jerk]], len(joints))
-    return Limits(np.array([joint.position_limits[0] for joint in joints]), np.vstack([speed, more]))
+    sizes = [(motor.speed, acceleration, jerk, motor.moment) for motor in (joint.motor_limits[0] for joint in joints)]
+    return Limits(np.array([joint.position_limits[0] for joint in joints]), np.transpose(sizes))
 
 
 def peaks(times: Array, values: Array) -> Array:
@@ -272,7 +277,7 @@ def _jumps(name: str, times: Array, values: Array) -> Iterator[Fault]:
 
 def _is_noise(bends: Array) -> bool:
     """Whether most second differences count, and change their sign from row to row."""
-    counts = np.abs(bends) > NOTABLE * np.sqrt(np.mean(bends**2))
+    counts = np.abs(bends) > NOTABLE * np.abs(bends).max()
     pairs = counts[1:] & counts[:-1]
     turns = bends[1:] * bends[:-1] < 0.0
     return bool(pairs.sum() > max(len(bends) / 4, MANY) and (turns & pairs).sum() > TURNS * pairs.sum())

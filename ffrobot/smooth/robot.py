@@ -16,9 +16,10 @@ from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, free_coordinates
 from ..mbs.linear.linearisation import LinearEquations
 from ..mbs.model.gears import with_compliance
 from ..mbs.model.model import without_paths
-from ..mbs.quantities.motion import section_motion
+from ..mbs.quantities.motion import joint_motion, section_motion
 from ..mbs.quantities.settling import Settling, commanded_rest, settling
 from ..mbs.quantities.supply import gear_motions, motor_moments
+from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
 from ..run.prepare import with_scene
@@ -75,12 +76,16 @@ class Ride:
             the first period of the lowest vibration once the controllers have settled. None without a place of rest.
         times, off: (T,) s, and m between the point and its final place.
         q: (T, n_q) states.
+        torque: (n,) largest of each motor, N·m or N.
+        sag: (2, n) by which joints are off their set points at rest, at the start and at the end, rad or m.
     """
 
     settling: Settling | None
     times: Array
     off: Array
     q: Array
+    torque: Array
+    sag: Array
 
 
 class Robot:
@@ -98,15 +103,17 @@ class Robot:
         self.has_gears, self._still = bool(self._gears.tree.gears), np.zeros(self._gears.tree.n_v)
         self._frequency: float | None = None
 
-    def modes(self, q: Array) -> Modes:
-        """Return modes at the posture q (n_q,) of a run; none if nothing vibrates."""
+    def modes(self, q: Array, *, of_links: bool = False) -> Modes:
+        """Return modes at the posture q (n_q,) of a run; `of_links`: motors and joints behind gears move alike."""
         mechanism = self._linear.at(0.0, q, self._still, self._still)
-        free = free_coordinates(mechanism, COMPLIANT if self.has_gears else LOCKED)
+        sides = ("joint", "motor") if of_links else ("motor",)
+        free = free_coordinates(mechanism, LOCKED if of_links or not self.has_gears else COMPLIANT)
         squares, vectors = np.linalg.eigh((free.K + free.K.T) / 2)
         stiff = squares > SLACK * squares.max(initial=0.0)
         omega, shape = np.sqrt(squares[stiff]), vectors[:, stiff]
-        held = [mechanism.outputs.get(f"motor/{joint}", mechanism.outputs[f"joint/{joint}"]) for joint in self.joints]
-        follow = np.linalg.pinv(np.array(held))
+        outputs = mechanism.outputs
+        moved = [outputs.get(f"{side}/{joint}", outputs[f"joint/{joint}"]) for side in sides for joint in self.joints]
+        follow = np.linalg.pinv(np.array(moved)) @ np.tile(np.eye(len(self.joints)), (len(sides), 1))
         slack = shape @ ((shape.T @ free.N.T @ mechanism.K @ follow) / squares[stiff, None])
         driven = -shape.T @ free.N.T @ mechanism.M @ (follow - free.N @ slack)
         J = mechanism.points[self.point][: len(SPACES[self._scene.space].translations)] @ free.N @ shape
@@ -122,31 +129,42 @@ class Robot:
         period = 1 / self._lowest(path)
         until = path.end + period
         found = self._solved(path, "motor", until + min(LAST * period, LONGEST), period / PER_PERIOD)
-        run, rest = found.run, commanded_rest(found.run)
+        run, rest, moments = found.run, commanded_rest(found.run), motor_moments(found.run)
+        torque = np.array([np.abs(moments[joint]).max() if joint in moments else 0.0 for joint in self.joints])
         if rest is None:
-            return Ride(None, run.time, np.full(len(run.time), np.nan), run.q)
+            return Ride(None, run.time, np.full(len(run.time), np.nan), run.q, torque, np.zeros((2, len(torque))))
         rest = rest._replace(since=last)
         whole, soon = (
             settling(one, rest, [self.point], self.tolerance, rest.frequency)[self.point]
             for one in (run, run.at(np.flatnonzero(run.time <= until).tolist()))
         )
-        final = section_motion(replace(run, model=rest.model, q=rest.q[None], v=0 * run.v[:1]), self.point).r[0]
-        off = np.linalg.norm(section_motion(run, self.point).r - final, axis=1)
-        return Ride(replace(whole, residual=soon.residual), run.time, off, run.q)
+        still = replace(run, model=rest.model, q=rest.q[None], v=0 * run.v[:1])
+        off = np.linalg.norm(section_motion(run, self.point).r - section_motion(still, self.point).r[0], axis=1)
+        sag = np.vstack([self._coordinates(run)[:1] - command[0], self._coordinates(still) - command[-1]])
+        return Ride(replace(whole, residual=soon.residual), run.time, off, run.q, torque, sag)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
-        """Set points (T, n) at even `times` from 0 that make links follow `motion`, and the torques (T, n) of motors.
+        """Set points (T', n) every `times[1]` s that make links follow `motion` at `times` (T,), and motors' torques.
 
-        Gears are strained by what the motion needs: motors are ahead by K⁻¹τ, and the controllers are inverted.
+        Gears are strained by what the motion needs: motors are ahead by K⁻¹τ, and the controllers are inverted, which
+        begin before the motion and end after it by `Servo.margins`.
         """
         found = self._solved(motion, "joint", float(times[-1]), float(times[1]))
-        own = np.array([motion.sample(times, order) for order in range(3)])
+        position, rate = motion.sample(times), motion.sample(times, 1)
         for joint, gear in gear_motions(found.run).items():
-            own[:, :, self.joints.index(joint)] = gear.angle, gear.rate, gear.acceleration
+            k = self.joints.index(joint)
+            position[:, k], rate[:, k] = gear.angle, gear.rate
         moments = np.column_stack([motor_moments(found.run)[joint] for joint in self.joints])
-        command = self.servo.command(own)
-        command[[0, -1]] = own[0, [0, -1]]  # at rest, whatever derivatives jump there
+        around = (self.servo.margins(times[1]), (0, 0))
+        position, moments = (np.pad(of, around, "edge") for of in (position, moments))
+        command = self.servo.command(times[1], position, np.pad(rate, around))
+        command[[0, -1]] = position[[0, -1]]  # at rest, whatever derivatives jump there
         return command, moments
+
+    def _coordinates(self, run: Run) -> Array:
+        """(T, n) of joints behind their gears."""
+        found = (joint_motion(run, joint) for joint in self.joints)
+        return np.column_stack([coordinate for coordinate, _ in filter(None, found)])
 
     def _lowest(self, path: Piecewise) -> float:
         """Hz, of the posture in which the robot starts."""

@@ -21,9 +21,10 @@ from ..exchange.motion.robot_motion import (
 from ..run.watcher import Watcher
 from ..scene.load import load_robot
 from ..scene.scene import Scene
+from .axes import axis_of
 from .candidates import Candidate, candidates
 from .diagnosis import Diagnosis, diagnose
-from .recording import limits_of, planned, read_recording
+from .recording import Limits, limits_of, planned, read_recording
 from .robot import Robot
 from .servo import Servo
 
@@ -35,11 +36,14 @@ class Smoothed:
     Attributes:
         robot: what was simulated.
         before: the motion as it is.
-        candidates: motions along the same path, simulated, the best first; none of robots in which nothing vibrates.
+        limits: of joints.
+        candidates: motions along the same path, simulated, the best first; none where the motion is good as it is, or
+            nothing can vibrate.
     """
 
     robot: Robot
     before: Diagnosis
+    limits: Limits
     candidates: tuple[Candidate, ...]
 
     @property
@@ -51,8 +55,13 @@ class Smoothed:
     def best(self) -> Candidate:
         """The motion that settles first. Raises `SolveError` where there is none."""
         if not self.candidates:
-            raise SolveError(f"expected a robot that vibrates, found that {self.verdict}")
+            raise SolveError(f"expected a motion to be improved, found: {self.verdict}")
         return self.candidates[0]
+
+    @property
+    def torque(self) -> float:
+        """The largest torque of the motion as it is, by its limit; 0 without limits."""
+        return float((self.before.ride.torque / self.limits.sizes[3]).max())
 
     def write(self, output: AnyPath, *, force: bool = False) -> None:
         """Write the best motion as a JointTrajectory (`.json`), a table (`.csv`) or a bag of ROS 2 (`.rosbag2`).
@@ -88,7 +97,7 @@ def smooth_motion(
     scene: AnyPath,
     path: AnyPath | None = None,
     *,
-    bandwidth: float | Mapping[str, float] = 20.0,
+    servo: float | str | Mapping[str, float | str] = 20.0,
     damping_ratio: float = 0.8,
     point: str | None = None,
     settled: float = 1e-4,
@@ -103,8 +112,10 @@ def smooth_motion(
     Args:
         scene: a scene file; its analyses are not needed.
         path: CSV, JSON or YAML with a JointTrajectory, or a bag of ROS; None: the trajectories of the scene.
-        bandwidth: natural frequency of position controllers, Hz, of all joints or by joint.
-        damping_ratio: of these controllers, between 0 and 1.
+        servo: position controllers of all joints or by joint: natural frequency in Hz, transfer function as
+            "NUMERATOR / DENOMINATOR" (highest power first, a "/ DELAY" in s may follow), or a CSV table of a measured
+            frequency response: frequency (Hz), magnitude, phase (degrees).
+        damping_ratio: of controllers given by a frequency.
         point: "BODY.POINT" whose vibration counts; None: the tool.
         settled: m, within which of its final place the point has to stay.
         acceleration: limit of all joints, rad/s² or m/s².
@@ -122,7 +133,7 @@ def smooth_motion(
         SolveError: the robot cannot follow it.
 
     Example:
-        found = ffrobot.smooth_motion("scene.toml", "recorded.csv", bandwidth=15.0)
+        found = ffrobot.smooth_motion("scene.toml", "recorded.csv", servo=15.0)
         print(found.verdict)
         found.write("smooth.json")
     """
@@ -131,32 +142,27 @@ def smooth_motion(
         raise InputError(f"{loaded.path}: expected joints with motors, found none")
     if not 10.0 <= rate <= 10_000.0:
         raise InputError(f"rate: expected 10 to 10000 Hz, found {rate:g}")
-    servo = _servo(loaded, bandwidth, damping_ratio)
+    controllers = _servo(loaded, servo, damping_ratio)
     watcher.stage("motion")
     read = planned(loaded, 1 / rate, watcher) if path is None else read_recording(
         Path(path), loaded, is_in_degrees=degrees
     )  # fmt: skip
-    robot = Robot(loaded, servo, point, settled, watcher)
+    robot = Robot(loaded, controllers, point, settled, watcher)
     limits = limits_of(loaded, acceleration, jerk)
     before = diagnose(robot, read, limits)
     has_rest = before.frequencies.size and before.ride.settling is not None
-    return Smoothed(robot, before, tuple(candidates(robot, before, limits, 1 / rate)) if has_rest else ())
+    needed = has_rest and (before.residual > settled or before.faults)
+    return Smoothed(robot, before, limits, tuple(candidates(robot, before, limits, 1 / rate)) if needed else ())
 
 
-def _servo(scene: Scene, bandwidth: float | Mapping[str, float], ratio: float) -> Servo:
+def _servo(scene: Scene, servo: float | str | Mapping[str, float | str], ratio: float) -> Servo:
     """The controllers of all joints with motors."""
     joints = [joint.name for joint in scene.motor_joints]
-    by_joint = bandwidth if isinstance(bandwidth, Mapping) else dict.fromkeys(joints, bandwidth)
+    by_joint = servo if isinstance(servo, Mapping) else dict.fromkeys(joints, servo)
     if by_joint.keys() != set(joints):
         wrong = next(iter(by_joint.keys() ^ set(joints)))
         raise InputError(
-            f'{scene.path}: bandwidth: expected one of all of {quoted(joints)}, found "{wrong}" in only one of both'
+            f'{scene.path}: servo: expected one of all of {quoted(joints)}, found "{wrong}" in only one of both'
             f"{did_you_mean(wrong, joints)}"
         )
-    values = np.array([by_joint[joint] for joint in joints])
-    if not (np.isfinite(values).all() and (values > 0.0).all() and 0.0 < ratio < 1.0):
-        raise InputError(
-            f"bandwidth: expected frequencies above 0 Hz and a damping ratio between 0 and 1, found {values.min():g} Hz"
-            f" and {ratio:g}"
-        )
-    return Servo(2 * np.pi * values, ratio)
+    return Servo(tuple(axis_of(by_joint[joint], ratio) for joint in joints))

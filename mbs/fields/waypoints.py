@@ -309,11 +309,12 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value, found {','.join(header)!r}")
     if len(rows) < 2:
         raise InputError(f"{path}: expected at least 2 waypoints, found {len(rows)}")
-    table = np.array([_numbers(path, line, row, len(header)) for line, row in rows])
+    table = np.array([numbers_of(path, line, row, len(header)) for line, row in rows])
     return header, table, np.array([line for line, _ in rows])
 
 
-def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:
+def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]:
+    """Of a row of `path`. Raises `InputError` where they are not as many, or no numbers."""
     try:
         numbers = [float(cell) for cell in row]
     except ValueError:

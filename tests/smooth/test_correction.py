@@ -1,20 +1,25 @@
 """Motions that leave less vibration: inversion by closed forms, what candidates keep, what is written."""
 
+import re
+
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
-from test_diagnosis import LAWS, RATIO, SERVO, TIMES, WAY, T, arm, axis, motion, table, written
+from scipy.integrate import trapezoid
+from scipy.signal import lsim
+from test_diagnosis import LAWS, OMEGA, RATIO, SERVO, STEP, TIMES, WAY, J, T, arm, axis, motion, table, written
 
-from ffrobot import InputError, smooth_motion
-from ffrobot.mbs.fields.paths import averaged_step
+from ffrobot import InputError, SolveError, smooth_motion
+from ffrobot.mbs.fields.paths import averaged_step, polynomial_law
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_robot
+from ffrobot.smooth.axes import axis_of
 from ffrobot.smooth.robot import Robot
 from ffrobot.smooth.servo import Servo
 
 
 def robot(tmp_path, stiffer=0.0):
-    servo = Servo(2 * np.pi * np.array([SERVO]), RATIO)
+    servo = Servo((axis_of(SERVO, RATIO),))
     return Robot(load_robot(axis(tmp_path, stiffer)), servo, None, 1e-4, Watcher())
 
 
@@ -67,15 +72,15 @@ def test_other_endings_are_rejected(tmp_path, found):
         found.write(tmp_path / "new.txt")
 
 
-def test_a_flexible_link_vibrates_by_the_closed_form_and_inversion_says_that_it_leaves_that(tmp_path):
-    """The first mode of a cantilever, see tests/cases/test_settling.py; gears alone are inverted, links are not."""
+def test_a_flexible_link_vibrates_by_the_closed_form_under_its_motor_or_behind_an_inverted_gear(tmp_path):
+    """The first mode of a cantilever, see tests/cases/test_settling.py; behind the gear its root follows the motion."""
     length, way, beta = 0.6, 0.1, 1.8751040687
     link = beam_link(length, rectangle(0.004, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"})
     joint = {"name": "hub", "type": "revolute", "between": ["ground", "b.root"], "motor": True}
     tables = {"name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "b", "link": link}], "joint": [joint]}
     times = np.arange(501) * 0.001
     path = table(tmp_path / "path.csv", times, hub=way * LAWS["trapezoid"].sample(times)[:, 0])
-    found = smooth_motion(written(tmp_path, tables), path, bandwidth=SERVO, damping_ratio=RATIO)
+    found = smooth_motion(written(tmp_path, tables), path, servo=SERVO, damping_ratio=RATIO)
     omega, servo = (beta / length) ** 2 * np.sqrt(70e9 / 2700 / 12) * 0.004, 2 * np.pi * SERVO
     step = way * np.prod(np.abs(np.sinc(omega * T * np.array([0.75, 0.25]) / (2 * np.pi))))
     gain = abs(servo**2 / (servo**2 - omega**2 + 2j * RATIO * servo * omega))
@@ -85,11 +90,57 @@ def test_a_flexible_link_vibrates_by_the_closed_form_and_inversion_says_that_it_
     assert not any(one.name.startswith("inverted") for one in found.candidates)
 
     joint |= {"stiffness": 100.0, "gear_ratio": 100.0, "rotor_inertia": 1e-4}
-    found = smooth_motion(written(tmp_path, tables), path, bandwidth=SERVO, damping_ratio=RATIO)
+    found = smooth_motion(written(tmp_path, tables), path, servo=SERVO, damping_ratio=RATIO)
     inverted = next(one for one in found.candidates if one.name.startswith("inverted"))
+    span = STEP * np.ceil(float(re.search(r"over (\d+) ms", inverted.name)[1]) / (1e3 * STEP))
+    bell, fine = polynomial_law(5).moved(span), np.linspace(0.0, span, 4001)
+    averaged = abs(trapezoid(bell.sample(fine, 1)[:, 0] * np.exp(-1j * omega * fine), fine))
+    assert inverted.residual == pytest.approx(2 * 4 * length / beta**2 * step * averaged, rel=0.05)
+    assert inverted.residual < 1e-4
+    assert inverted.settled < np.inf
     again = smooth_motion(found.robot.file, table(tmp_path / "new.csv", inverted.times, hub=inverted.command[:, 0]))
     assert again.before.residual == pytest.approx(inverted.residual, rel=1e-3)
-    assert inverted.residual > 1e-3
-    assert inverted.settled == np.inf
-    assert found.best is not inverted
-    assert found.best.residual < 0.1 * found.before.residual
+    assert again.candidates == ()  # nothing to be improved
+    with pytest.raises(SolveError, match="expected a motion to be improved, found: not vibration of the robot"):
+        again.write(tmp_path / "more.csv")
+
+
+def test_torques_are_compared_with_limits_of_motors(tmp_path):
+    """T/θ_cmd = G (I s² + K J s²/(J s² + K)) of one axis; with half of its peak as the limit."""
+    fine, servo, K, inertia = np.linspace(0.0, 1.0, 20_001), 2 * np.pi * 20.0, J * OMEGA**2, 0.1
+    command = WAY * LAWS["nonic"].sample(TIMES)[:, 0]
+    moving = [inertia * J, 0.0, (inertia + J) * K]
+    poles = np.polymul([1.0, 1.6 * servo, servo**2], [J, 0.0, K])
+    _, torque, _ = lsim((servo**2 * np.append(moving, [0.0, 0.0]), poles), np.interp(fine, TIMES, command), fine)
+    peak = np.abs(torque).max()
+    path = table(tmp_path / "path.csv", TIMES, hub=command)
+    found = smooth_motion(axis(tmp_path, moment_limit=0.5 * peak), path, settled=1e-3)
+    assert found.torque == pytest.approx(2.0, rel=1e-3)
+    assert [fault.kind for fault in found.before.faults] == ["limit"]
+    assert f"hub: torque of up to {found.torque * 0.5 * peak:.4g}" in found.before.faults[0].text
+    assert found.best.torque <= 1.0
+    for one in found.candidates:
+        if one.moments is not None:
+            assert one.torque == pytest.approx(np.abs(one.moments).max() / (0.5 * peak), rel=0.02)
+
+
+def test_inversion_is_of_measured_controllers_too(tmp_path):
+    """Four poles, two zeros and a delay, fitted to a table: links follow to what is left of them by the closed form."""
+    s = 2j * np.pi * np.linspace(1.0, 60.0, 60)
+    numerator, denominator = [1.6e-4, 2.5e-3, 1.0], np.polymul([6.3e-5, 1.3e-2, 1.0], [1.2e-4, 3.3e-3, 1.0])
+    G = np.exp(-0.004 * s) * np.polyval(numerator, s) / np.polyval(denominator, s)
+    columns = np.transpose([s.imag / (2 * np.pi), abs(G), np.degrees(np.angle(G))])
+    np.savetxt(tmp_path / "g.csv", columns, delimiter=",", header="frequency,magnitude,phase", comments="")
+    polynomials = " / ".join(" ".join(f"{c:.17g}" for c in of) for of in (numerator, denominator, [0.004]))
+    given, fitted = axis_of(polynomials, RATIO), axis_of(str(tmp_path / "g.csv"), RATIO)
+    np.testing.assert_allclose(fitted.at(s), G, atol=1e-6)
+    assert "4 poles, delay 4 ms" in fitted.words
+    np.testing.assert_allclose(given.at(s), G, rtol=1e-9)
+
+    times, law = np.arange(501) * 0.001, LAWS["nonic"].along(np.array([WAY]))
+    for servo in (fitted, axis_of("-0.004 1 / 1e-6 3e-4 3e-2 1", RATIO)):  # and with a zero to the right
+        model = Robot(load_robot(axis(tmp_path)), Servo((servo,)), None, 1e-4, Watcher())
+        model.ride(times, law.sample(times))
+        command, _ = model.inverted(times, law)
+        ride = model.ride(0.001 * np.arange(len(command)), command)
+        assert ride.settling.residual < 2e-3 * 1e-4 * 19.14325

@@ -11,6 +11,7 @@ from tables_3d import DOWN, ORIGIN, Y, revolute, rigid, scene
 from ffrobot import InputError, smooth_motion
 from ffrobot.mbs.fields.paths import averaged_step, law_in
 from ffrobot.scene.load import load_robot
+from ffrobot.smooth.axes import axis_of
 from ffrobot.smooth.recording import read_recording
 from ffrobot.smooth.servo import Servo
 
@@ -29,9 +30,9 @@ def table(path, times, **columns):
     return path
 
 
-def axis(tmp_path, stiffer=0.0):
+def axis(tmp_path, stiffer=0.0, **more):
     """A body of J behind a gear whose vibration has OMEGA with the right stiffness."""
-    gear = {"stiffness": (1 + stiffer) * J * OMEGA**2, "gear_ratio": 100.0, "rotor_inertia": 1e-5}
+    gear = {"stiffness": (1 + stiffer) * J * OMEGA**2, "gear_ratio": 100.0, "rotor_inertia": 1e-5} | more
     body = rigid("b", 1.0, [J] * 3, ORIGIN, tip=[1.0, 0.0, 0.0])
     return written(tmp_path, scene([body], [revolute("hub", "ground", "b.root", **gear)], gravity=ORIGIN))
 
@@ -52,7 +53,7 @@ def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected):
     """|∫ θ̈ e^(−iωt) dt|/ω, mrad, by an ideal controller, times |G(iω)|; by simulation and by the linear model."""
     times = np.arange(501) * 0.001
     path = table(tmp_path / "path.csv", times, hub=WAY * LAWS[law].sample(times)[:, 0])
-    found = smooth_motion(axis(tmp_path, stiffer), path, bandwidth=SERVO, damping_ratio=RATIO)
+    found = smooth_motion(axis(tmp_path, stiffer), path, servo=SERVO, damping_ratio=RATIO)
     s, servo = 1j * OMEGA * np.sqrt(1 + stiffer), 2 * np.pi * SERVO
     angle = 1e-3 * expected * abs(servo**2 / (s**2 + 2 * RATIO * servo * s + servo**2))
     assert found.before.residual == pytest.approx(2 * np.sin(angle), rel=5e-4)
@@ -64,11 +65,11 @@ def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected):
 
 def test_a_servo_follows_lines_exactly():
     """Step by step the same as the convolution of the command with the controller's own response."""
-    servo, rng = Servo(2 * np.pi * np.array([20.0, 5.0]), RATIO), np.random.default_rng(0)
+    servo, rng = Servo((axis_of(20.0, RATIO), axis_of(5.0, RATIO))), np.random.default_rng(0)
     times = np.append(0.0, np.cumsum(rng.uniform(0.005, 0.05, 30)))
     command = np.cumsum(rng.normal(0.0, 0.1, (31, 2)), axis=0)
     fine = np.linspace(0.0, times[-1], 400_001)
-    for k, omega in enumerate(servo.omega):
+    for k, omega in enumerate(2 * np.pi * np.array([20.0, 5.0])):
         damped = omega * np.sqrt(1 - RATIO**2)
         response = omega**2 / damped * np.exp(-RATIO * omega * fine) * np.sin(damped * fine)
         slope = np.interp(fine, times, command[:, k]) - command[0, k]
@@ -199,8 +200,11 @@ TWO = "0,0,0\n0.1,0.1,0.1\n0.2,0.2,0.2\n0.3,0.3,0.3\n"
         ("t,hip,knee\n0,0,0\n0.1,10,20\n0.2,20,40\n0.3,30,80\n", {}, "found \"hip\" from 0 to 30: --degrees"),
         ("t,hip,knee\n0,1,1\n0.1,1,1\n0.2,1,1\n0.3,1,1\n", {}, "expected joints that move, found none"),
         ("t,hip,knee\n0,0,0\n0,1,1\n0,2,1\n0.3,3,1\n", {}, "4 set points with times that increase, found 2"),
-        ("t,hip,knee\n" + TWO, {"bandwidth": {"hip": 20.0}}, 'expected one of all of "hip", "knee", found "knee"'),
-        ("t,hip,knee\n" + TWO, {"damping_ratio": 1.5}, "damping ratio between 0 and 1, found 20 Hz and 1.5"),
+        ("t,hip,knee\n" + TWO, {"servo": {"hip": 20.0}}, 'expected one of all of "hip", "knee", found "knee"'),
+        ("t,hip,knee\n" + TWO, {"servo": "1 / 1"}, "with at least two poles more than zeros, found \"1 / 1\""),
+        ("t,hip,knee\n" + TWO, {"servo": "1 / 1e-4 -1e-2 1"}, "stable"),
+        ("t,hip,knee\n" + TWO, {"servo": "axis.csv"}, "axis.csv"),
+        ("t,hip,knee\n" + TWO, {"damping_ratio": 0.0}, "a damping ratio above 0, found 20 Hz and 0"),
         ("t,hip,knee\n" + TWO, {"point": "b.tool"}, 'expected one of'),
     ],
 )  # fmt: skip

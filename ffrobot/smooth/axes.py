@@ -1,0 +1,133 @@
+"""Transfer functions of position controllers: of a bandwidth, of polynomials, or fitted to a measured response."""
+
+from __future__ import annotations
+
+import csv
+from functools import partial, reduce
+from pathlib import Path
+
+import numpy as np
+
+from ..common.arrays import Array, ComplexArray
+from ..common.errors import InputError
+from ..common.structs import struct
+from ..common.tables import parse_csv
+from ..common.toml_files import read_text
+from ..mbs.fields.waypoints import numbers_of
+
+APART = 1e-4  # of a pole: nearer ones are moved so far apart, which changes G by 1e-8
+UNITY = 1e-3  # by which G(0) may be off 1
+CLOSE = 0.01  # by which G may be off measured values (RMS) before more poles are tried
+PAIRS, FASTEST = (1, 2, 3), 10.0  # of poles, and how many times the largest measured frequency they may be
+LEAST = 4  # rows of a measured response
+COLUMNS = ["frequency", "magnitude", "phase"]
+
+
+@struct
+class Axis:
+    """G(s) = e^(−delay·s) numerator/denominator, coefficients of the highest power first and the last of both 1.
+
+    `words` say what it is.
+    """
+
+    numerator: Array
+    denominator: Array
+    delay: float = 0.0
+    words: str = ""
+
+    @property
+    def poles(self) -> ComplexArray:
+        """1/s, none of them double."""
+        roots = np.roots(self.denominator)
+        is_real = np.abs(roots.imag) < APART * np.abs(roots)
+        real, upper = np.sort(roots[is_real].real), np.sort_complex(roots[~is_real & (roots.imag > 0.0)])
+        for of in (real, upper):
+            for k in np.flatnonzero(np.abs(np.diff(of)) < APART * np.abs(of[1:])):
+                of[k : k + 2] *= [1 + APART, 1 - APART]
+        return np.concatenate([real, upper, upper.conj()])
+
+    def at(self, s: ComplexArray) -> ComplexArray:
+        """G at s, 1/s."""
+        return np.asarray(np.exp(-self.delay * s) * np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
+
+
+def axis_of(servo: float | str, ratio: float) -> Axis:
+    """ω²/(s² + 2ζω s + ω²) of a natural frequency (Hz) and damping ratio, "NUMERATOR / DENOMINATOR", or a CSV table.
+
+    Behind the denominator, whose numbers have blanks between them, "/ DELAY" (s) may follow. The table has measured
+    values: frequency (Hz), magnitude, phase (degrees).
+
+    Raises `InputError` for an axis that is not stable, does not come to its command, or follows jumps of its rate.
+    """
+    try:
+        parts = [np.array([float(word) for word in part.split()]) for part in str(servo).split("/")]
+    except ValueError:
+        return _measured(Path(str(servo)))
+    if len(parts) == 1 and parts[0].size == 1:
+        (omega,) = 2 * np.pi * parts[0]
+        if not (0.0 < omega < np.inf and 0.0 < ratio < np.inf):
+            found = f"{omega / 2 / np.pi:g} Hz and {ratio:g}"
+            raise InputError(f"servo: expected a frequency above 0 Hz and a damping ratio above 0, found {found}")
+        words = f"{parts[0][0]:.3g} Hz, damping ratio {ratio:.3g}"
+        return Axis(np.ones(1), np.array([omega**-2, 2 * ratio / omega, 1.0]), words=words)
+    numerator, denominator, delay = (
+        (*parts, np.zeros(1), np.zeros(0))[:3] if len(parts) in (2, 3) else [np.zeros(0)] * 3
+    )
+    numerator, denominator = np.trim_zeros(numerator, "f"), np.trim_zeros(denominator, "f")
+    is_axis = numerator.size and len(denominator) >= len(numerator) + 2 and delay.size == 1 and 0.0 <= delay[0] < np.inf
+    if not (is_axis and np.isfinite([*numerator, *denominator]).all() and np.roots(denominator).real.max() < 0.0
+            and abs(numerator[-1] - denominator[-1]) <= UNITY * abs(denominator[-1])):  # fmt: skip
+        raise InputError(
+            'servo: expected "NUMERATOR / DENOMINATOR" or "… / … / DELAY", stable, equal to 1 at s = 0, with at least'
+            f' two poles more than zeros, found "{servo}"'
+        )
+    return Axis(numerator / numerator[-1], denominator / denominator[-1], float(delay[0]), str(servo))
+
+
+def _measured(path: Path) -> Axis:
+    """Fitted to a CSV table. Raises `InputError` naming file and line."""
+    try:
+        header, rows = parse_csv(read_text(path, "table of a frequency response"))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot read the table of a frequency response: {error}") from None
+    if header != COLUMNS or len(rows) < LEAST:
+        expected = f"columns {','.join(COLUMNS)} and at least {LEAST} rows"
+        raise InputError(f"{path}: expected {expected}, found {','.join(header)!r} and {len(rows)}")
+    frequency, magnitude, phase = np.transpose([numbers_of(path, line, row, 3) for line, row in rows])
+    if min(frequency.min(), magnitude.min()) <= 0.0:
+        raise InputError(f"{path}: expected frequencies and magnitudes above 0, found others")
+    return fitted(frequency, magnitude * np.exp(1j * np.radians(phase)))
+
+
+def fitted(frequency: Array, response: ComplexArray) -> Axis:
+    """The axis with the fewest poles that is near a response (F,) at frequencies (F,), Hz; else the nearest of all.
+
+    Least squares of G with pairs of poles ω²/(s² + 2ζω s + ω²), two zeros less, and a delay.
+    """
+    from scipy.optimize import least_squares
+
+    s = 2j * np.pi * frequency
+    unit = float(abs(s[int((np.abs(response) < np.sqrt(0.5)).argmax()) or -1]))  # rad/s, where it falls by 3 dB
+
+    def axis(x: Array, pairs: int, words: str = "") -> Axis:
+        omega, ratio = unit * np.exp(x[:pairs]), np.exp(x[pairs : 2 * pairs])
+        sections = np.column_stack([omega**-2, 2 * ratio / omega, np.ones(pairs)])
+        numerator = np.append(x[2 * pairs : -1] / unit ** np.arange(2 * pairs - 2, 0, -1), 1.0)
+        return Axis(numerator, reduce(np.polymul, sections), float(x[-1]) / unit, words)
+
+    def off(x: Array, pairs: int) -> Array:
+        return (axis(x, pairs).at(s) - response).view(float)
+
+    found = list[tuple[float, Axis]]()
+    for pairs in PAIRS:
+        start = np.concatenate([np.log(1.5) * np.arange(pairs), np.full(pairs, np.log(0.7)), np.zeros(2 * pairs - 1)])
+        start[-1] = 0.01
+        low, high = np.full((2, len(start)), np.inf) * [[-1.0], [1.0]]
+        low[-1], high[:pairs] = 0.0, np.log(FASTEST * np.abs(s).max() / unit)
+        fit = least_squares(partial(off, pairs=pairs), start, bounds=(low, high), x_scale="jac")
+        error = float(np.sqrt(2 * fit.cost / len(s)))
+        words = f"measured: {2 * pairs} poles, delay {1e3 * fit.x[-1] / unit:.3g} ms, off by {100 * error:.2g} % (RMS)"
+        found.append((error, axis(fit.x, pairs, words)))
+        if error < CLOSE:
+            break
+    return min(found, key=lambda one: one[0])[1]
