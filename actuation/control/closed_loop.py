@@ -48,7 +48,7 @@ from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
 from .records import SampledAnalysis
 from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input_names, needed_sensors
-from .signals import Filter, Sensing, Signal, filters, make_signals, merged
+from .signals import Filter, Sensing, Signal, filters, make_signals, merged, readings_at
 
 APART = 1e-6  # of a run, between two times of a spline
 
@@ -140,7 +140,7 @@ class ClosedLoop(SampledAnalysis):
         closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
         quiet = max((last_change(partial(_values, of, self), outputs) for of in _exciting(plant, self)), default=0.0)
         runs = _followed(run, place_at, held, tip, quiet), _followed(closer, place_at, held, tip, quiet)
-        readings = loop.readings if observed is None else observed.seen
+        readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
         loops = loops_about(setup, begun, readings[: loop.taken], models, filters(read, self.sample_time))
         record = loop_record(self, setup, loop, acting, runs, loops, lowest, gears=bool(plant.tree.gears))
         if observed is not None:
@@ -177,13 +177,11 @@ def loop_models(
     None where it is singular, or has none yet.
     """
     rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
-    names, sensing = [signal.name for signal in read], Sensing(model, read)
     with suppress(SolveError, InputError):
         linearisation, found = LinearEquations(model, reference.q[0]), []
         for k in rows:
             at = linearisation.at(float(time[k]), reference.q[k], rest, rest)
-            readings = dict(zip(names, zip(*sensing.rows(at), strict=True), strict=True))
-            found.append(state_space(at, voltages_at(model, at, patches), readings))
+            found.append(state_space(at, voltages_at(model, at, patches), readings_at(model, at, read)))
         return tuple(found)
     return ()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, groupby
 from typing import Literal
@@ -10,7 +10,7 @@ from typing import Literal
 from ...common.arrays import Array
 from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, find_operating_points, places_of
-from ...mbs.fields.field_types import PointReference
+from ...mbs.fields.field_types import PointReference, Reference, under
 from ...mbs.linear.joint_conditions import JointCondition, RobotModes, joint_conditions
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism
 from ...mbs.model.model import Model, modal_directions
@@ -28,6 +28,8 @@ from .linear_model import (
     zeros,
 )
 from .margins import Suggestion, unhurried_gains
+from .records import Sensor
+from .signals import make_signals, readings_at
 
 MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some seconds
 
@@ -84,7 +86,7 @@ def _analyse(models: tuple[LinearModel, ...]) -> LinearModels:
 def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
     """(inputs …, outputs …), as many of each; where all would take minutes, without those to other outputs."""
     motors = [name for name in model.input_names if name.startswith("joint/")]
-    places = [name for name in model.output_names if name.startswith("point/")]
+    places = [name for name in model.output_names if name.startswith("point/") and name.count("/") == 2]  # no sensors
     own = [(motor, motor) for motor in motors]
     single = [(motor, output) for motor in motors for output in (motor, *places)]
     single = next((pairs for pairs in (single, own) if len(pairs) * model.freedom**3 <= MOST_WORK), [])
@@ -98,15 +100,23 @@ def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
 class Linear(InstantAnalysis):
     """The robot as x' = A x + B u, y = C x + D u: `about` the static equilibrium, or an earlier analysis at `times`.
 
-    `points` are outputs and disturbance inputs of the model.
+    `points` are outputs and disturbance inputs of the model, readings of `sensor` outputs.
     """
 
     kind: Literal["linear"]
     points: tuple[PointReference, ...] | None = None
     """Points whose motion is an output and at which disturbances act; by default those of trajectories, or all tips."""
+    sensor: tuple[Sensor, ...] = ()
+    """Sensors whose readings are outputs, too: exact and continuous, without noise, filters, delay and limits."""
 
     needs_actuators = True
     refers_to = (("points", "body"),)
+
+    def references(self) -> Iterator[Reference]:
+        """What is measured, too."""
+        yield from super().references()
+        for k, sensor in enumerate(self.sensor, 1):
+            yield from under(f"sensor no. {k}", sensor.references())
 
     def run(self, context: ActuatedContext) -> Run:
         """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""
@@ -121,7 +131,10 @@ def make_linear_models(context: ActuatedContext, analysis: Linear, about: Operat
     mechanisms = [
         linearization.at(float(t), q, v, a) for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True)
     ]
-    models = [state_space(one, voltages_at(free, one, context.patches)) for one in mechanisms]
+    signals = [signal for sensor in analysis.sensor for signal in make_signals(free, context, sensor, context.whole)]
+    models = [
+        state_space(one, voltages_at(free, one, context.patches), readings_at(free, one, signals)) for one in mechanisms
+    ]
     return replace(_analyse(tuple(models)), conditions=tuple(map(joint_conditions, mechanisms)))
 
 

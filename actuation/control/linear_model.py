@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -28,17 +28,11 @@ SHOWN = 4  # names in the line that a model prints
 
 
 @struct
-class LinearModel:
-    """Linear model about a configuration or one instant of a motion: states x = (δs, δṡ), f coordinates s.
+class StateSpace:
+    """x' = A x + B u, or x(k+1) = A x + B u every `step` s; y = C x + D u, with names of states, inputs and outputs.
 
     Attributes:
-        A, B, C, D: (2f, 2f), (2f, inputs), (outputs, 2f), (outputs, inputs); D of accelerations alone is not 0.
-        state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
-        input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
-        output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k".
-        time: s.
-        mass: (f, f) mass matrix of s: the metric that compares coordinates of different kinds.
-        transformation: (coordinates, f) ∂q/∂s, which takes mode shapes to the robot.
+        A, B, C, D: (n, n), (n, inputs), (outputs, n), (outputs, inputs).
     """
 
     A: Array
@@ -48,6 +42,78 @@ class LinearModel:
     state_names: tuple[str, ...]
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
+
+    @property
+    def step(self) -> float:
+        """Between samples, s; 0 of continuous time."""
+        return 0.0
+
+    def inputs(self, names: Names) -> list[int]:
+        """Indices of inputs (columns of B) by name. Raises `InputError` for unknown ones."""
+        return _numbers("input", names, self.input_names)
+
+    def outputs(self, names: Names) -> list[int]:
+        """Indices of outputs (rows of C) by name. Raises `InputError` for unknown ones."""
+        return _numbers("output", names, self.output_names)
+
+    def arrays(self) -> dict[str, Any]:
+        """Arrays and names of the model, as files contain them."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    def save(self, path: Path) -> None:
+        """Write the model to a .npz or .mat file. Raises `InputError` for another suffix."""
+        save_arrays(self.arrays(), path)
+
+    def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> control.StateSpace:
+        """State-space model of python-control (extra "control"), with ":" instead of "." in names.
+
+        Of samples it has their `step` as dt.
+
+        From `inputs` to `outputs` by their names here, in that order; all where they are not given. Raises `InputError`
+        for unknown ones.
+        """
+        with extras():
+            import control
+
+        columns = self.inputs(self.input_names if inputs is None else inputs)
+        rows = self.outputs(self.output_names if outputs is None else outputs)
+        names = {
+            "states": self.state_names,
+            "inputs": [self.input_names[k] for k in columns],
+            "outputs": [self.output_names[k] for k in rows],
+        }
+        allowed = {kind: [name.replace(".", ":") for name in given] for kind, given in names.items()}
+        matrices = self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)]
+        return control.ss(*matrices, self.step, **allowed)
+
+
+@struct
+class SampledController(StateSpace):
+    """Controllers of a loop, with observer and filters of sensors: from readings to commands, off the reference."""
+
+    sample_time: float  # s
+
+    @property
+    def step(self) -> float:
+        """Between samples, s."""
+        return self.sample_time
+
+
+@struct
+class LinearModel(StateSpace):
+    """Linear model about a configuration or one instant of a motion: states x = (δs, δṡ), f coordinates s.
+
+    D of accelerations alone is not 0.
+
+    Attributes:
+        state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
+        input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
+        output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k"; of sensors as of `Signal`.
+        time: s.
+        mass: (f, f) mass matrix of s: the metric that compares coordinates of different kinds.
+        transformation: (coordinates, f) ∂q/∂s, which takes mode shapes to the robot.
+    """
+
     time: float
     mass: Array
     transformation: Array
@@ -74,47 +140,15 @@ class LinearModel:
         inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
         return -1.0 * A_K, -1.0 * A_D, inputs, outputs
 
-    def inputs(self, names: Names) -> list[int]:
-        """Indices of inputs (columns of B) by name. Raises `InputError` for unknown ones."""
-        return _numbers("input", names, self.input_names)
-
-    def outputs(self, names: Names) -> list[int]:
-        """Indices of outputs (rows of C) by name. Raises `InputError` for unknown ones."""
-        return _numbers("output", names, self.output_names)
-
     def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:
         """Frequency response G(iω) (len(omega), outputs, inputs) at ω, rad/s."""
-        K, D, B, C = self.second_order
-        s = 1j * np.asarray(omega)[:, None, None]
-        X = np.linalg.solve(s**2 * np.eye(self.freedom) + s * D + K, B[None, :, self.inputs(inputs)])
-        return np.asarray(C[self.outputs(outputs)] @ X, dtype=complex)
-
-    def arrays(self) -> dict[str, Any]:
-        """Arrays and names of the model, as files contain them."""
-        return {name: getattr(self, name) for name in type(self).__annotations__}
-
-    def save(self, path: Path) -> None:
-        """Write the model to a .npz or .mat file. Raises `InputError` for another suffix."""
-        save_arrays(self.arrays(), path)
-
-    def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> control.StateSpace:
-        """State-space model of python-control (extra "control"), with ":" instead of "." in names.
-
-        From `inputs` to `outputs` by their names here, in that order; all where they are not given. Raises `InputError`
-        for unknown ones.
-        """
-        with extras():
-            import control
-
-        columns = self.inputs(self.input_names if inputs is None else inputs)
-        rows = self.outputs(self.output_names if outputs is None else outputs)
-        names = {
-            "states": self.state_names,
-            "inputs": [self.input_names[k] for k in columns],
-            "outputs": [self.output_names[k] for k in rows],
-        }
-        allowed = {kind: [name.replace(".", ":") for name in given] for kind, given in names.items()}
-        return control.ss(self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)], **allowed)
+        K, D, B, _ = self.second_order
+        s, f = 1j * np.asarray(omega)[:, None, None], self.freedom
+        columns, rows = self.inputs(inputs), self.outputs(outputs)
+        X = np.linalg.solve(s**2 * np.eye(f) + s * D + K, B[None, :, columns])
+        back = np.linalg.inv(np.linalg.cholesky(self.mass).T) @ X
+        C = self.C[rows]
+        return np.asarray((C[:, :f] + s * C[:, f:]) @ back + self.D[np.ix_(rows, columns)], dtype=complex)
 
 
 def state_space(

@@ -25,7 +25,7 @@ from .linear_model import LinearModel, kept_modes, observability, riccati, sampl
 from .margins import Feedback
 from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis, ScheduledObserver, Sensor
 from .robot import Setup, default_tip, estimated_sensors
-from .signals import Sensing, Signal, filters, make_signals, merged
+from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
 HIDDEN = 1e-7  # of the largest singular value
@@ -241,7 +241,7 @@ class Observed:
         self.warnings = [*warnings, *(line for each in controllers for line in getattr(each, "warnings", ()))]
         first = schedule.observers[0]
         self._p, self._x = len(first.C), np.zeros(len(first.A))
-        self.seen = np.zeros((len(setup.times), len(setup.outputs)))  # readings and estimates at samples
+        self.estimates = np.zeros((len(setup.times), len(setup.outputs) - self._p))  # at samples
 
     def __call__(self, k: int, y: Array) -> Array:
         """Commands at sample k. Raises `SolveError` where estimates diverge."""
@@ -254,7 +254,7 @@ class Observed:
         innovation = y - self._origin[k] - observer.C @ self._x
         x = self._x + observer.L @ innovation
         seen = np.concatenate([y, setup.reference[k, self._p :] + observer.E @ x])
-        self.seen[k] = seen
+        self.estimates[k] = seen[self._p :]
         u: Array = np.zeros(len(setup.inputs))
         for controller in self.controllers:
             u += controller(k, seen)
@@ -278,7 +278,7 @@ class Observed:
         p, tip = self._p, self.tip
         taken = len(next(iter(truth.values())))
         first = self.schedule.observers[0]
-        values, times = self.seen[:taken, p:], self.setup.times[:taken]
+        values, times = self.estimates[:taken], self.setup.times[:taken]
         names = [name.removeprefix("estimate/") for name in self.setup.outputs[p:]]
         columns = [k for k, name in enumerate(names) if name.rpartition("/")[0] == f"point/{tip}"]
         error = values[:, columns] - np.transpose([truth[names[k]] for k in columns] or np.zeros((0, taken)))
@@ -332,8 +332,7 @@ def kalman_filters(
     filters_there, unseen = [], dict[str, None]()
     for row in instants:
         mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
-        readings = zip(*Sensing(plant, signals).rows(mechanism), strict=True)
-        model = state_space(mechanism, voltages, dict(zip([s.name for s in signals], readings, strict=True)))
+        model = state_space(mechanism, voltages, readings_at(plant, mechanism, signals))
         filters_there.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
         if lost := observability(model, [signal.name for signal in read]).lost:
             unseen[f"observer: sensors cannot see {', '.join(lost)}"] = None

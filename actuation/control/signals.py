@@ -113,6 +113,14 @@ class Sensing:
         return by_s, by_rate, by_acceleration
 
 
+def readings_at(
+    model: Model, mechanism: LinearMechanism, read: Sequence[Signal]
+) -> dict[str, tuple[Array, Array, Array]]:
+    """Changes (f,) of each reading by s, ṡ and s̈ of a linear mechanism of `model`, by name."""
+    rows = zip(*Sensing(model, read).rows(mechanism), strict=True)
+    return dict(zip([signal.name for signal in read], rows, strict=True))
+
+
 def _places_in_q(tree: KinematicTree) -> Indices:
     """(n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place."""
     places = np.zeros(tree.n_v, dtype=np.intp)

@@ -22,7 +22,7 @@ from .bodies.matrices import craig_bampton_file, exudyn_file
 from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
-from .fmu.linear_fmu import linear_fmu
+from .fmu.linear_fmu import c_table, linear_fmu
 from .motion.read_motion import TEXTS, path_text, read_motion
 from .motion.robot_motion import (
     JointMotions,
@@ -81,6 +81,7 @@ FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
         "joint-trajectory": (".joint-trajectory.json", partial(_motion, joint_trajectory_text, "{points} points")),
         "rosbag2": (".rosbag2", partial(_motion, joint_trajectory_bag, "a JointTrajectory with {points} points")),
         "fmu": (".fmu", lambda path, analysis, _: FileContent(*linear_fmu(path, analysis))),
+        "c": (".h", lambda path, analysis, _: FileContent(*c_table(path, analysis))),
     },
     "a scene": {
         "urdf": (".urdf", lambda path, *_: FileContent(*scene_as_urdf(path))),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from ..actuation.control.linear_model import LinearModel
+    from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace
     from .verdict import Verdict
 
 
@@ -111,6 +111,23 @@ class AnalysisAccess(Datasets):
 
         return read_linear(self._file, analysis)
 
+    def controller(self, analysis: str) -> SampledController:
+        """The controllers of a closed loop at its start, with the observer, as one linear system in discrete time.
+
+        Raises `InputError` where the analysis has none: no loop, or controllers that are not linear.
+        """
+        if not self.has(f"{analysis}/control/controller"):
+            known = quoted(name for name in self.analyses if self.has(f"{name}/control/controller"))
+            raise InputError(f'{self.path}: expected a closed loop of linear controllers ({known}), found "{analysis}"')
+        from .linear import read_controller
+
+        return read_controller(self._file, analysis)
+
+    def state_spaces(self, analysis: str) -> tuple[StateSpace, ...]:
+        """The linear models of an analysis, or the controller of a loop. Raises `InputError` if it has neither."""
+        is_loop = self.has(f"{analysis}/control/controller")
+        return (self.controller(analysis),) if is_loop else self.linear(analysis)
+
     def linear_analysis(self, analysis: str | None) -> str:
         """`analysis`, or the first one with linear models. Raises `InputError` if there is none."""
         known = self._with_models()
@@ -119,10 +136,10 @@ class AnalysisAccess(Datasets):
         return analysis or known[0]
 
     def export_linear(self, analysis: str | None, path: Path) -> str:
-        """Write the linear models of an analysis (default: the first with any) to .npz or .mat; returns its name."""
+        """Write linear models, by default of the first with any, or a loop's controller to .npz or .mat; its name."""
         from .linear import save_models
 
-        save_models(self.linear(name := self.linear_analysis(analysis)), path)
+        save_models(self.state_spaces(name := self.linear_analysis(analysis)), path)
         return name
 
     def _with_models(self) -> list[str]:

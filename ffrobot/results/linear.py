@@ -17,7 +17,7 @@ from ..mbs.quantities.motion import body_motion, modal_rates, reported_points
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
-    from ..actuation.control.linear_model import LinearModel, Zeros
+    from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace, Zeros
     from ..actuation.control.loop import LoopRecord
     from ..actuation.control.metrics import Metrics
     from ..actuation.control.observer import Estimates
@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # most scenes have none of these
 
 MATRICES = names_of("LinearModel")
 NAMES = ("state_names", "input_names", "output_names")
+PORTS = ("inputs", "outputs")
 LISTED = 3  # natural frequencies
 
 
@@ -159,6 +160,16 @@ def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
     entry.attrs["off_rest"] = inversion.off_rest
 
 
+def read_controller(file: h5py.File, analysis: str) -> SampledController:
+    """The controllers of a loop that has linear ones."""
+    from ..actuation.control.linear_model import SampledController
+
+    group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
+    A, B, C, D = (np.asarray(group[key], dtype=float) for key in "ABCD")
+    states, names = tuple(f"state/{k}" for k in range(1, len(A) + 1)), (tuple(group.attrs[key]) for key in PORTS)
+    return SampledController(A, B, C, D, states, *names, sample_time=float(np.median(np.diff(time))))
+
+
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
     """The linear models of an analysis that has them."""
     from ..actuation.control.linear_model import LinearModel
@@ -172,7 +183,7 @@ def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
     return tuple(models)
 
 
-def save_models(models: Sequence[LinearModel], path: Path) -> None:
+def save_models(models: Sequence[StateSpace], path: Path) -> None:
     """Write models to .npz or .mat: one as it is, several with a first axis over their times."""
     if len(models) == 1:
         models[0].save(path)

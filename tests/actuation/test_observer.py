@@ -1,5 +1,7 @@
 """Observers and their sensors: closed forms, python-control, exact discrete models, statistics, what does not fit."""
 
+import re
+
 import numpy as np
 import pytest
 from beam_links import paper_link
@@ -14,6 +16,8 @@ from ffrobot.actuation.control.observer import Schedule, kalman
 from ffrobot.actuation.control.records import KalmanObserver, Sensor
 from ffrobot.actuation.control.signals import Filter, Signal
 from ffrobot.common.errors import InputError
+from ffrobot.exchange.export import export_file
+from ffrobot.exchange.fmu.forward_model import joint_units, linear_variables
 from ffrobot.scene.load import make_scene
 
 T, INERTIA = 0.01, 0.5
@@ -145,7 +149,7 @@ def test_high_pass_and_delay_of_a_sensor():
     np.testing.assert_array_equal(found[:, 1], t)
 
 
-def wheel(joint=None, **keys):
+def wheel(joint=None, analysis=None, **keys):
     """A wheel about O that is to stand still, I γ̈ = u, under a closed loop."""
     body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "rim": [0.3, 0.0]}}
     loop = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": T, "tip": "w.rim"} | keys
@@ -153,7 +157,7 @@ def wheel(joint=None, **keys):
         name="wheel", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}],
         joint=[{"name": "O", "type": "revolute", "between": ["ground", "w.root"]} | (joint or {})],
         trajectory=[{"name": "stand", "joint": "O", "value": "0"}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T}, loop],
+        analysis=analysis or [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T}, loop],
     )  # fmt: skip
 
 
@@ -185,6 +189,56 @@ def test_a_loop_with_an_observer_is_its_exact_discrete_model():
     seen += [results[f"{group}/estimate/{name}"][()] for name in ("joint/O", "rate/joint/O", "disturbance/joint/O")]
     np.testing.assert_allclose(np.transpose(seen), found, atol=1e-5)  # the rim turns by 8 mrad
     assert results.attributes(group)["verdict"] == "stable"
+
+
+def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path):
+    """From readings off the reference to commands; dt of python-control, matrices of a file, a table in C."""
+    control = pytest.importorskip("control")
+    push = [{"point": "w.rim", "y": "1"}]
+    results = ffrobot.solve(
+        wheel(sensor=[ENCODER], controller=[PID], observer=KALMAN, disturbance=push), output=tmp_path / "w.results.h5"
+    )
+    system = results.controller("loop").to_control()
+    assert system.dt == pytest.approx(T)
+    read = results["loop/control/readings"][()] - results["loop/control/reference"][()]
+    found = control.forced_response(system, U=read.T).outputs
+    np.testing.assert_allclose(np.reshape(found, (-1, 1)), results["loop/control/wanted"][()], atol=1e-9)
+    results.export_linear("loop", tmp_path / "c.npz")
+    saved = np.load(tmp_path / "c.npz")
+    np.testing.assert_array_equal(saved["A"], system.A)
+    assert saved["sample_time"] == pytest.approx(T)
+    export_file(tmp_path / "w.results.h5", "c", "loop", tmp_path / "c.h")
+    text = (tmp_path / "c.h").read_text()
+    assert f"#define N_X {len(system.A)}" in text
+    numbers = re.search(r"double A\[\] = \{(.*?)\}", text, re.DOTALL)[1].split(",")
+    np.testing.assert_array_equal(np.array(numbers, dtype=float), system.A.ravel())
+    with pytest.raises(InputError, match=r'expected a closed loop of linear controllers .*"loop".*found "inverse"'):
+        results.controller("inverse")
+
+
+def test_sensors_are_outputs_of_linear_models():
+    """A wheel: γ̇ = u/(I s), which a gyro reads, too; r u/I along y at r = 0.3 m, and u/(I s²) of an encoder."""
+    sensors = [{"joint": "O", "measure": "rate"}, {"point": "w.rim", "measure": "accelerometer"},
+               {"point": "w.rim", "measure": "gyro"}, {"joint": "O", "noise": 1.0}]  # fmt: skip
+    results = ffrobot.solve(wheel(analysis=[{"name": "at_rest", "kind": "linear", "sensor": sensors}]))
+    model, omega = results.linear("at_rest")[0], np.array([0.5, 3.0, 20.0])
+    s = 1j * omega
+    names = [
+        "joint/O/rate",
+        "point/w.rim/y/accelerometer",
+        "point/w.rim/z/gyro",
+        "joint/O",
+        "point/w.rim/x/accelerometer",
+    ]
+    expected = np.array([1 / (INERTIA * s), 0.3 / INERTIA + 0 * s, 1 / (INERTIA * s), 1 / (INERTIA * s**2), 0 * s])
+    found = model.frequency_response(omega, "joint/O", names)[:, :, 0]
+    np.testing.assert_allclose(found.T, expected, rtol=1e-9, atol=1e-12)
+    control = pytest.importorskip("control")
+    system = model.to_control("joint/O", names)
+    np.testing.assert_allclose(control.frequency_response(system, omega).frdata[:, 0], expected, rtol=1e-9, atol=1e-12)
+    _, _, outputs = linear_variables(model, joint_units(results.scene))
+    units = {each.name: each.unit for each in outputs}
+    assert [units[name] for name in names[:4]] == ["rad/s", "m/s2", "rad/s", "rad"]
 
 
 @pytest.mark.parametrize(

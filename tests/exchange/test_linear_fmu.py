@@ -37,6 +37,9 @@ analysis = [
   { name = "at_rest", kind = "linear" },
   { name = "inverse", kind = "pcid", end = 0.1, output_step = 0.01 },
   { name = "along", kind = "linear", about = "inverse", times = [0.0, 0.05] },
+  { name = "loop", kind = "closed-loop", actuation = "inverse", sample_time = 1e-3, controller = [
+    { kind = "joint-pid", proportional = { hub = 13.0 }, derivative = { hub = 2.0 }, integral = { hub = 5.0 } },
+  ], disturbance = [{ point = "arm.tip", y = "0.1" }] },
 ]
 
 [[pzt]]
@@ -144,6 +147,40 @@ def test_fmpy_finds_no_fault(robot):
     units = {each.name: each.unit for each in robot.description.modelVariables}
     assert [units[name] for name in (MOTOR, PATCH, FORCE, "joint/hub", TIP)] == ["N.m", "V", "N", "rad", "m"]
     assert units["der(rate of joint/hub)"] == "rad/s2"
+
+
+def test_a_controller_commands_what_it_did_in_its_loop(ffrobot, folder):
+    """Of samples: only co-simulation, with steps of the sample time."""
+    done = ffrobot.ok("export", "scene.results.h5", "--format", "fmu", "--analysis", "loop", cwd=folder)
+    assert "written    scene.results.loop.fmu: loop, 1 states, 2 inputs, 1 outputs" in done.stdout
+    path = folder / "scene.results.loop.fmu"
+    assert validate_fmu(str(path)) == []
+    description = read_model_description(str(path))
+    assert description.modelExchange is None
+    reference = {each.name: each.valueReference for each in description.modelVariables}
+    results = Results(folder / "scene.results.h5")
+    names = [reference[name] for name in results.attributes("loop/control")["outputs"]]
+    readings = results["loop/control/readings"][()] - results["loop/control/reference"][()]
+    fmu = FMU2Slave(
+        guid=description.guid, unzipDirectory=extract(str(path), str(folder / "loop")),
+        modelIdentifier=description.coSimulation.modelIdentifier, instanceName="loop",
+    )  # fmt: skip
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    controller = results.controller("loop")
+    x, found, expected = np.zeros(len(controller.A)), [], []
+    for k, y in enumerate(readings):
+        fmu.setReal(names, list(y))
+        found += fmu.getReal([reference[MOTOR]])
+        expected += list(controller.C @ x + controller.D @ y)
+        fmu.doStep(currentCommunicationPoint=1e-3 * k, communicationStepSize=1e-3)
+        x = controller.A @ x + controller.B @ y
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert np.ptp(found) > 1e-3  # N·m
+    fmu.terminate()
+    fmu.freeInstance()
 
 
 def test_co_simulation_holds_inputs(robot):

@@ -7,13 +7,12 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
-from itertools import count
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
 import numpy as np
 
-from ...actuation.control.linear_model import LinearModel
+from ...actuation.control.linear_model import StateSpace
 from ...common.arrays import Array
 from ...mbs.analysis.forward import Forward
 from .forward_model import UNITS, ForwardUnit, Variable
@@ -40,7 +39,7 @@ class Unit:
     name: str
     description: str
     guid: str
-    model: LinearModel
+    model: StateSpace
     states: tuple[Variable, ...]
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
@@ -52,6 +51,7 @@ def model_description(unit: Unit, generator: str) -> bytes:
         "modelIdentifier": unit.identifier, "canNotUseMemoryManagementFunctions": "true",
         "canGetAndSetFMUstate": "true", "providesDirectionalDerivative": "true",
     }  # fmt: skip
+    model, f, u, is_sampled = unit.model, len(unit.states), len(unit.inputs), unit.model.step > 0.0
     stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
     kinds = {
         "ModelExchange": abilities | {"completedIntegratorStepNotNeeded": "true"},
@@ -62,20 +62,24 @@ def model_description(unit: Unit, generator: str) -> bytes:
         for each in unit.states
     )
     groups = {"states": unit.states, "derivatives": derivatives, "inputs": unit.inputs, "outputs": unit.outputs}
-    model, f, u = unit.model, len(unit.states), len(unit.inputs)
+    references, experiment = list(range(2 * f + u + len(unit.outputs))), _experiment(model)
+    if is_sampled:
+        kinds = {"CoSimulation": abilities}
+        del groups["derivatives"], references[f : 2 * f]
+    first = sum(len(group) for group in groups.values()) - len(unit.outputs) + 1
     # FMI counts variables from 1; columns of [A B] and [C D] are states, then inputs.
-    columns = np.array([*range(1, f + 1), *range(2 * f + 1, 2 * f + 1 + u)])
+    columns = np.array([*range(1, f + 1), *range(first - u, first)])
 
     def unknowns(first: int, matrix: Array) -> dict[int, list[int]]:
         return {first + k: columns[row != 0].tolist() for k, row in enumerate(matrix)}
 
-    outputs = unknowns(2 * f + 1 + u, np.hstack([model.C, model.D]))
-    rates = unknowns(f + 1, np.hstack([model.A, model.B]))
-    structure = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": rates | outputs}
+    outputs = unknowns(first, np.hstack([model.C, model.D]))
+    rates = {} if is_sampled else unknowns(f + 1, np.hstack([model.A, model.B]))
+    structure = {"Outputs": outputs} | ({"Derivatives": rates} if rates else {}) | {"InitialUnknowns": rates | outputs}
     root = _root(unit.name, unit.guid, unit.description, generator)
     for kind, attributes in kinds.items():
         _add(_add(_add(root, kind, attributes), "SourceFiles"), "File", {"name": SOURCE})
-    return _finished(root, groups, _experiment(unit.model.A), count(), structure)
+    return _finished(root, groups, experiment, references, structure)
 
 
 def forward_description(unit: ForwardUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
@@ -152,9 +156,11 @@ def _finished(
     return text + b"\n"
 
 
-def _experiment(A: Array) -> dict[str, str]:
-    """Ten periods of the slowest vibration in a thousand steps; a second where there is none."""
-    poles = np.linalg.eigvals(A)
+def _experiment(model: StateSpace) -> dict[str, str]:
+    """Ten periods of the slowest vibration in a thousand steps; a second where there is none, or of samples."""
+    if model.step:
+        return {"startTime": "0", "stopTime": "1", "stepSize": repr(model.step)}
+    poles = np.linalg.eigvals(model.A)
     angular = np.abs(poles.imag)
     vibrations = angular[angular > VIBRATION * max(np.abs(poles).max(), 1.0)]
     stop = float(f"{10 * 2 * np.pi / vibrations.min():.1g}") if len(vibrations) else 1.0

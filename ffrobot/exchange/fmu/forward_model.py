@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...actuation.control.linear_model import LinearModel
+from ...actuation.control.linear_model import StateSpace
+from ...actuation.control.signals import ORDERS
 from ...actuation.patches.link_patches import LinkPatches
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
@@ -63,22 +64,26 @@ def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
 
 
 def linear_variables(
-    model: LinearModel, units: Mapping[str, str]
+    model: StateSpace, units: Mapping[str, str]
 ) -> tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]]:
     """States, inputs and outputs; `units` of the joints' coordinates, see `joint_units`.
 
-    FMI wants names once: a motor is "joint/NAME/moment", as in results, since "joint/NAME" is an output, and "state "
-    stands before a state whose name an output has, too.
+    FMI wants names once: a motor is "joint/NAME/moment", as in results, since "joint/NAME" is an output, "state "
+    stands before a state whose name an output has, too, and "measured " before patches that are sensors.
     """
-    inputs = tuple(_input(name, units) for name in model.input_names)
-    outputs = tuple(Variable(name, *_coordinate(name, units)) for name in model.output_names)
-    states = []
+    seen, driven = model.output_names, model.input_names
+    if model.step:  # a controller reads, and commands
+        seen, driven = driven, seen
+    readings = tuple(
+        Variable(f"measured {name}" if name.startswith("pzt/") else name, *_coordinate(name, units)) for name in seen
+    )
+    acting, states = tuple(_input(name, units) for name in driven), []
     for name in model.state_names:
         unit, description = _coordinate(name.removeprefix(RATE), units)
         if name.startswith(RATE):
             unit, description = f"{unit}/s", f"rate of the {description}"
         states.append(Variable(f"state {name}" if name in model.output_names else name, unit, description))
-    return tuple(states), inputs, outputs
+    return (tuple(states), readings, acting) if model.step else (tuple(states), acting, readings)
 
 
 def _input(name: str, units: Mapping[str, str]) -> Variable:
@@ -103,8 +108,19 @@ def voltage(layout: str, number: int) -> Variable:
 
 
 def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
+    stem, _, measure = name.rpartition("/")
+    if measure in ORDERS and "/" in stem:  # of a sensor
+        unit, what = _coordinate(stem, units)
+        of = {"rate": f"{unit}/s", "gyro": "rad/s"}.get(measure, f"{unit}/s2")
+        return of, f"{measure} of the {what}"
     kind, _, rest = name.partition("/")
     place, _, last = rest.rpartition("/")
+    if kind == "state":  # of a controller
+        return "1", f"state {rest}"
+    if kind == "strain":
+        return "1", f"strain at {rest}"
+    if kind == "pzt":
+        return "V", f"voltage that patch {last} of {place} measures"
     if kind == "modal":
         return "kg0.5.m", f"modal coordinate {last} of {place}"
     if kind == "point":

@@ -1,4 +1,4 @@
-"""`ffrobot export --format fmu`: the linear model of an analysis as a functional mock-up unit."""
+"""`ffrobot export`: the linear model of an analysis, or the controller of a loop, as an FMU or as numbers in C."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import matrix_balance
 
-from ...actuation.control.linear_model import LinearModel
+from ...actuation.control.linear_model import LinearModel, StateSpace
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.version import VERSION
@@ -25,11 +26,30 @@ from .forward_model import joint_units, linear_variables
 
 
 def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
-    """The FMU of an analysis of kind "linear", the first if not named; a few words on it, remarks, its name.
+    """The FMU of an analysis with linear models, the first if not named; a few words on it, remarks, its name.
 
     Raises:
         InputError: there is no such analysis, it has several times, or its model has no inputs or is not finite.
     """
+    unit, what, remarks, name = _unit(path, analysis)
+    files = {SOURCE: (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8"), HEADER: _header(unit)}
+    compiled = binary(unit, files)
+    content = {"modelDescription.xml": model_description(unit, f"ffrobot {VERSION}")}
+    content |= {f"sources/{file}": text.encode() for file, text in files.items()}
+    if isinstance(compiled, str):
+        remarks.append(f"sources only, no binary: {compiled}")
+    else:
+        content[compiled[0]] = compiled[1]
+    return zipped(content), what, tuple(remarks), name
+
+
+def c_table(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...], str]:
+    """A header file with the matrices instead; otherwise as `linear_fmu`."""
+    unit, what, remarks, name = _unit(path, analysis)
+    return _header(unit), what, tuple(remarks), name
+
+
+def _unit(path: Path, analysis: str | None) -> tuple[Unit, str, list[str], str]:
     with Results(path) as results:
         name = results.linear_analysis(analysis)
         if name in results.analyses and results.attributes(name)["kind"] == "forward":
@@ -37,36 +57,37 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
                 f'{path}: --analysis: expected a linear analysis of results, found "{name}" of kind "forward": export'
                 " the scene, SCENE.toml, for an FMU of that motion"
             )
-        models, scene = results.linear(name), results.scene
+        models, scene = results.state_spaces(name), results.scene
     if len(models) != 1:
         times = f"{len(models)}, from t = {models[0].time:g} s to t = {models[-1].time:g} s"
         raise InputError(
             f"{path}: {name}: expected a linear model of one instant for an FMU, found {times}; solve with one in"
             " `times`"
         )
+    _check(path, name, models[0])
     model = models[0]
-    _check(path, name, model)
+    if not len(model.A):  # C has no arrays without numbers
+        still = {"A": np.zeros((1, 1)), "B": np.zeros((1, model.B.shape[1])), "C": np.zeros((len(model.C), 1))}
+        model = replace(model, **still, state_names=("state/1",))
     unit = make_unit(str(scene["name"]), name, model, joint_units(scene))
-    files = {SOURCE: (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8"), HEADER: _header(unit)}
-    compiled = binary(unit, files)
-    content = {"modelDescription.xml": model_description(unit, f"ffrobot {VERSION}")}
-    content |= {f"sources/{file}": text.encode() for file, text in files.items()}
-    remarks = ["all values are deviations from the configuration that the model is about"]
-    if isinstance(compiled, str):
-        remarks.append(f"sources only, no binary: {compiled}")
-    else:
-        content[compiled[0]] = compiled[1]
     what = f"{name}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), what, tuple(remarks), name
+    remark = "all values are deviations from the configuration that the model is about"
+    if model.step:
+        remark = f"a step of {model.step:g} s; readings and commands are off those of the reference"
+    return unit, what, [remark], name
 
 
-def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str, str]) -> Unit:
+def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, str]) -> Unit:
     """Names and variables of the FMU of a model; `units` of the joints' coordinates."""
     states, inputs, outputs = linear_variables(model, units)
     return Unit(
         identifier=identifier_of(scene, analysis),
         name=f"{scene}, {analysis}",
-        description=f"linear model about t = {model.time:g} s; all values are deviations from the configuration there",
+        description=(
+            f"linear model about t = {model.time:g} s; all values are deviations from the configuration there"
+            if isinstance(model, LinearModel)
+            else "controllers and observer at the start, from readings to commands, both off the reference"
+        ),
         guid=guid_of(numbers(model), (*states, *inputs, *outputs)),
         model=model,
         states=states,
@@ -75,7 +96,7 @@ def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str,
     )
 
 
-def _check(path: Path, analysis: str, model: LinearModel) -> None:
+def _check(path: Path, analysis: str, model: StateSpace) -> None:
     if not (model.input_names and model.output_names):
         raise InputError(
             f"{path}: {analysis}: expected a model with inputs and outputs for an FMU, found {len(model.input_names)}"
@@ -89,7 +110,7 @@ HEADER = "model.h"
 COMPILERS = ("cc", "gcc", "clang")
 
 
-def numbers(model: LinearModel) -> str:
+def numbers(model: StateSpace) -> str:
     """Return the matrices as C source, and the scale of the states that balances A."""
     _, (scale, _) = matrix_balance(model.A, permute=False, separate=True)
     arrays = {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "SCALE": scale[None, :]}
@@ -100,6 +121,9 @@ def _header(unit: Unit) -> str:
     sizes = {"N_X": unit.states, "N_U": unit.inputs, "N_Y": unit.outputs}
     lines = [f"/* {_comment(unit.name)}: {_comment(unit.description)} */", f'#define GUID "{unit.guid}"']
     lines += [f"#define {name} {len(variables)}" for name, variables in sizes.items()]
+    lines += [f"#define SAMPLE_TIME {unit.model.step!r} /* s; x(k+1) = A x + B u, y = C x + D u */"] * bool(
+        unit.model.step
+    )
     for title, variables in zip(("States", "Inputs", "Outputs"), sizes.values(), strict=True):
         names = "\n".join(f"     {_comment(each.name)} ({each.unit})" for each in variables)
         lines += ["", f"/* {title}:\n{names} */"]

@@ -8,7 +8,9 @@
 
        x(h) = E x + F B u + G B u',   E = exp(A h),   F = int_0^h exp(A s) ds,   G = int_0^h F(s) ds.
 
-   E, F and G are computed when the step differs from theirs by more than first-order terms make up for. */
+   E, F and G are computed when the step differs from theirs by more than first-order terms make up for.
+
+   With SAMPLE_TIME in model.h it is x(k+1) = A x + B u of a controller, one such step at a time. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -428,10 +430,19 @@ STATUS(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_se
     return fail(m, "fmi2DoStep: expected a step of zero or more seconds");
   if (h == 0)
     return fmi2OK;
+#ifdef SAMPLE_TIME
+  double next[N_X];
+  if (fabs(h - SAMPLE_TIME) > 1e-6 * SAMPLE_TIME)
+    return fail(m, "fmi2DoStep: expected steps of the sample time");
+  for (size_t i = 0; i < N_X; ++i)
+    next[i] = row(A, B, i, m->x, m->u);
+  memcpy(m->x, next, sizeof next);
+#else
   const double second_order = (h - m->step) * m->norm; /* squared, of the state */
   if ((m->step == 0 || fabs(second_order) > 1e-7) && !propagate(m, h))
     return fail(m, "fmi2DoStep: not enough memory");
   advance(m, h);
+#endif
   for (size_t i = 0; i < N_X; ++i)
     if (!isfinite(m->x[i]))
       return fail(m, "fmi2DoStep: the state is no longer finite");
