@@ -23,7 +23,15 @@ from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, make_controllers
 from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
 from .margins import Feedback
-from .records import GainsObserver, KalmanObserver, KalmanRecord, SampledAnalysis, ScheduledObserver, Sensor
+from .records import (
+    FilterRecord,
+    GainsObserver,
+    KalmanObserver,
+    KalmanRecord,
+    SampledAnalysis,
+    ScheduledObserver,
+    Sensor,
+)
 from .robot import Setup, default_tip, estimated_sensors
 from .signals import Signal, filters, make_signals, merged, readings_at
 
@@ -78,7 +86,7 @@ class Observer:
 
 
 def kalman(
-    record: KalmanRecord,
+    record: FilterRecord,
     model: LinearModel,
     read: Sequence[Signal],
     estimated: Sequence[str],

@@ -19,7 +19,13 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
+from ...mbs.analysis.operating_points import (
+    InstantAnalysis,
+    OperatingPoints,
+    find_operating_points,
+    of_earlier,
+    row_at,
+)
 from ...mbs.fields.field_types import Reference
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.run.record import Details, Run
@@ -29,8 +35,12 @@ from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray
 from ..patches.records import PztLayout
-from .linear_model import LinearModel, state_space
-from .records import Placement
+from .linear import voltages_at
+from .linear_model import LinearModel, kept_modes, state_space
+from .observer import kalman
+from .records import EstimateRecord, Placement, Sensor
+from .robot import default_tip
+from .signals import Signal, make_signals, readings_at
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
 CHUNK = 200  # sets whose voltages over the path are held in memory together
@@ -127,9 +137,16 @@ def link_modes(link: PatchableLink, count: int) -> ModalReach:
 
 
 def place(
-    scene_path: Path, wanted: Placement, link: PatchableLink, model: LinearModel | None, F_p: Array | None
+    scene_path: Path,
+    wanted: Placement,
+    link: PatchableLink,
+    model: LinearModel | None,
+    F_p: Array | None,
+    deviation: Callable[[Array], float] | None = None,
 ) -> Placed:
-    """The best centers for the patches of a link; `model` for controllability, F_p (T, m) for voltages.
+    """Find the best centers for the patches of a link; `model` for controllability, F_p (T, m) for voltages.
+
+    `deviation`: of the estimated tip, m, with patches of modal forces per volt (m, count) as sensors.
 
     Controllability of a mode is what its gramian grows with under light damping, Σ (φᵀ b_k)² over the patches, b_k the
     modal forces of a patch per volt (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to what the
@@ -157,6 +174,8 @@ def place(
 
     def judge(Phi_V: Array) -> Array:
         """Values (sets,) of sets of patches, Phi_V (n, sets, count)."""
+        if deviation is not None:
+            return -np.array([deviation(of_set) for of_set in Phi_V.swapaxes(0, 1)])
         if F_p is not None:
             return -_voltages(reach.shape, Phi_V, F_p)
         return _measured(wanted.measure, gain(Phi_V.reshape(len(Phi_V), -1)).reshape(-1, *Phi_V.shape[1:]).sum(axis=2))
@@ -300,7 +319,44 @@ class PatchPlacement(InstantAnalysis):
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
         run, about = find_operating_points(context, self)
         at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
-        return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
+        deviation = None if wanted.estimate is None else _deviation(context, wanted.estimate, link, about)
+        return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None, deviation))
+
+
+def _deviation(
+    context: ActuatedContext, record: EstimateRecord, link: PatchableLink, about: OperatingPoints
+) -> Callable[[Array], float]:
+    """Return the standard deviation (m) of the tip's estimate by patches of modal forces per volt (m, count).
+
+    By reciprocity a patch reads these times p over its capacitance. Raises `InputError` where no filter exists.
+    """
+    model, q = about.model, about.q[0]
+    tip = Sensor(point=record.tip or default_tip(model))
+    read, wanted = ([s for one in of for s in make_signals(model, context, one)] for of in (record.sensor, [tip]))
+    pushed = (name.split("/") for name in (*record.process, *record.disturbance))
+    points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
+    whole = LinearEquations(model, q, points).at(float(about.time[0]), q, about.v[0], about.a[0])
+    at, voltages = kept_modes(whole, voltages_at(model, whole, context.patches), record.modes)
+    known = state_space(at, voltages, readings_at(model, at, [*read, *wanted]))
+    modal = [name for body in link.bodies for name in whole.names if name.startswith(f"modal/{body}/")]
+    volts = link.own[:, [k for k, name in enumerate(modal) if name in at.names]] / link.layout.capacitance()
+    columns = [at.names.index(name) for name in modal if name in at.names]
+
+    as_sensor = Sensor(pzt=link.layout.label, noise=record.noise)
+
+    def deviation(Phi_V: Array) -> float:
+        patches = [Signal(f"patch/{k}", as_sensor) for k in range(Phi_V.shape[1])]
+        C = np.zeros((len(patches), len(known.A)))
+        C[:, columns] = Phi_V.T @ volts
+        model = replace(
+            known, C=np.vstack([known.C, C]), D=np.vstack([known.D, np.zeros((len(C), known.D.shape[1]))]),
+            output_names=(*known.output_names, *(patch.name for patch in patches)),
+        )  # fmt: skip
+        found = kalman(record, model, [*read, *patches], [s.name for s in wanted], ((), record.sample_time, 0.0))
+        of_tip = found.E[: len(wanted)]
+        return float(np.sqrt(np.trace(of_tip @ found.covariance @ of_tip.T)))
+
+    return deviation
 
 
 def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:

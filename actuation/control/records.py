@@ -240,8 +240,8 @@ class ObserverRecord(Record):
     """Samples for which observer and controllers see the first readings before the run; 0: start on the reference."""
 
 
-class KalmanRecord(ObserverRecord):
-    """Keys of Kalman filters.
+class FilterRecord(Record):
+    """Keys of the model of Kalman filters.
 
     They estimate coordinates and rates of joints, motors and the lowest `modes` of links, and constant loads on
     request. `process` and `disturbance` name inputs of the linear model: "joint/NAME", "pzt/LAYOUT/k" or
@@ -254,6 +254,11 @@ class KalmanRecord(ObserverRecord):
     """Standard deviation, by input, of white noise that is constant over a sample; N·m, V or N."""
     disturbance: dict[str, Positive] = Field(default_factory=dict)
     """Constant loads to be estimated, by input, with their drift; N·m, V or N per √s."""
+
+
+class KalmanRecord(ObserverRecord, FilterRecord):
+    """Keys of Kalman filters of a loop."""
+
     reject: bool = False
     """Permission for motors and patches to act against estimated disturbances of theirs."""
 
@@ -325,11 +330,31 @@ class GainsObserver(ObserverRecord):
 Observer = Annotated[KalmanObserver | ScheduledObserver | GainsObserver, Field(discriminator="kind")]
 
 
+class EstimateRecord(FilterRecord):
+    """The Kalman filter whose estimate of the tip placed patches serve, as sensors."""
+
+    sample_time: Positive
+    """Time between readings, s."""
+    noise: Positive
+    """Standard deviation of the noise of each patch, V."""
+    sensor: tuple[Sensor, ...] = ()
+    """Other sensors, such as encoders, with their noise."""
+    tip: PointReference | None = None
+    """Point "BODY.POINT" to be estimated; by default the tip of the robot."""
+
+    def references(self) -> Iterator[Reference]:
+        """What is measured and estimated."""
+        for k, sensor in enumerate(self.sensor, 1):
+            yield from under(f"placement.estimate.sensor no. {k}", sensor.references())
+        if self.tip is not None:
+            yield Reference("placement.estimate.tip", self.tip)
+
+
 class Placement(Record):
     """Optimal positions of the `count` patches of a [[pzt]] on its link.
 
     Modes are the lowest of the robot with locked motors; with criterion "voltage", those of the link, whose forces in
-    the inverse analysis `about` count.
+    the inverse analysis `about` count. With "estimate" patches are sensors.
     """
 
     body: str
@@ -338,8 +363,12 @@ class Placement(Record):
     """Layout of the patches; required if a link has several layouts."""
     count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
-    criterion: Literal["controllability", "voltage"] = "controllability"
-    """Controllability of the robot's lowest modes, or the largest voltage over its limit along the path."""
+    criterion: Literal["controllability", "voltage", "estimate"] = "controllability"
+    """Controllability of the robot's lowest modes, the largest voltage over its limit along the path, or the deviation
+    of the estimated tip (the root of the trace of its covariance).
+    """
+    estimate: EstimateRecord | None = None
+    """Filter of criterion "estimate"."""
     measure: Literal["worst", "mean", "product"] = "worst"
     """Controllability measure: that of the worst mode, their mean, or their product."""
     modes: ModeCount | None = None
@@ -349,12 +378,21 @@ class Placement(Record):
     most_sets: Annotated[int, Field(gt=0, le=10_000_000)] = 100_000
     """Largest number of sets for an exhaustive search; beyond it, differential evolution searches."""
 
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.criterion == "estimate") != (self.estimate is not None):
+            found = "none" if self.estimate is None else f'it with "{self.criterion}"'
+            raise ValueError(f'expected the table "estimate" with criterion = "estimate" only, found {found}')
+        return self
+
     def references(self) -> Iterator[Reference]:
         """The link and its patches."""
         yield Reference("placement.body", self.body)
         yield Reference("placement.body", self.body, "patched body")
         if self.pzt is not None:
             yield Reference("placement.pzt", self.pzt, "patches")
+        if self.estimate is not None:
+            yield from self.estimate.references()
 
 
 class SampledAnalysis(ActuatedAnalysis):

@@ -208,10 +208,16 @@ def _placement(name: str, placed: Placed) -> Rows:
     """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
     over_path = placed.wanted.criterion == "voltage"
     pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
-    best, even = (f"{volts(value)} V" if over_path else f"{value:.4g}" for value in pair)
+    is_estimate = placed.wanted.criterion == "estimate"
+    best, even = (
+        f"{volts(value)} V" if over_path else f"{-1e6 * value:.4g} µm" if is_estimate else f"{value:.4g}"
+        for value in pair
+    )
     cells = {
         "on": placed.wanted.body,
-        "by": "voltage" if over_path else f"{placed.wanted.measure} reach",
+        "by": {"voltage": "voltage", "estimate": "deviation of the tip"}.get(
+            placed.wanted.criterion, f"{placed.wanted.measure} reach"
+        ),
         "optimum": best,
         "evenly spaced": even,
         "sets tried": f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),

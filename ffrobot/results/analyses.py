@@ -112,7 +112,7 @@ class AnalysisAccess(Datasets):
         return read_linear(self._file, analysis)
 
     def controller(self, analysis: str) -> SampledController:
-        """The controllers of a closed loop at its start, with the observer, as one linear system in discrete time.
+        """Return controllers of a closed-loop run at its start, with the observer, as one linear system of samples.
 
         Raises `InputError` where the analysis has none: no loop, or controllers that are not linear.
         """
@@ -124,7 +124,7 @@ class AnalysisAccess(Datasets):
         return read_controller(self._file, analysis)
 
     def state_spaces(self, analysis: str) -> tuple[StateSpace, ...]:
-        """The linear models of an analysis, or the controller of a loop. Raises `InputError` if it has neither."""
+        """Return linear models of an analysis, or the controller of a closed-loop run. Raises `InputError` if it has neither."""
         is_loop = self.has(f"{analysis}/control/controller")
         return (self.controller(analysis),) if is_loop else self.linear(analysis)
 

@@ -27,7 +27,6 @@ if TYPE_CHECKING:  # most scenes have none of these
 
 MATRICES = names_of("LinearModel")
 NAMES = ("state_names", "input_names", "output_names")
-PORTS = ("inputs", "outputs")
 LISTED = 3  # natural frequencies
 
 
@@ -166,8 +165,8 @@ def read_controller(file: h5py.File, analysis: str) -> SampledController:
 
     group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
     A, B, C, D = (np.asarray(group[key], dtype=float) for key in "ABCD")
-    states, names = tuple(f"state/{k}" for k in range(1, len(A) + 1)), (tuple(group.attrs[key]) for key in PORTS)
-    return SampledController(A, B, C, D, states, *names, sample_time=float(np.median(np.diff(time))))
+    states, step = tuple(f"state/{k}" for k in range(1, len(A) + 1)), float(np.median(np.diff(time)))
+    return SampledController(A, B, C, D, states, tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"]), step)
 
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:

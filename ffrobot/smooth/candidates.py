@@ -87,7 +87,7 @@ class _Search:
         self.robot, self.limits, self.step, self.tolerance = robot, limits, step, robot.tolerance
         self.sag, (self.times, self.values) = before.ride.sag, evened(before.recording).dense(step / 2)
         self.modes = modes_along(robot, before.ride)
-        self.of_links = modes_along(robot, before.ride, of_links=True) if robot.has_gears else []
+        self.of_links = modes_along(robot, before.ride, of_links=True) if robot.has_gears and robot.bends else []
         self.periods = [1 / f for f in before.frequencies.mean(axis=0)]
 
     def motions(self) -> Iterator[Motion]:
@@ -189,7 +189,7 @@ class _Search:
 def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
     """Residual vibration (m, peak to peak) of the worst posture, driven along the path."""
     driving = accelerations(path)
-    return max(float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in modes)
+    return max((float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in modes), default=0.0)
 
 
 def _between(at: Array, times: Array, values: Array) -> Array:

@@ -101,6 +101,7 @@ class Robot:
         check_point(self._prepared, self.point)
         self._gears = with_compliance(without_paths(self._prepared.model))
         self.has_gears, self._still = bool(self._gears.tree.gears), np.zeros(self._gears.tree.n_v)
+        self.bends = any(node.p_v.stop > node.p_v.start for node in self._gears.tree.nodes)
         self._frequency: float | None = None
 
     def modes(self, q: Array, *, of_links: bool = False) -> Modes:

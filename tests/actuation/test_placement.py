@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from patches_on_links import SCENE, layout, patches, planar_body
 from scipy.linalg import solve_continuous_lyapunov
 
+import ffrobot
 from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.placement import PatchableLink, locked_modes, place
 from ffrobot.actuation.control.records import Placement
@@ -102,3 +104,37 @@ def test_voltages_over_a_path(arm):
     two = placed(arm, 2, F_p, criterion="voltage", modes=1)
     assert two.best.centers == pytest.approx([0.025, 0.075])
     assert two.largest_voltage[0] < one.largest_voltage[0]
+
+
+def test_patches_as_sensors_by_the_deviation_of_the_estimated_tip(tmp_path):
+    """The value is the deviation that the filter of a closed loop has with its patch there, and the least of all."""
+    process, noise, T = {"force/arm.tip/y": 2.0}, 0.5, 1e-3
+    encoder = {"joint": "hub", "noise": 1e-5}
+    link = beam_link(0.6, rectangle(0.004, 0.02), 20, damping={"ratio": 0.005}, modes={"count": 3})
+    patch = {"body": "arm", "length": 0.06, "width": 0.02, "thickness": 0.5e-3, "modulus": 63e9, "d31": 110e-12}
+    patch |= {"structural": False, "allocation": "least-squares", "permittivity": 1.5e-8}
+    keys = {"name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "arm", "link": link}]}
+    keys["joint"] = [{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "motor": True}]
+    keys["trajectory"] = [{"name": "still", "joint": "hub", "value": "0"}]
+    estimate = {"modes": 2, "process": process | {"joint/hub": 0.1}, "noise": noise, "sample_time": T, "tip": "arm.tip"}
+    estimate["sensor"] = [encoder]
+    placement = {"body": "arm", "count": 1, "criterion": "estimate", "estimate": estimate, "spacing": 0.06}
+    search = {"name": "where", "kind": "placement", "placement": placement}
+    results = ffrobot.solve(make_scene(**keys, pzt=[patch | {"count": 1}], analysis=[search]))
+    best = results["where/placement/best/centers"][()]
+    observer = {"kind": "kalman", "modes": 2, "process": estimate["process"]}
+
+    def loop(centers):
+        sensors = [encoder, {"pzt": "arm", "noise": noise}]
+        analysis = [
+            {"name": "inverse", "kind": "pcid", "end": 0.01, "output_step": T},
+            {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": T, "tip": "arm.tip",
+             "observer": observer, "sensor": sensors},
+        ]  # fmt: skip
+        with_patch = [patch | {"centers": [float(x) for x in centers]}]
+        found = ffrobot.solve(make_scene(**keys, pzt=with_patch, analysis=analysis))
+        return float(np.sqrt(np.square(found["loop/control/estimate/points/arm.tip/sigma"][0]).sum()))
+
+    value = -results["where/placement/best/value"][()]
+    assert loop(best) == pytest.approx(value, rel=1e-6)
+    assert all(loop([x]) >= value * (1 - 1e-6) for x in results["where/placement/candidates"][()][::3])

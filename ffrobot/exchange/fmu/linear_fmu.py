@@ -59,16 +59,14 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, str, list[str], str]:
             )
         models, scene = results.state_spaces(name), results.scene
     if len(models) != 1:
-        times = f"{len(models)}, from t = {models[0].time:g} s to t = {models[-1].time:g} s"
         raise InputError(
-            f"{path}: {name}: expected a linear model of one instant for an FMU, found {times}; solve with one in"
-            " `times`"
+            f"{path}: {name}: expected a linear model of one instant, found {len(models)}; solve with one in `times`"
         )
     _check(path, name, models[0])
     model = models[0]
     if not len(model.A):  # C has no arrays without numbers
-        still = {"A": np.zeros((1, 1)), "B": np.zeros((1, model.B.shape[1])), "C": np.zeros((len(model.C), 1))}
-        model = replace(model, **still, state_names=("state/1",))
+        B, C = np.zeros((1, model.B.shape[1])), np.zeros((len(model.C), 1))
+        model = replace(model, A=np.zeros((1, 1)), B=B, C=C, state_names=("state/1",))
     unit = make_unit(str(scene["name"]), name, model, joint_units(scene))
     what = f"{name}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
     remark = "all values are deviations from the configuration that the model is about"
