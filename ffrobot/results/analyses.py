@@ -124,7 +124,7 @@ class AnalysisAccess(Datasets):
         return read_controller(self._file, analysis)
 
     def state_spaces(self, analysis: str) -> tuple[StateSpace, ...]:
-        """Return linear models of an analysis, or the controller of a closed-loop run. Raises `InputError` if it has neither."""
+        """Return linear models of an analysis, or the controller of a run. Raises `InputError` without either."""
         is_loop = self.has(f"{analysis}/control/controller")
         return (self.controller(analysis),) if is_loop else self.linear(analysis)
 
