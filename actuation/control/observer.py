@@ -107,22 +107,28 @@ def kalman(
     B = np.vstack([model.B, np.zeros((d, model.B.shape[1]))])
     felt = model.D[rows]
     plant = sampled(A, B[:, columns], T, delay, with_last=bool(felt.any()))
-    seen = np.zeros((len(rows), len(plant.A)))
+    sizes, at = np.array(list(record.process.values())), len(plant.A)
+    w = len(process) if felt[:, process].any() else 0  # loads that readings feel, the last ones, of unit variance
+    seen = np.zeros((len(rows), at + w))
     seen[:, :n], seen[:, n : n + d] = model.C[rows], felt[:, added]
     if felt.any():
         seen[:, n + d : n + d + len(columns)] = felt[:, columns]
+    seen[:, at:] = (felt[:, process] * sizes)[:, :w]
     A_w, B_w, C_w, D_w = filters(read, T)
-    none = np.zeros((len(plant.A), len(A_w)))
-    A = np.block([[plant.A, none], [B_w @ seen, A_w]])
+    A = np.block([
+        [plant.A, np.zeros((at, w + len(A_w)))], [np.zeros((w, at + w + len(A_w)))], [B_w @ seen, A_w]
+    ])  # fmt: skip
     C = np.hstack([D_w @ seen, C_w])
-    unknown = np.r_[: n + d, len(plant.A) : len(A)]  # commands on their way are known
-    pushed = zero_order_hold(model.A, model.B[:, process], T)[1] * list(record.process.values())
-    Q = np.zeros_like(A)
-    Q[:n, :n] = pushed @ pushed.T
+    unknown = np.r_[: n + d, at : len(A)]  # commands on their way are known
+    pushed = np.zeros((len(A), len(process)))
+    pushed[:n] = zero_order_hold(model.A, model.B[:, process], T)[1] * sizes
+    pushed[at : at + w] = np.eye(len(process))[:w]
+    Q = pushed @ pushed.T
     Q[range(n, n + d), range(n, n + d)] = np.square(list(record.disturbance.values())) * T
     R = np.array([s.sensor.deviation(T) ** 2 + s.sensor.resolution**2 / 12 for s in read])
     a, c, q = A[np.ix_(unknown, unknown)], C[:, unknown], Q[np.ix_(unknown, unknown)]
-    states = [*model.state_names, *record.disturbance, *(f"filter {k}" for k in range(1, len(A_w) + 1))]
+    states = [*model.state_names, *record.disturbance, *list(record.process)[:w]]
+    states += [f"filter {k}" for k in range(1, len(A_w) + 1)]
     P = _covariance(a, c, q, R, states)
     L = np.zeros((len(A), len(rows)))
     L[unknown] = np.linalg.solve(c @ P @ c.T + np.diag(R), c @ P).T
@@ -131,7 +137,7 @@ def kalman(
     E = np.zeros((len(estimated) + d, len(A)))
     E[: len(estimated), :n] = model.C[model.outputs(estimated)]
     E[len(estimated) :, n : n + d] = np.eye(d)
-    B = np.vstack([plant.B, np.zeros((len(A_w), len(columns)))])
+    B = np.vstack([plant.B, np.zeros((len(A) - at, len(columns)))])
     names = [*estimated, *(f"disturbance/{name}" for name in record.disturbance)]
     return Observer(A, B, C, L, np.zeros_like(L), E, covariance, tuple(names))
 

@@ -1,6 +1,7 @@
 """Observers and their sensors: closed forms, python-control, exact discrete models, statistics, what does not fit."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -123,6 +124,33 @@ def test_errors_are_as_large_as_their_covariance_says():
         error, ahead = x - estimate, estimate @ observer.A.T
         x = x @ Phi.T + rng.standard_normal((runs, 2)) * PUSH @ Gamma.T
     nees = np.einsum("ri,ij,rj->", error, np.linalg.inv(observer.covariance), error)
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], 4 * runs)
+    assert low < nees < high
+
+
+def test_accelerometers_feel_the_loads_that_push_the_robot():
+    """NEES as above: a reading D w + noise and the next state have the load w in common."""
+    plain, rng, runs = two_masses(0.3), np.random.default_rng(6), 500
+    rows = {"a/acceleration": 2, "b/acceleration": 3}
+    model = replace(
+        plain, C=np.vstack([plain.C, plain.A[2:]]), D=np.vstack([plain.D, plain.B[2:]]),
+        output_names=(*plain.output_names, *rows),
+    )  # fmt: skip
+    read = [
+        Signal(name, Sensor(joint="a", noise=s)) for name, s in zip(("sum", *rows), (NOISE[0], 0.1, 0.1), strict=True)
+    ]
+    record = KalmanObserver(kind="kalman", process=dict(zip(model.input_names, PUSH, strict=True)))
+    observer = kalman(record, model, read, model.output_names[2:6], ((), T, 0.0))
+    Phi, Gamma = zero_order_hold(model.A, model.B, T)
+    seen = [0, 6, 7]
+    x, last, ahead = np.zeros((runs, 4)), np.zeros((runs, 2)), np.zeros((runs, len(observer.A)))
+    for _ in range(300):
+        y = x @ model.C[seen].T + last @ model.D[seen].T + rng.standard_normal((runs, 3)) * (NOISE[0], 0.1, 0.1)
+        estimate = ahead + (y - ahead @ observer.C.T) @ observer.L.T
+        error, ahead = x - estimate[:, :4], estimate @ observer.A.T
+        last = rng.standard_normal((runs, 2)) * PUSH
+        x = x @ Phi.T + last @ Gamma.T
+    nees = np.einsum("ri,ij,rj->", error, np.linalg.inv(observer.covariance[:4, :4]), error)
     low, high = chi2.ppf([1e-3, 1 - 1e-3], 4 * runs)
     assert low < nees < high
 
