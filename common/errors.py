@@ -24,7 +24,7 @@ class InputError(FfrobotError):
 
 
 class SolveError(FfrobotError):
-    """An analysis could not be completed: the message tells where, why and what to try next."""
+    """An analysis could not be completed: the message states where, why and what to try next."""
 
     __module__ = "ffrobot"
     exit_code = 1
