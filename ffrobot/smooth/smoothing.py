@@ -112,9 +112,9 @@ def smooth_motion(
     Args:
         scene: a scene file; its analyses are not needed.
         path: CSV, JSON or YAML with a JointTrajectory, or a bag of ROS; None: the trajectories of the scene.
-        servo: position controllers of all joints or by joint: natural frequency in Hz, transfer function as
-            "NUMERATOR / DENOMINATOR" (highest power first, a "/ DELAY" in s may follow), or a CSV table of a measured
-            frequency response: frequency (Hz), magnitude, phase (degrees).
+        servo: position controllers of all joints or by joint: natural frequency (Hz), "NUMERATOR / DENOMINATOR", or a
+            CSV table. Polynomials have the highest power first; "/ DELAY" (s) may follow. The table is a measured
+            response: frequency (Hz), magnitude, phase (degrees).
         damping_ratio: of controllers given by a frequency.
         point: "BODY.POINT" whose vibration counts; None: the tool.
         settled: m, within which of its final place the point has to stay.
