@@ -16,7 +16,7 @@ from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.structs import struct
-from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions
+from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions, pace
 from ...mbs.linear.joint_conditions import robot_modes as modes_of
 from ...mbs.linear.linearisation import LinearMechanism
 
@@ -445,7 +445,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
     if b.shape[1] != len(c):
         raise InputError(f"zeros: expected as many inputs as outputs, found {b.shape[1]} and {len(c)}")
-    scale = max(float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0))), 1.0)
+    scale = pace(K, D) or 1.0
     s = scale * (0.1 + 0.1j)  # any that is no pole
     passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)
     weakest = np.linalg.svd(passed, compute_uv=False).min(initial=np.inf)

@@ -18,7 +18,6 @@ from ...common.structs import struct
 from .linearisation import LinearMechanism
 
 RIGID = 1e-6  # of the highest frequency, below which a mode counts as without stiffness: round-off of a double zero
-RIGID_POINT = 1e-15  # m/N, compliance of a kilometer of diamond: below it is round-off
 LOCKED, COMPLIANT = "locked", "compliant"
 DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows from others
 
@@ -32,7 +31,7 @@ class RobotModes:
     # largest entry real
     shape: ComplexArray
     motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
-    rounding: float  # 1/s, by which a double pole at 0 may be off: `RIGID` √max(‖K̂‖, ‖D̂‖)
+    rounding: float  # 1/s, by which a double pole at 0 may be off: `RIGID` times the `pace`
 
     @property
     def frequency(self) -> Array:
@@ -74,8 +73,12 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     Z = Z * (np.abs(largest) / largest) / np.linalg.norm(Z, axis=0)
     shape = (back @ Z).T
     motion = shape @ transformation.T
-    rounding = RIGID * float(np.sqrt(max(np.abs(K).max(initial=0.0), np.abs(D).max(initial=0.0))))
-    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), rounding)
+    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), RIGID * pace(K, D))
+
+
+def pace(K: Array, D: Array) -> float:
+    """The larger of √‖K̂‖ and ‖D̂‖, 1/s, of z̈ + D̂ ż + K̂ z = 0: about that of its fastest pole."""
+    return max(float(np.sqrt(np.linalg.norm(K, 2))), float(np.linalg.norm(D, 2))) if len(K) else 0.0
 
 
 def _pairs(poles: ComplexArray) -> Indices:
@@ -126,7 +129,7 @@ def translational_stiffness(compliance: Array) -> Stiffness | None:
         return None
     values, directions = np.linalg.eigh(C)
     diagonal = np.append(np.diag(C), values[-1])
-    stiffness = 1 / np.where(diagonal > RIGID_POINT, diagonal, np.nan)
+    stiffness = 1 / np.where(diagonal > RIGID**2 * diagonal.max(), diagonal, np.nan)
     *along, least = np.where(np.isnan(stiffness), np.inf, stiffness)
     return Stiffness(np.array(along), float(least), directions[:, -1])
 
@@ -162,7 +165,7 @@ def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> Complex
 def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
     N, K, D = free = free_coordinates(mechanism, condition)
     modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
-    compliance = {point: _compliance(K, mechanism.of_tool(point) @ N) for point in mechanism.points}
+    compliance = {point: _compliance(K, _moved(mechanism.of_tool(point), N)) for point in mechanism.points}
     return JointCondition(modes, compliance, free)
 
 
@@ -178,6 +181,12 @@ def free_directions(R: Array) -> Array:
     """Return orthonormal directions (f, m) z with R z = 0, of `R` (r, f), whose rows may be dependent."""
     sizes = np.linalg.norm(R, axis=1, keepdims=True)
     return null_space(R / np.where(sizes > 0.0, sizes, 1.0), DEPENDENT)
+
+
+def _moved(J: Array, N: Array) -> Array:
+    """J N, (k, m); 0 where its terms cancel but for round-off, as before the joints that are free."""
+    moved = J @ N
+    return np.where(np.abs(moved) > RIGID**2 * (np.abs(J) @ np.abs(N)), moved, 0.0)
 
 
 def _compliance(K: Array, J: Array) -> Array:

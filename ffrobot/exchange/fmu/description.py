@@ -162,7 +162,7 @@ def _experiment(model: StateSpace) -> dict[str, str]:
         return {"startTime": "0", "stopTime": "1", "stepSize": repr(model.step)}
     poles = np.linalg.eigvals(model.A)
     angular = np.abs(poles.imag)
-    vibrations = angular[angular > VIBRATION * max(np.abs(poles).max(), 1.0)]
+    vibrations = angular[angular > VIBRATION * np.abs(poles).max()]
     stop = float(f"{10 * 2 * np.pi / vibrations.min():.1g}") if len(vibrations) else 1.0
     return {"startTime": "0", "stopTime": f"{stop:g}", "stepSize": f"{stop / 1000:g}"}
 
