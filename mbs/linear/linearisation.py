@@ -23,11 +23,12 @@ from ...common.rotations import skew
 from ...common.structs import struct
 from ..model.gears import gear_matrices
 from ..model.known_motion import KnownStates, required_forces
-from ..model.model import Model, constraint_values
+from ..model.model import Model
 from ..model.motors import FrameShare, frame_share, turning_motors
 from ..model.nodes import Node
 from ..model.system import MultibodySystem
 from ..model.tree import CompliantGear
+from ..posture.posture import natural_gradients, natural_sizes, row_sizes
 from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
@@ -139,19 +140,20 @@ class LinearEquations:
         H = np.zeros((n_v, len(s)))
         H[s, np.arange(len(s))] = 1.0
         others = np.setdiff1d(np.arange(n_v), s)
-        C_v = constraint_values(self.model, state.q, np.array([t]))[1][0]
+        rows, sizes = row_sizes(self.model), natural_sizes(self.model)
+        (C_v,) = natural_gradients(self.model, state.q, np.array([t]), sizes)
         if not len(others):
             return H, np.zeros((0, len(C_v)))
-        sizes = np.linalg.svd(C_v[:, others], compute_uv=False)
-        if not sizes[-1] > DEPENDENT * sizes[0]:
+        values = np.linalg.svd(C_v[:, others], compute_uv=False)
+        if not values[-1] > DEPENDENT * values[0]:
             joints = ", ".join(name for name in self.names if not name.startswith("modal/"))
             raise SolveError(
                 f"{self.model.scene.path}: linear model at t = {t:g} s: {joints} do not determine the posture there (a"
                 " singular one)"
             )
-        determine = np.linalg.pinv(C_v[:, others])
-        H[others] = -determine @ C_v[:, s]
-        return H, determine
+        determine = sizes[others, None] * np.linalg.pinv(C_v[:, others])
+        H[others] = -determine @ C_v[:, s] / sizes[s]
+        return H, determine / rows
 
     def _inputs(self, H: Array, shares: Mapping[str, FrameShare], points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: a unit of each motor, and of forces on points along x, y, z."""
@@ -246,7 +248,7 @@ def _independent(model: Model, q: Array) -> Indices:
     modes = np.flatnonzero(~model.tree.joint_columns)
     motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
-    left = constraint_values(model, q[None], np.zeros(1))[1][0]
+    (left,) = natural_gradients(model, q[None], np.zeros(1), natural_sizes(model))
     size, free = np.abs(left).max(initial=0.0), []
     for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
         rank, order = 0, np.arange(len(group))

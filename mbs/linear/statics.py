@@ -23,7 +23,7 @@ from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.posture import joint_scales, robot_size, row_sizes, with_rates
+from ..posture.posture import natural_sizes, robot_size, row_sizes, with_rates
 from ..posture.start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
@@ -350,11 +350,3 @@ def static_shapes(
 def modal_sizes(bodies: Iterable[Body]) -> Array:
     """Return √J (n,) of the modes of all bodies: deflections of about their length."""
     return np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])
-
-
-def natural_sizes(model: Model) -> Array:
-    """Return natural sizes (n_v,): 1 rad or the robot's size for joints, √J for modes."""
-    sizes = joint_scales(model)
-    for node in model.tree.nodes:
-        sizes[node.p_v] = np.sqrt(node.body.largest_moment)
-    return sizes

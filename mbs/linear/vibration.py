@@ -16,9 +16,9 @@ from ...common.structs import struct
 from ..model.body import Body
 from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
-from ..model.model import Model, constraint_values, without_paths
+from ..model.model import Model, without_paths
 from ..model.system import MultibodySystem
-from ..posture.posture import solve_posture
+from ..posture.posture import natural_gradients, natural_sizes, solve_posture
 from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
@@ -49,14 +49,15 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     M⁻¹ is what the core says that forces do to accelerations where `unconstrained`. K are the stiffnesses of links and
     gears, D their damping and viscous friction; neither gravity nor dry friction.
     """
-    M = np.linalg.inv(unconstrained.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
-    C_v = constraint_values(model, q[None], np.array([t]))[1][0]
-    free = null_space(C_v, DEPENDENT)
+    still, sizes = np.zeros(model.tree.n_v), natural_sizes(model)
+    both = np.outer(sizes, sizes)
+    M = np.linalg.inv(unconstrained.derivatives(t, q, still, still).a_f / both)
+    free = null_space(natural_gradients(model, q[None], np.array([t]), sizes)[0], DEPENDENT)
     K, D = _springs(model, q)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
-    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
-    stiff = slice(len(squares) - strained(K, free), None)
-    omega, shape = np.sqrt(squares[stiff]), free @ L_inverse.T @ vectors[:, stiff]
+    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ (K * both) @ free @ L_inverse.T)
+    stiff = slice(len(squares) - strained(K * both, free), None)
+    omega, shape = np.sqrt(squares[stiff]), sizes[:, None] * (free @ L_inverse.T @ vectors[:, stiff])
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
     return Vibrations(as_floats(omega), as_floats(ratio), shape, K)
 
@@ -74,7 +75,7 @@ def _springs(model: Model, q: Array) -> tuple[Array, Array]:
 
 
 def strained(K: Array, free: Array) -> int:
-    """Return the number of independent motions in the columns of `free` (n, m) that strain the springs K (n, n).
+    """Return the number of motions in the columns of `free` (n, m), in natural sizes, that strain springs K (n, n).
 
     Each spring counts by its own size: a soft link beside a stiff one vibrates, however slowly.
     """

@@ -82,9 +82,9 @@ def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans 
     scales, now = joint_scales(model), np.array([t])
     if held is not None:
         scales[held] = 0.0
-    C_v = constraint_values(model, q[None], now)[1][0]
-    left = -constraint_rates(model, q[None], v[None], now)[0]
-    return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
+    (C_v,) = natural_gradients(model, q[None], now, scales)
+    left = -constraint_rates(model, q[None], v[None], now)[0] / row_sizes(model)
+    return State(q, v + scales * np.linalg.lstsq(C_v, left, rcond=1e-10)[0])
 
 
 def joint_scales(model: Model) -> Array:
@@ -95,6 +95,22 @@ def joint_scales(model: Model) -> Array:
         sizes = np.array([1.0 if unit == "rad" else length for unit in units])
         scales[node.v] = node.joint.state(sizes) if node.joint.units else sizes
     return scales
+
+
+def natural_sizes(model: Model) -> Array:
+    """Return natural sizes (n_v,): 1 rad or the robot's size for joints, √J for modes."""
+    sizes = joint_scales(model)
+    for node in model.tree.nodes:
+        sizes[node.p_v] = np.sqrt(node.body.largest_moment)
+    return sizes
+
+
+def natural_gradients(model: Model, q: Array, times: Array, sizes: Array) -> Array:
+    """Return C_v (T, rows, n_v) at q (T, n_q) and `times` (T,), rows in natural sizes and coordinates in `sizes`.
+
+    Its rank does not depend on units.
+    """
+    return constraint_values(model, q, times)[1] * sizes / row_sizes(model)[:, None]
 
 
 @struct
@@ -152,7 +168,7 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
     is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
         return 0, ()
-    C_v = constraint_values(model, q[None], now)[1][0] * joint_scales(model) / row_sizes(model)[:, None]
+    (C_v,) = natural_gradients(model, q[None], now, joint_scales(model))
     moving = _largest(mobilities(model, now, q[None])[0].free) > MOVES
     rows = C_v[~is_loop][:, model.tree.joint_columns]
     is_locked = (_largest(rows[:, moving]) <= MOVES) & (_largest(rows) > MOVES)

@@ -17,10 +17,10 @@ from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, SolveError
 from .. import _core
 from ..fields.waypoints import spline
-from ..model.model import Model, constraint_rates, constraint_values
+from ..model.model import Model, constraint_rates
 from ..model.motors import driven_mechanism
 from ..model.nodes import Node, coordinate_row
-from .posture import Mobility, joint_scales, mobility
+from .posture import Mobility, joint_scales, mobility, natural_gradients, row_sizes
 from .prescribed import joint_places, prescribed_motion
 from .start import undeformed_posture
 
@@ -100,8 +100,9 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
 
     def rates(t: float, way: Array) -> Array:
         at, now, q_dot = (q + way)[None], np.array([t]), np.zeros_like(q)
-        C_v = (constraint_values(model, at, now)[1][0] * scales)[:, model.tree.joint_columns]
-        least = -np.linalg.pinv(C_v, rcond=RANK) @ constraint_rates(model, at, rest, now)[0]
+        C_v = natural_gradients(model, at, now, scales)[0][:, model.tree.joint_columns]
+        left = constraint_rates(model, at, rest, now)[0] / row_sizes(model)
+        least = -np.linalg.pinv(C_v, rcond=RANK) @ left
         q_dot[places] = scales[model.tree.joint_columns] * least
         return q_dot
 
@@ -164,9 +165,9 @@ def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[
 
     Raises `SolveError` where no such joints tell it all along the path.
     """
-    scales, C_v = joint_scales(model), constraint_values(model, q, times)[1]
+    scales = joint_scales(model)
     joints = np.eye(len(scales))[:, scales > 0]
-    free = [joints @ null_space(of_one * scales @ joints, RANK) for of_one in C_v]
+    free = [joints @ null_space(C_v @ joints, RANK) for C_v in natural_gradients(model, q, times, scales)]
     single = [node for node in model.tree.nodes if len(node.joint.units) == 1]
     best: tuple[float, tuple[Node, ...]] = (0.0, ())
     for nodes in combinations(single, count):

@@ -16,6 +16,7 @@ from .posture import (
     MET,
     joint_scales,
     mobility,
+    natural_sizes,
     paths_by_bending,
     row_sizes,
     solve_posture,
@@ -25,6 +26,7 @@ from .posture import (
 from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
 
 LEAST = 1e-13  # of inertia, relative
+SAME = 1e-8  # of the largest rate
 AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
 
 
@@ -59,7 +61,7 @@ def undeformed_posture(model: Model) -> State:
     start = with_rates(model, q, v)
     if named.any():
         kept = with_rates(model, q, with_rates(model, q, v, held=named).v)
-        start = kept if np.allclose(kept.v[named], v[named]) else start
+        start = kept if np.allclose(kept.v[named], v[named], atol=SAME * np.abs(v[named]).max()) else start
     return _twisted_gears(model, start, relaxed_gears(model, start))
 
 
@@ -83,7 +85,8 @@ def check_turning(model: Model) -> None:
     slim = [name for name, J in rigid if np.linalg.eigvalsh(J)[0] <= ROUNDING * np.abs(J).max()]
     if not slim:
         return
-    M = mass_matrices(model, undeformed_posture(model).q[None])[0]
+    natural = natural_sizes(model)
+    M = mass_matrices(model, undeformed_posture(model).q[None])[0] * np.outer(natural, natural)
     sizes, least = np.diag(M), LEAST * np.abs(np.trace(M))
     for node in model.tree.nodes:
         if (sizes[node.v] <= least).any():

@@ -22,6 +22,7 @@ from ...fe_models.modal_body import ModalBody
 from ..model.body import Body, bent_section
 from ..model.kinematics import Motion
 from ..model.known_motion import mass_matrices
+from ..posture.posture import natural_sizes, row_sizes
 from ..run.record import Run
 from .motion import constraint_rows
 
@@ -38,7 +39,7 @@ class ModesInMotion(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Initial state of a run, with M (n_v, n_v), C_q (rows, n_v) and accelerations (n_v,) there.
+    """Initial state of a run in natural sizes: M (n_v, n_v), C_q (rows, n_v) and accelerations (n_v,) there.
 
     K (n_v,), D (n_v, n_v) and `late` (n_v,) of `mode_error`, s², are those of modal coordinates, and 0 of others.
     """
@@ -153,15 +154,16 @@ def start_of_motion(run: Run) -> Start:
         energy += run.q[:, node.p_q] ** 2 @ node.body.stiffness
         if node.body.attachment_modes and node.body.n_eigenmodes:
             late[node.p_v] = _late(node.body)
-    (M,) = mass_matrices(run.model, run.q[:1], float(run.time[0]))
+    (M,), sizes = mass_matrices(run.model, run.q[:1], float(run.time[0])), natural_sizes(run.model)
+    both = np.outer(sizes, sizes)
     duration = float(run.time[-1] - run.time[0])
     largest = float(energy.max(initial=0.0))
     return Start(
-        M=M,
-        C_q=constraint_rows(run)[1][0],
-        a=run.a[0],
-        stiffness=stiffness,
-        damping=damping,
+        M=M * both,
+        C_q=constraint_rows(run)[1][0] * sizes / row_sizes(run.model)[:, None],
+        a=run.a[0] / sizes,
+        stiffness=stiffness * sizes**2,
+        damping=damping * both,
         late=late,
         largest=largest,
         duration=duration,

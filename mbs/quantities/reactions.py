@@ -15,10 +15,9 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
-from ..linear.statics import natural_sizes
 from ..model.known_motion import MotionForces, Wrench, multiplier_forces
 from ..model.nodes import Node
-from ..posture.posture import SINGULAR, robot_size, row_sizes
+from ..posture.posture import SINGULAR, natural_sizes, robot_size, row_sizes
 from ..run.record import Run
 from ..scene.loads import OF_POINT
 from .motion import acting_forces, constraint_rows, places, system_of

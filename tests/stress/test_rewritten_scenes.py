@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from rewritten_scenes import TOLERANCE, differences, random_robot, solved, written_otherwise
+from rewritten_scenes import (
+    SYSTEMS,
+    TOLERANCE,
+    Written,
+    differences,
+    random_robot,
+    scaled,
+    solved,
+    written_otherwise,
+)
 
 
 @pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
@@ -14,3 +23,12 @@ def test_results_do_not_depend_on_how_a_robot_is_written(seed, number, tmp_path)
     for way, other in written_otherwise(tables, np.random.default_rng([seed, number])).items():
         off = differences(tables, original, other, solved(other.tables, tmp_path))
         assert {name: size for name, size in off.items() if size > TOLERANCE} == {}, (kind, way)
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+@pytest.mark.parametrize(("number", "system"), [(1, "cm, g, µs"), (3, "a robot of a size of 1e-5")])
+def test_results_do_not_depend_on_units(number, system, tmp_path):
+    _, tables = random_robot(57, number)
+    other = Written(scaled(tables, SYSTEMS[system]), units=SYSTEMS[system])
+    off = differences(tables, solved(tables, tmp_path), other, solved(other.tables, tmp_path))
+    assert {name: size for name, size in off.items() if size > TOLERANCE} == {}

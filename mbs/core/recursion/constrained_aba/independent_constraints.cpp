@@ -23,7 +23,7 @@ constexpr double immobile = 1e-24;
 // be as much larger as theirs.
 constexpr double slight = 1e-6;
 
-// Both in natural sizes of constraints
+// Both in natural sizes
 std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
   const Eigen::VectorXd own = S.diagonal();
   const double largest = own.maxCoeff(), smallest = immobile * squares.maxCoeff();
@@ -56,19 +56,15 @@ std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const d
   w.keep(all);
   if (count == 0)
     return all;
-  Eigen::VectorXd sizes = Eigen::VectorXd::Ones(count);
-  const double length = NaturalSizes(m).length();
-  for (Eigen::Index r = 0; r < count; ++r)
-    if (!is_moment(m, m.constraints[static_cast<std::size_t>(r)]))
-      sizes[r] = 1 / length;
-  const Eigen::VectorXd squares = (sizes.asDiagonal() * gradients(m, q, w)).rowwise().squaredNorm();
+  const NaturalSizes sizes(m);
+  const Eigen::VectorXd squares = sizes.of_gradients(gradients(m, q, w)).rowwise().squaredNorm();
   const std::vector<double> target(m.constraints.size(), 0.0);
   std::vector<double> a(static_cast<std::size_t>(m.n_v));
   w.keeps_delassus = true;
   accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_delassus = false;
   const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(w.delassus.data(), count, count);
-  w.keep(pivots(sizes.asDiagonal() * S * sizes.asDiagonal(), squares));
+  w.keep(pivots(sizes.of_rows().asDiagonal() * S * sizes.of_rows().asDiagonal(), squares));
   return w.active;
 }
 

@@ -76,6 +76,10 @@ template <class Space> double NaturalSizes<Space>::of_rates(const VectorXd &rate
   return largest(rate, of_row_) / (pace_ + largest(Eigen::Map<const VectorXd>(v, of_v_.size()), of_v_));
 }
 
+template <class Space> Eigen::MatrixXd NaturalSizes<Space>::of_gradients(const Eigen::MatrixXd &gradients) const {
+  return of_row_.asDiagonal() * gradients * of_v_.cwiseInverse().asDiagonal();
+}
+
 template bool is_moment(const Mechanism<Planar> &, const Constraint &);
 template bool is_moment(const Mechanism<Spatial> &, const Constraint &);
 template class NaturalSizes<Planar>;

@@ -26,6 +26,10 @@ public:
   double of_values(const Eigen::VectorXd &value, const double *q) const;
   double of_rates(const Eigen::VectorXd &rate, const double *v) const;
 
+  // Gradients (constraints, n_v) in natural sizes of constraints and of v, the same in all units.
+  Eigen::MatrixXd of_gradients(const Eigen::MatrixXd &gradients) const;
+  const Eigen::VectorXd &of_rows() const { return of_row_; } // (constraints), 1 over their sizes
+
 private:
   double by_gravity_ = 0, pace_ = 1;
   double length_ = 0;
