@@ -21,6 +21,7 @@ from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model, without_paths
+from ...mbs.posture.posture import robot_size
 from ...mbs.quantities.settling import commanded_rest
 from ...mbs.run.context import place_of
 from ...mbs.run.drive import Control, drive_robot
@@ -51,6 +52,7 @@ from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged, readings_at
 
 APART = 1e-6  # of a run, between two times of a spline
+INSTANT = 1e-6  # of the sample time, before and after which commands are read where they change
 
 
 class ClosedLoop(SampledAnalysis):
@@ -128,9 +130,10 @@ class ClosedLoop(SampledAnalysis):
             directions = strain_directions(plant, context.patches)
             arriving = AmplifiedLoop(loop, at_sample, samples, self.sample_time, amplifiers, directions, splits)
             samples, at_sample = arriving.times, arriving
-        held = partial(held_commands, samples=samples, delay=self.delay, loop=arriving)
-        before, inputs = partial(held, after=-1e-9), actuator_commands(plant, context.patches)
-        control = Control(inputs, arriving.first, samples, self.delay, at_sample, before)
+        instant, inputs = INSTANT * self.sample_time, actuator_commands(plant, context.patches)
+        held = partial(held_commands, samples=samples, delay=self.delay, loop=arriving, after=instant)
+        before = partial(held, after=-instant)
+        control = Control(inputs, arriving.first, samples, self.delay, at_sample, before, instant)
         disturbing = ((place_of(whole, str(load.point)), load.components) for load in self.disturbance)
         drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
         run = drive_robot(
@@ -283,7 +286,8 @@ def _followed(
     rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
     error = _position(model, run.q, tip) - place_at(run.time)
     completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
-    return LoopMotion(run.time, error, place_at, rates, held(run.time), completed, is_disturbed, quiet)
+    motion = run.time, error, place_at, rates, held(run.time)
+    return LoopMotion(*motion, completed, is_disturbed, quiet, robot_size(model))
 
 
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:

@@ -143,7 +143,8 @@ def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable:
     moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
     work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
     cut = np.sign(loop.commands[taken]) * loop.at_limits
-    asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0)
+    most = float(np.abs(loop.wanted[taken]).max(initial=0.0)) or 1.0
+    asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0) / most
     lowest, window = ringing(*resting(run.place_at, t), lowest)
     return Metrics(
         verdict=verdict_of(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
@@ -212,7 +213,7 @@ def between(times: Array, known: Array, values: Array) -> Array:
     return CubicSpline(known, values)(times)
 
 
-def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float = 1e-9) -> Array:
+def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float) -> Array:
     """Commands (T, inputs) that act at `times`, or `after` (s) them: accelerations are those before a change."""
     taken = slice(loop.taken)
     which = np.searchsorted(samples[taken] + delay, times + after, side="right")

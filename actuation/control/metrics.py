@@ -29,13 +29,13 @@ EXPLAINED = 0.25  # of what the cubic leaves: what is left beside a vibration, i
 PICKY = 8  # power of what fits leave, by which they count
 WATCHED = 400  # times of the last period, and of what is before it
 FINE = 4000  # intervals of a run, at which its place is read
-WINDOW = 0.1  # s at least, over which motion that a cubic follows is no vibration, for the verdict
+WINDOW = 100  # samples at least, over which motion that a cubic follows is no vibration, for the verdict
 GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its last
 AT_REST = 1e-6  # of the way to the last place
 AT_LIMITS = 0.05  # of the samples
 KEPT = 0.5  # of the vibration of a quarter, in its second half
 NEGLIGIBLE = 1e-3  # of the largest motion, or of the way
-ROUND_OFF = 1e-9  # m
+ROUND_OFF = 1e-9  # of the robot's size, and of the largest command
 CALM = ("stable", "not settled")
 
 DEFINITIONS = (
@@ -81,6 +81,7 @@ class LoopMotion:
     completed: bool  # whether it came to its end
     is_disturbed: bool  # by loads that the reference does not know
     quiet: float  # s, from which on the reference rests and loads stay
+    length: float  # m, the size of the robot
 
 
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
@@ -233,14 +234,14 @@ def verdict_of(
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
     decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without
     disturbance, or of the time in which nothing changes, or what is `asked` then, by samples (K,) in s and the largest
-    of their commands (K,); "unstable (linear)"; "not settled": in that time the tip does not come to rest, though
-    sensors are exact; else "stable".
+    of their commands (K,), of the largest of all; "unstable (linear)"; "not settled": in that time the tip does not
+    come to rest, though sensors are exact; else "stable".
     """
     if not run.completed:
         return "diverges"
     even = np.linspace(run.time[0], run.time[-1], len(run.time))
-    error, whole = _interpolated(even, run.time, run.error), float(np.ptp(even))
-    window = WINDOW if not lowest > 0.0 else max(WINDOW, min(PERIODS / lowest, whole / 4))
+    error, whole = _interpolated(even, run.time, run.error) / run.length, float(np.ptp(even))
+    window = min(max(WINDOW * whole / len(cut), PERIODS / lowest if lowest > 0.0 else 0.0), whole / 4)
     shaking = np.linalg.norm(error - _slow(even, error, window), axis=1)
     off = np.linalg.norm(error - error[-1], axis=1)
     still = even >= run.quiet
@@ -260,7 +261,7 @@ def verdict_of(
     period = 1.0 / lowest if lowest > 0.0 else 0.0
     tail = min(max(RESTING * whole, period), (even[-1] - run.quiet) / 2)
     moves, least = off[even >= even[-1] - tail].max(initial=0.0), np.linalg.norm(np.ptp(run.place_at(even), axis=0))
-    is_settled = moves <= max(SETTLED * off.max(initial=0.0), NEGLIGIBLE * least, ROUND_OFF)
+    is_settled = moves <= max(SETTLED * off.max(initial=0.0), NEGLIGIBLE * least / run.length, ROUND_OFF)
     return "stable" if is_settled or not is_quiet or not is_seen else "not settled"
 
 

@@ -52,7 +52,6 @@ Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
 
 POSTURES = 2001  # outputs whose postures are looked at where the core does not watch them
-INSTANT = 1e-9  # s, before and after which commands are read where they change: see `Control.held`
 
 STATUS = {
     _core.IntegrationStatus.completed: "completed",
@@ -74,6 +73,7 @@ class Control:
     # commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one
     controller: Callable[[int, float, Array], Array]
     held: Callable[[Array], Array]  # commands (T, inputs) that have acted up to times (T,), s, after a run
+    instant: float  # s, before and after which commands are read where they change
 
 
 def drive_robot(
@@ -201,7 +201,7 @@ def _between(
     """
     core, scene, _ = system.integrated
     if control is not None:
-        times, states, both = _with_both_sides(times, states, control.times + control.delay)
+        times, states, both = _with_both_sides(times, states, control.times + control.delay, control.instant)
         ends = np.append(ends, both)
 
     def at(rows: Indices) -> _core.TreeRun:
@@ -249,14 +249,14 @@ def _telling_motion(
     return thinned(replace(parts[0], **states))
 
 
-def _with_both_sides(times: Array, states: Array, changes: Array) -> tuple[Array, Array, Array]:
+def _with_both_sides(times: Array, states: Array, changes: Array, instant: float) -> tuple[Array, Array, Array]:
     """Times (k,), s, and states (k, n), with the instants before commands change, at `changes` (m,), s, beside these.
 
     And those on both sides of changes, by which means over time are, where they are not too many.
     """
-    near = np.clip(np.searchsorted(times, changes - INSTANT), 0, len(times) - 1)
-    near = near[np.abs(times[near] - changes) < INSTANT]
-    before = times[near] - 2.0 * INSTANT
+    near = np.clip(np.searchsorted(times, changes - instant), 0, len(times) - 1)
+    near = near[np.abs(times[near] - changes) < instant]
+    before = times[near] - 2.0 * instant
     every = np.append(times, before)
     order = np.argsort(every, kind="stable")
     both = np.append(before, times[near]) if len(near) < LOOKED_AT else before[:0]

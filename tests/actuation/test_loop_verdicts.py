@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rewritten_scenes import SYSTEMS, scaled
 from scipy.linalg import expm, solve_discrete_are
 
 import ffrobot
@@ -173,8 +174,8 @@ class Case:
         found = {"stable"} if moves < 0.06 or self.noise else set()
         return found | ({"not settled"} if moves > 0.04 else set())
 
-    def scene(self):
-        """For ffrobot."""
+    def tables(self):
+        """Of its scene."""
         body = {
             "mass": 1.0,
             "inertia": self.inertia,
@@ -198,11 +199,24 @@ class Case:
             "sensor": [{subject: "O", "noise": self.noise}, {subject: "O", "measure": "rate"}],
             "disturbance": [{"point": "w.rim", "y": f"where(t < 0.1, {self.blow}, 0)"}],
         }  # fmt: skip
-        return ffrobot.make_scene(
-            name="case", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}], joint=[joint],
-            trajectory=[{"name": "stand", subject: "O", "value": "0"}],
-            analysis=[{"name": "still", "kind": "pcid", "end": END, "output_step": 0.01}, loop],
-        )  # fmt: skip
+        return {
+            "name": "case", "gravity": [0.0, 0.0], "body": [{"name": "w", "rigid": body}], "joint": [joint],
+            "trajectory": [{"name": "stand", subject: "O", "value": "0"}],
+            "analysis": [{"name": "still", "kind": "pcid", "end": END, "output_step": 0.01}, loop],
+        }  # fmt: skip
+
+
+def about_loop(tables):
+    return ffrobot.solve(ffrobot.make_scene(**tables)).attributes("loop/control")
+
+
+@pytest.mark.parametrize("system", ["µm, mg, ms", "km, kt, h", "a robot of a size of 1e-5"])
+def test_verdicts_do_not_depend_on_units(system):
+    for seed in (0, 3, 7, 8):
+        tables = Case(seed).tables()
+        about, other = about_loop(tables), about_loop(scaled(tables, SYSTEMS[system]))
+        assert other["verdict"] == about["verdict"]
+        assert other["spectral_radius"] == pytest.approx(about["spectral_radius"], abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -210,6 +224,6 @@ class Case:
 )
 def test_verdicts_are_those_of_the_sampled_model_and_the_run(seed):
     case = Case(seed)
-    about = ffrobot.solve(case.scene()).attributes("loop/control")
+    about = about_loop(case.tables())
     assert about["spectral_radius"] == pytest.approx(case.radius(), abs=1e-5)
     assert about["verdict"] in case.expected()

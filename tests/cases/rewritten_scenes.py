@@ -36,7 +36,9 @@ KEYS = {  # the same of keys, by table where one name has two meanings
     "gravity": "m/s/s", "mass": "kg", "center": "m", "inertia": "m m kg", "points": "m", "at": "m",
     "youngs_modulus": "Pa", "density": "kg/m/m/m", "length": "m", "height": "m", "width": "m", "outer": "m",
     "inner": "m", "end": "s", "output_step": "s", "load.x": "N", "load.y": "N", "load.moment": "N m",
-    "trajectory.x": "m", "trajectory.y": "m", "trajectory.z": "m", "initial.guide": "m",
+    "trajectory.x": "m", "trajectory.y": "m", "trajectory.z": "m", "initial.guide": "m", "disturbance.y": "N",
+    "sample_time": "s", "delay": "s", "moment_limit": "N m", "proportional": "N m", "derivative": "N m s",
+    "integral": "N m/s", "rotor_inertia": "m m kg", "stiffness": "N m", "joint.damping": "N m s",
 }  # fmt: skip
 
 
@@ -176,7 +178,7 @@ def scaled(tables, units):
 
     def change(value, key, table):
         if isinstance(value, Mapping):
-            return {name: change(of, key if key == "points" else name, key) for name, of in value.items()}
+            return {name: change(of, key if key in KEYS else name, key) for name, of in value.items()}
         if isinstance(value, list):
             return [change(of, key, table) for of in value]
         unit = units.of(KEYS.get(f"{table}.{key}", KEYS.get(key, "")))
