@@ -27,6 +27,7 @@ from ..fields.functions import check_domain
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, path_errors, without_paths
+from ..posture.posture import robot_size
 from ..run.context import Context
 from ..run.integrators import Choice
 from ..run.record import ADVICE, Details, Prescription, Run, Statistics
@@ -45,7 +46,7 @@ INFINITE = (
     "where a zero of the modes passes through infinity: take another number of modes in the link files, or output ="
     ' "redefined"'
 )
-REST = 1e-9  # speed of a path at rest, relative to its mean speed
+REST = 1e-9  # speed of a path at rest, relative to its values over the time of the path
 
 
 @struct
@@ -83,10 +84,10 @@ def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> 
     """Raise `InputError` for a path that moves at one of the `ends` (s), where the robot has to be at rest."""
     for target in servo.targets():
         values = target.function.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
-        mean = float(np.ptp(values)) / analysis.end
+        largest = float(np.abs(values).max())
         for t in ends:
             rate = target.function(t)[1]
-            if abs(rate) > REST * max(mean, 1.0):
+            if abs(rate) * analysis.end > REST * largest:
                 raise InputError(
                     f'{servo.where}: trajectory "{target.owner}": {target.component}: expected'
                     f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
@@ -136,7 +137,7 @@ def cause_of(inversion: Inversion) -> str:
 FACTOR_STEP = 0.02  # of the search for the largest factor
 MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
 SINGULAR = 1e-13  # of M of the internal dynamics, scaled
-PATH_TOLERANCE = 1e-9  # m, rad: of a path that is left
+PATH_TOLERANCE = 1e-9  # rad, or sizes of the robot: of a path that is left
 
 
 class MotorsOnly(TimedAnalysis):
@@ -263,10 +264,10 @@ def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
     held = inversion.servo.model
     errors = {name: float(np.abs(off).max(initial=0.0)) for name, off in path_errors(held, run.time, run.q).items()}
     farthest = max(held.scene.trajectory, key=lambda path: errors[path.name])
-    if errors[farthest.name] <= PATH_TOLERANCE:
-        return ()
     joint = next((one for one in held.scene.joint if one.name == farthest.joint), None)
     turns = farthest.angle is not None if joint is None else joint.units == ("rad",)
+    if errors[farthest.name] <= PATH_TOLERANCE * (1.0 if turns else robot_size(held)):
+        return ()
     unit, scale = ("m or rad", 1) if farthest.orientation is not None else ("rad", 1) if turns else ("mm", 1e3)
     return (
         f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of trajectory"

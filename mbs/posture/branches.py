@@ -107,7 +107,7 @@ def _turn(q: Array, other: Array, columns: Indices) -> float:
     return float(np.abs(np.angle(np.exp(1j * (q[columns] - other[columns])))).max())
 
 
-NEAR = 1e-9  # m: joints at one place
+NEAR = 1e-9  # of the size of the robot: joints at one place
 MEETING = 1e-6  # of the size of the robot: axes that miss each other by less meet, and rad: that are parallel
 
 
@@ -222,16 +222,16 @@ def _cut_point(model: Model, body: str) -> str | None:
 
 def _above(model: Model, q: Array, node: Node) -> bool:
     """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
-    tree, places = model.tree, model.tree.places(q[None])
+    tree, places, near = model.tree, model.tree.places(q[None]), NEAR * robot_size(model)
 
     def place(section: Section) -> Array:
         return places.at(section).r[0]
 
     own, before, after = place(node.inner), node, node
-    while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=NEAR):
+    while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=near):
         before = tree.nodes[before.inner.body]
     start, end = place(before.inner), own
-    while np.allclose(end, own, atol=NEAR):
+    while np.allclose(end, own, atol=near):
         number = tree.index[after.body.name]
         outer = next((other for other in tree.nodes if other.inner.body == number), None)
         if outer is None:
@@ -243,5 +243,5 @@ def _above(model: Model, q: Array, node: Node) -> bool:
     down[: len(model.scene.gravity)] = model.scene.gravity
     if not down.any():
         down[1 if SPACES[model.scene.space].is_plane else 2] = -1.0
-    across = offset - chord * (offset @ chord) / max(float(chord @ chord), NEAR**2)
+    across = offset - chord * (offset @ chord) / max(float(chord @ chord), near**2)
     return bool(across @ down < 0.0)
