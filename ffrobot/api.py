@@ -54,7 +54,7 @@ def solve(
     from .results.solving import check_ended, solve_and_keep
     from .results.write import results_image
     from .run.watcher import Watcher
-    from .scene.load import load_scene
+    from .scene.load import MADE_IN_PYTHON, load_scene
     from .scene.scene import Scene
 
     if output is None and resume:
@@ -66,12 +66,13 @@ def solve(
         raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {wrong}")
     path, watcher = None if output is None else Path(output), watcher or Watcher()
     again = "" if path is None else "solve(…, resume=True)"
+    shown = Path(MADE_IN_PYTHON) if scene.path.name == MADE_IN_PYTHON else scene.path  # that one is in no folder
     solution = solve_and_keep(scene, path, watcher, again, resume=resume)
     if solution is not None:
         for name, result in solution.analyses.items():
             for text in result.warnings:
-                warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
-        check_ended(solution, watcher, again, scene.path)
+                warnings.warn(f'{shown}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
+        check_ended(solution, watcher, again, shown)
         if path is None:
             return Results.from_image(results_image(solution), scene.path)
     assert path is not None  # results that are complete are those of a file

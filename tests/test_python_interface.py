@@ -114,6 +114,16 @@ def test_mistakes_are_named_as_in_a_file(folder, changes, complaint):
     assert "<scene made in Python>: " in str(error.value)
 
 
+def test_warnings_name_no_folder_of_a_scene_without_a_file(folder):
+    with pytest.warns(ffrobot.FfrobotWarning) as given:
+        ffrobot.solve(
+            swing(
+                folder, analysis=[{"name": "rough", "kind": "fcid", "shape": "zero", "end": 0.01, "output_step": 0.001}]
+            )
+        )
+    assert all(str(each.message).startswith('<scene made in Python>: analysis "rough": ') for each in given)
+
+
 def test_run_that_stops_early_keeps_its_file(folder, tmp_path):
     few = {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001, "max_steps": 3}
     with pytest.raises(ffrobot.SolveError, match="raise max_steps"):
