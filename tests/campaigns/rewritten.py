@@ -1,6 +1,6 @@
 """Random robots in 3D written otherwise: turned, in a mirror, renamed, split, in other units. Results have to agree.
 
-    python tests/campaigns/rewritten.py [--count 100] [--seed 57] [--record]
+    python tests/campaigns/rewritten.py [--count 100] [--seed 57] [--first 0] [--record]
 
 Every dataset counts but round-off (constraints) and what has a size or an order of its own (mode shapes).
 A line for each that differs by more than the tolerance.
@@ -20,10 +20,10 @@ from rewritten_scenes import TOLERANCE, differences, random_robot, solved, writt
 
 
 def main():
-    asked = options(__doc__, count=100, seed=57).parse_args()
+    asked = options(__doc__, count=100, seed=57, first=0).parse_args()
     warnings.simplefilter("ignore")
     tried, differ, most, datasets = Counter(), Counter(), 0.0, 0
-    for number in range(asked.count):
+    for number in range(asked.first, asked.first + asked.count):
         kind, tables = random_robot(asked.seed, number)
         with tempfile.TemporaryDirectory() as folder:
             original = solved(tables, Path(folder))
