@@ -1,5 +1,6 @@
 """`import ffrobot`: what the command line does, in a few lines of Python."""
 
+import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from beam_links import beam_link, tube
 import ffrobot
 from ffrobot.cli import cli
 from ffrobot.present import console
+from ffrobot.run.watcher import Watcher
 
 LINK = beam_link(0.6, tube(0.02, 0.016), 10, name="arm", modes={"count": 3, "family": "in-plane-bending"})
 KEYS = {"time", "bodies/arm/angle", "points/arm.tip/position[0]", "joints/shoulder/moment", "energy/kinetic"}
@@ -112,6 +114,22 @@ def test_mistakes_are_named_as_in_a_file(folder, changes, complaint):
     with pytest.raises(ffrobot.InputError, match=complaint) as error:
         swing(folder, **changes)
     assert "<scene made in Python>: " in str(error.value)
+
+
+class Stopping(Watcher):
+    """Ctrl-C comes in the first analysis, which is over at once."""
+
+    def stage(self, title):
+        if title == 'analysis "first"':
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_a_signal_between_analyses_does_not_leave_the_others_out_in_silence(folder, tmp_path):
+    two = [{"name": "first", "kind": "static"}, {"name": "second", "kind": "static"}]
+    with pytest.raises(ffrobot.SolveError, match="stopped on request before all analyses"):
+        ffrobot.solve(swing(folder, analysis=two), tmp_path / "r.h5", watcher=Stopping())
+    with ffrobot.Results(tmp_path / "r.h5") as results:
+        assert results.attributes("first")["status"] == "completed"
 
 
 def test_warnings_name_no_folder_of_a_scene_without_a_file(folder):

@@ -87,7 +87,7 @@ class Display(Watcher):
 
     def stopping(self, number: int) -> None:
         """Announce at once that the run is stopping, since evaluating and writing may take a while."""
-        self.signal = number
+        super().stopping(number)
         # not by way of Python's streams, which the signal may have found in the middle of something
         os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
 

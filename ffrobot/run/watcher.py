@@ -26,6 +26,7 @@ class Watcher:
 
     def stopping(self, number: int) -> None:
         """Signal `number` requests an end: computed results are kept, unless another signal follows."""
+        self.signal = number
 
 
 class Interruption:
