@@ -98,21 +98,26 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
         return q[None]
     scales, places, rest = joint_scales(model), joint_places(model), np.zeros((1, model.tree.n_v))
 
+    def ends_at(t: float) -> SolveError:
+        return SolveError(
+            f"{model.scene.path}: redundancy: the motion of least size ends at t = {t:.6g} s: the joints cannot follow"
+            " the path there; start in another posture, or prescribe a joint by a trajectory"
+        )
+
     def rates(t: float, way: Array) -> Array:
         at, now, q_dot = (q + way)[None], np.array([t]), np.zeros_like(q)
         C_v = natural_gradients(model, at, now, scales)[0][:, model.tree.joint_columns]
         left = constraint_rates(model, at, rest, now)[0] / row_sizes(model)
         least = -np.linalg.pinv(C_v, rcond=RANK) @ left
+        if np.abs(C_v @ least + left).max() > RANK * np.abs(left).max():
+            raise ends_at(t)
         q_dot[places] = scales[model.tree.joint_columns] * least
         return q_dot
 
     run = solve_ivp(rates, (0.0, float(times[-1])), 0 * q, "DOP853", times, rtol=TOLERANCE, atol=TOLERANCE)
     if run.success:
         return q + run.y.T
-    raise SolveError(
-        f"{model.scene.path}: redundancy: the motion of least size ends at t = {run.t[-1]:.6g} s: the joints cannot"
-        " follow the path there; start in another posture, or prescribe a joint by a trajectory"
-    )
+    raise ends_at(run.t[-1])
 
 
 def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -> Array:

@@ -1,5 +1,7 @@
 """Arms with seven joints under six components: what settles the freedom left, and what is said where nothing does."""
 
+import re
+
 import numpy as np
 import pytest
 import scenes_in_3d
@@ -149,6 +151,25 @@ def test_flexible_arm_on_a_turntable_follows_its_path_and_comes_back(tmp_path, c
         moments = [found[f"inverse/joints/{each['name']}/moment"] for each in tables["joint"]]
         assert np.abs(found[f"inverse/joints/{joint}/moment"]).max() > 1e-3
         assert np.all(np.isfinite(moments))
+
+
+@pytest.mark.parametrize("criterion", ["least-motion", "least-torque"])
+def test_a_path_out_of_reach_ends_where_the_arm_is_straight(criterion):
+    """Three bars of 1.2 m in all; the search went on without end."""
+    names = ["ground", "a", "b", "c"]
+    bars = [rigid(name, 1.0, [1e-3, 0.02, 0.02], [0.2, 0.0, 0.0], tip=[0.4, 0.0, 0.0]) for name in names[1:]]
+    ends = ["ground", "a.tip", "b.tip"]
+    joints = [revolute(f"j{k}", ends[k], f"{names[k + 1]}.root", [0.0, 0.0, 1.0]) for k in range(3)]
+    scene = ffrobot.make_scene(
+        name="edge", space="spatial", gravity=[0.0, 0.0, 0.0], body=bars, joint=joints, redundancy=criterion,
+        initial={"joints": {"j0": 0.8, "j1": -1.0, "j2": -0.6}},
+        trajectory=[{"name": "line", "point": "c.tip", "x": "0.7 + 0.6*t", "y": "0.1"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
+    )  # fmt: skip
+    with pytest.raises(ffrobot.SolveError, match="the joints cannot follow the path there") as error:
+        ffrobot.solve(scene)
+    reached = (np.sqrt(1.2**2 - 0.1**2) - 0.7) / 0.6
+    assert float(re.search(r"at t = ([\d.]+) s", str(error.value))[1]) == pytest.approx(reached, abs=1e-6)
 
 
 def test_keys_that_settle_nothing_are_refused(tmp_path):
