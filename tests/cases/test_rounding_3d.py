@@ -175,7 +175,7 @@ def test_loads_that_motors_bear(space, rate, load):
 
 @pytest.mark.parametrize("links", [1, 5])
 def test_many_modes_at_the_default_tolerance(links):
-    """Steps of order 5: a hundredth of the tolerance takes 2.5 times as many, where it took 20 times (five links: 6)."""
+    """Steps of order 5: a hundredth of the tolerance takes 2.5 times as many, where it took 6 and 20 times."""
     link = beam_link(0.3, tube(0.02, 0.016), 40, modes={"count": 20, "family": "in-plane-bending"})
     path = "0.5*(10*t**3 - 15*t**4 + 6*t**5)"
     keys = {"damping": {"ratio": 0.01}}
