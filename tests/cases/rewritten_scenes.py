@@ -214,7 +214,7 @@ def differences(tables, original, other, results):
     """Largest difference of each dataset of the original to the one written otherwise, in parts of its largest value.
 
     Those of all bodies, points, joints and paths count together. Modal forces count in parts of what bending takes,
-    too: where motors can do all there are none but round-off.
+    too: where motors can do all there are none but round-off; those of motors in parts of what their joints bear.
     """
     units = {joint["name"]: "m" if joint["type"] == "prismatic" else "rad" for joint in tables["joint"]}
     is_mirrored = np.linalg.det(other.Q) < 0
@@ -228,6 +228,9 @@ def differences(tables, original, other, results):
         if name.endswith("/modal"):
             kind = f"{kind}_force"
             largest[kind] = max(largest.get(kind, 0.0), stiffness * size)
+        if name.endswith("/reaction_moment"):
+            for of_motors in (kind.replace("reaction_", ""), f"{name.partition('/')[0]}/trajectories/*/force"):
+                largest[of_motors] = max(largest.get(of_motors, 0.0), size)
     for name, values in original.items():
         analysis, _, dataset = name.partition("/")
         if matches(dataset, ROUND_OFF + SHAPES):
