@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from ..bench import OF_A_SCENE
-from ..present.logs import FILE, logging_options, python_option
-from .options import POSITIVE, protect
+from ..present.logs import logging_options, python_option
+from .options import POSITIVE, output_option, protect, scene_argument
 
 
 def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
@@ -25,8 +25,8 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 
 
 @click.command()
-@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder [SCENE.bench next to the scene].")
+@scene_argument
+@output_option("DIR", "Folder [SCENE.bench next to the scene].")
 @click.option("--analysis", metavar="NAME", help="Analysis of the scene [the first that integrates].")
 @click.option("--integrators", metavar="A,B", callback=_texts, help="Integrators [all, and auto].")
 @click.option("--tolerances", metavar="T,T", callback=_numbers, help="Tolerances [1e-2 … 1e-7].")

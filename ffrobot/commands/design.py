@@ -13,8 +13,8 @@ import click
 
 from ..common.errors import InputError, SolveError
 from ..design import studies
-from ..present.logs import FILE, logging_options, python_option, together
-from .options import F, options_of, protect, runs_options
+from ..present.logs import logging_options, python_option, together
+from .options import F, options_of, protect, runs_options, scene_argument
 
 if TYPE_CHECKING:
     from ..design.finding import Finding
@@ -27,7 +27,7 @@ def study_options(folder: str, figures: str) -> Callable[[F], F]:
         python_option,
         runs_options(folder),
         click.option("--figures/--no-figures", default=True, show_default=True, help=figures),
-        click.argument("scene_file", metavar="SCENE.toml", type=FILE),
+        scene_argument,
     )
 
 

@@ -10,19 +10,12 @@ import click
 
 from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
-from .options import POSITIVE, protect
+from .options import POSITIVE, output_option, protect
 
 
 @click.command(name="import")
 @click.argument("file", metavar="ROBOT.urdf|BODY|MOTION", type=FILE)
-@click.option(
-    "-o",
-    "--output",
-    metavar="DIR|BODY.h5|PATH.csv",
-    type=FILE,
-    required=True,
-    help="Folder of the scene; file of a body or of waypoints.",
-)
+@output_option("DIR|BODY.h5|PATH.csv", "Folder of the scene; file of a body or of waypoints.", required=True)
 @click.option(
     "--flexible", metavar="LINK=FILE.toml", multiple=True, help="Flexible link with its link file; repeatable."
 )
@@ -147,7 +140,7 @@ ELSEWHERE = {
     type=click.Choice(["motor", "joint"]),
     help="Side of compliant gears whose positions a JointTrajectory has [motor].",
 )
-@click.option("-o", "--output", metavar="FILE", type=FILE, help="Output file [next to the input, by analysis].")
+@output_option("FILE", "Output file [next to the input, by analysis].")
 @click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
 def export(

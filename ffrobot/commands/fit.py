@@ -8,7 +8,7 @@ from typing import Literal
 import click
 
 from ..present.logs import FILE, logging_options, python_option
-from .options import protect
+from .options import output_option, protect
 
 
 @click.command()
@@ -16,7 +16,7 @@ from .options import protect
 @click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table with mode, frequency (Hz), …")
 @click.option("--vary", metavar="KEY,KEY …", multiple=True, required=True, help="Keys to fit; repeatable.")
 @click.option("--motors", type=click.Choice(["free", "held"]), help="Motors of a robot during the measurement [free].")
-@click.option("-o", "--output", metavar="FILE.toml", type=FILE, help="Output file [FILE.fitted.toml].")
+@output_option("FILE.toml", "Output file [FILE.fitted.toml].")
 @click.option("--force", is_flag=True, help="Replacement of files of an earlier fit.")
 @python_option
 @logging_options

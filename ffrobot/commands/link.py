@@ -11,7 +11,7 @@ from ..common.errors import InputError
 from ..common.files import check_new_file, write_atomically
 from ..common.parallel import is_first
 from ..present.logs import FILE, logging_options
-from .options import POSITIVE, protect
+from .options import POSITIVE, output_option, protect
 
 if TYPE_CHECKING:
     from ..mesh.inspection import Unit
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("link_file", metavar="LINK.toml|PART", type=FILE)
-@click.option(
-    "-o", "--output", metavar="BODY.h5|DRAFT.toml", type=FILE, help="Output file [LINK.h5 next to the input]."
-)
+@output_option("BODY.h5|DRAFT.toml", "Output file [LINK.h5 next to the input].")
 @click.option("--force", is_flag=True, help="Computation even if the file is up to date.")
 @click.option(
     "--inspect",

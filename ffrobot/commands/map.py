@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from ..common.errors import InputError
-from ..present.logs import FILE, logging_options, python_option
-from .options import processes_option, protect
+from ..present.logs import logging_options, python_option
+from .options import output_option, processes_option, protect, scene_argument
 
 if TYPE_CHECKING:
     from ..common.arrays import Array
 
 
 @click.command("map")
-@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@scene_argument
 @click.option("--over", metavar="NAME=VALUES", multiple=True, required=True, help="Axis of the grid; repeatable.")
 @click.option(
     "--point", metavar="BODY.POINT", help="Tool or point.  [default: that of the path, a tool, or of the last body]"
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 )
 @click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
 @processes_option("Number of parallel processes.")
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the map [SCENE.map next to the input].")
+@output_option("DIR", "Folder of the map [SCENE.map next to the input].")
 @python_option
 @logging_options
 def map_(

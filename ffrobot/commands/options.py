@@ -18,6 +18,12 @@ from ..present.logs import FILE, together
 F = TypeVar("F", bound=Callable[..., object])
 
 POSITIVE = FiniteRange(0.0, min_open=True)
+scene_argument = click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+
+
+def output_option(metavar: str, text: str, *, required: bool = False) -> Callable[[F], F]:
+    """Decorator: add option `-o`, the file or folder that is written; `text`: its help."""
+    return click.option("-o", "--output", metavar=metavar, type=FILE, required=required, help=text)
 
 
 def processes_option(text: str) -> Callable[[F], F]:
@@ -35,7 +41,7 @@ def processes_option(text: str) -> Callable[[F], F]:
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
     """Decorator: add `-j`, `--retry` and `-o` (default `folder`); `of`: help text on the content of that folder."""
     return together(
-        click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} next to the input]."),
+        output_option("DIR", f"{of} [{folder} next to the input]."),
         click.option("--retry", is_flag=True, help="Repetition of failed runs."),
         processes_option("Number of parallel runs."),
     )

@@ -12,6 +12,7 @@ from click.core import ParameterSource
 from ..common.errors import InputError
 from ..design.studies import FiniteRange
 from ..present.logs import FILE, together
+from .options import output_option
 
 MOST = 100_000  # frames of a view
 
@@ -28,7 +29,7 @@ movie_options = together(
 
 @click.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
+@output_option("DIR", "Folder for the figures; FILE.figures if absent.")
 @click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several formats [png,pdf].")
 @click.option(
     "--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*", or "*"; repeatable.'
@@ -60,7 +61,7 @@ def plot(
 
 @click.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
+@output_option("DIR", "Folder for the files; FILE.view if absent.")
 @click.option(
     "--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Largest number of time steps [201]."
 )
@@ -96,9 +97,7 @@ def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
 
 @click.command()
 @click.argument("results_files", metavar="RESULTS.h5|FOLDER …", nargs=-1, required=True, type=FILE)
-@click.option(
-    "-o", "--output", metavar="FILE.html", type=FILE, help="Output file [RESULTS.html or FOLDER.html, of the first]."
-)
+@output_option("FILE.html", "Output file [RESULTS.html or FOLDER.html, of the first].")
 def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     """Write one self-contained HTML page: motion, histories, modes, tables.
 

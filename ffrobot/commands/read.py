@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..present.logs import FILE, logging_options, python_option
-from .options import protect
+from .options import output_option, protect, scene_argument
 
 
 @click.command()
@@ -44,7 +44,7 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
 @click.command()
 @click.argument("results_file", metavar="RESULTS.h5", type=FILE)
 @click.option("--analysis", metavar="NAME", help="Analysis [the first linear one].")
-@click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Output file [RESULTS.npz].")
+@output_option("FILE.npz|FILE.mat", "Output file [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
     from ..common.hdf5 import reading
@@ -57,7 +57,7 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 
 
 @click.command()
-@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@scene_argument
 @python_option
 @logging_options
 def pose(scene_file: Path) -> None:

@@ -8,11 +8,11 @@ import click
 
 from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
-from .options import POSITIVE, protect
+from .options import POSITIVE, output_option, protect, scene_argument
 
 
 @click.command()
-@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@scene_argument
 @click.option("--path", "motion", metavar="MOTION", type=FILE, help="Recorded motion [trajectories of the scene].")
 @click.option(
     "--servo",
@@ -33,12 +33,8 @@ from .options import POSITIVE, protect
 @click.option("--jerk", metavar="LIMIT", type=POSITIVE, help="Limit of all joints (rad/s³, m/s³).")
 @click.option("--degrees", is_flag=True, help="Angles of the file are in degrees.")
 @click.option("--rate", metavar="HZ", type=POSITIVE, default=125.0, show_default=True, help="Rate of new set points.")
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT.json|.csv|.rosbag2",
-    type=FILE,
-    help="New motion, with OUT.png and OUT.report.html [SCENE.smooth.json next to the input].",
+@output_option(
+    "OUT.json|.csv|.rosbag2", "New motion, with OUT.png and OUT.report.html [SCENE.smooth.json next to the input]."
 )
 @click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options

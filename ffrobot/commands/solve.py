@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..present.logs import FILE, VERBOSE, logging_options, python_option
+from ..present.logs import VERBOSE, logging_options, python_option
+from .options import output_option, scene_argument
 
 if TYPE_CHECKING:
     from ..run.solution import Solution
 
 
 @click.command()
-@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
-@click.option(
-    "-o", "--output", metavar="RESULTS.h5", type=FILE, help="Output file [SCENE.results.h5 next to the input]."
-)
+@scene_argument
+@output_option("RESULTS.h5", "Output file [SCENE.results.h5 next to the input].")
 @click.option("--resume", is_flag=True, help="Resume a stopped run from its results file.")
 @click.option("--robust", is_flag=True, help="State what remains of tracking and motors-only motions under deviations.")
 @click.option("--strict", is_flag=True, help="Exit code 1 if there is a warning; results are written nevertheless.")

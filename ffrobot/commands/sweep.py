@@ -7,14 +7,14 @@ from pathlib import Path
 import click
 
 from ..common.parallel import is_first, on_first
-from ..present.logs import FILE, logging_options, python_option
-from .options import protect, runs_options
+from ..present.logs import logging_options, python_option
+from .options import protect, runs_options, scene_argument
 
 MOST = 100_000  # runs
 
 
 @click.command()
-@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@scene_argument
 @click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="Key with its values; repeatable.")
 @click.option(
     "--sample", metavar="N", type=click.IntRange(1, MOST), help="N points of a Latin hypercube, not the full grid."
