@@ -102,7 +102,7 @@ def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices)
 
 
 def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> Unsupplied:
-    """Add the shift of points by unmet modal forces r (T, n); `point` becomes the one with the largest error."""
+    """Add the shift (m) of points by unmet modal forces r (T, n), N/√kg; `point`: the one with the largest error."""
     shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(run, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
     kept, step = shift[point], max(1, len(run.time) // ROWS)
@@ -382,7 +382,7 @@ def find_unmet(
     *,
     limited: bool,
 ) -> dict[str, Array]:
-    """Return unmet modal forces (T, n) by link, at required voltages or at those within limits."""
+    """Return unmet modal forces (T, n), N/√kg, by link, at required voltages or at those within limits."""
     found = {}
     for name, link in links.items():
         found[name] = link.F_p

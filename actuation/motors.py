@@ -166,7 +166,7 @@ def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, e
 
 
 def first_time(time: Array, beyond: Booleans) -> Array:
-    """The first of the times (T,) at which each column of `beyond` (T, k) holds; NaN where it never does."""
+    """The first of the times (T,), s, at which each column of `beyond` (T, k) holds; NaN where it never does."""
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 

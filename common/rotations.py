@@ -105,7 +105,7 @@ def quaternions(C: Array) -> Array:
 
 
 def logarithm(C: Array) -> Array:
-    """The rotation vectors (…, 3) of matrices, of length π at most."""
+    """The rotation vectors (…, 3), rad, of matrices (…, 3, 3), of length π at most."""
     e = quaternions(C)
     size = np.linalg.norm(e[..., 1:], axis=-1)
     angle = 2 * np.arctan2(size, e[..., 0])
@@ -114,7 +114,7 @@ def logarithm(C: Array) -> Array:
 
 
 def about(axis: int, angles: Array | float) -> Array:
-    """Rotations (…, 3, 3) about coordinate axis 0, 1 or 2 by `angles` (…)."""
+    """Rotation matrices (…, 3, 3) about coordinate axis 0, 1 or 2 by `angles` (…), rad."""
     cosine, sine = np.cos(angles), np.sin(angles)
     found = np.zeros((*np.shape(angles), 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3

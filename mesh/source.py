@@ -80,7 +80,7 @@ class MeshBlocks:
             self.facets[name].append(corners[members])
 
     def mesh(self, points: Array, point_groups: Mapping[str, Integers], remarks: Iterable[str] = ()) -> RawMesh:
-        """Make the mesh of the collected elements on points (p, 3)."""
+        """Make the mesh of the collected elements on points (p, 3), lengths as in the file."""
         regions = {name: np.concatenate(members) for name, members in self.regions.items()}
         groups = regions, self.facets, point_groups
         return RawMesh(points, self.blocks, *groups, self.surfaces, self.lines, tuple(remarks))

@@ -238,7 +238,7 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
 
 
 def joint_mobility(setup: Setup) -> Array:
-    """Return (motors,) acceleration per torque of each joint at the start, links rigid, the other joints free."""
+    """Return acceleration per torque (motors,), 1/(kg·m²) or 1/kg, at the start; links rigid, other joints free."""
     rest = np.zeros(len(setup.robot.motors))
     if not setup.robot.motors_fit:
         return rest

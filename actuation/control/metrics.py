@@ -101,7 +101,7 @@ def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
 
 
 def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Array]:
-    """Times (T,) over those of a run, and the place of its tip there (T, d): for `ringing`."""
+    """Times (T,), s, after the paths of a run, and the place (T, d), m, of its tip there: for `ringing`."""
     even = np.linspace(time[0], time[-1], FINE + 1)
     return even, place_at(even)
 

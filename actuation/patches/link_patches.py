@@ -78,7 +78,7 @@ class LinkPatches:
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return voltages by layout for modal forces F_p (T, n); `unmet` is what all layouts leave."""
+        """Return voltages (T, k), V, by layout for modal forces F_p (T, n), N/√kg; `unmet`: what all layouts leave."""
         found = solve_voltages(self.reach, self.reached.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
@@ -105,7 +105,7 @@ class LinkPatches:
 
     @property
     def per_volt(self) -> dict[str, Array]:
-        """Modal forces per volt (n, k) by body, on the modes of its file."""
+        """Modal forces per volt (n, k), N/(√kg·V), by body, on the modes of its file."""
         return {name: of.Phi_V for name, of in self.bodies.items()}
 
     @property
@@ -141,7 +141,7 @@ class LinkPatches:
         return slice(end - len(self.arrays[layout].edges), end)
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
-        """Return modal forces (T, n) that voltages (T, k) of all patches leave of F_p (T, n)."""
+        """Return modal forces (T, n), N/√kg, that voltages (T, k), V, of all patches leave of F_p (T, n)."""
         left: Array = F_p - voltages @ self.Phi_V.T
         return left if self.on_kept is None else left @ self.on_kept
 

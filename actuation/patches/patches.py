@@ -179,7 +179,7 @@ class Voltages:
 
     @property
     def residual(self) -> Array:
-        """Norm (T,) of the modal force on served modes that `within_limit` leaves unmet."""
+        """Norm (T,), N/√kg, of the modal force on served modes that `within_limit` leaves unmet."""
         return np.linalg.norm(self.unmet[:, : self.served], axis=1)
 
     @property
@@ -214,7 +214,7 @@ def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
 
 
 def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
-    """Voltages that produce the modal forces F_p (T, n), or as much of them as they can."""
+    """Find voltages (T, k), V, that produce the modal forces F_p (T, n), N/√kg, as nearly as possible."""
     F_p = np.ascontiguousarray(F_p)
     required = F_p @ voltage_gain(patches).T
     within_limit = allocation(patches, limited=True).solve(F_p)

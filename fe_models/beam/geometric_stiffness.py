@@ -102,7 +102,7 @@ def section_forces(
 
 
 def of_load(load: Array, arm: Array) -> Array:
-    """Return force and moment (6, g), from `load` (6, 1) or (6, g), that acts a distance `arm` (g,) further along x."""
+    """Return force (N), moment (N·m) (6, g), from `load` (6, 1) or (6, g), that acts `arm` (g,), m, further along x."""
     force, moment = load[:3] * np.ones_like(arm), load[3:]
     return np.concatenate([force, moment + _lever(force * arm)])
 

@@ -87,5 +87,5 @@ def hermite(nodes: Array) -> Functions:
 
 
 def on_axis(x: Array) -> Array:
-    """Return points (k, 3) of the axis at x (k,)."""
+    """Return points (k, 3), m, of the axis at x (k,), m."""
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)

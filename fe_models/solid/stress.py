@@ -151,7 +151,7 @@ def point_stresses(
 
 
 def surface_stresses(space: FunctionSpace, C: Array, modes: Array, points: Array) -> Array:
-    """Return modal stresses (p, 6, n) at `points` (p, 3) of the picture mesh, the same on all processes.
+    """Return modal stresses (p, 6, n), Pa/(m·√kg), at `points` (p, 3), m, of the picture mesh; equal on all processes.
 
     Raises `ValueError` for a point that is not on the mesh.
     """

@@ -88,7 +88,7 @@ def triangles_of(cells: Integers) -> Integers:
 
 
 def coarsened(points: Array, triangles: Integers, limit: int) -> tuple[Indices, Integers]:
-    """Reduce a surface: return indices of kept points (p, 3), and at most `limit` triangles on them.
+    """Reduce a surface: return indices of kept points (p, 3), m, and at most `limit` triangles on them.
 
     Points in the same box of a grid become the one nearest to their mean (vertex clustering: Rossignac & Borrel, 1993),
     so that the points that remain keep their exact displacements. Boxes are as small as the limit allows, and across a
@@ -250,7 +250,7 @@ def thickened(shape: Shape, radius: float) -> Shape:
 
 
 def shortest_tree(points: Array) -> Integers:
-    """Return the edges (p − 1, 2) of the shortest tree that connects points (p, 3)."""
+    """Return the edges (p − 1, 2) of the shortest tree that connects points (p, 3), m."""
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     distance = np.linalg.norm(points[:, None] - points, axis=2)

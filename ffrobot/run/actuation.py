@@ -112,7 +112,7 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str,
 
 
 def missing_forces(run: Run, actuation: Actuation) -> dict[str, Array]:
-    """Return modal forces (T, n) by body, modes of its file, that nothing supplies; empty if none are missing."""
+    """Return modal forces (T, n), N/√kg, by body, modes of its file, that nothing supplies; empty if none."""
     forces = actuator_forces(run)
     if forces is None or not motors_fit(run) or not (actuation.unmet or actuation.feasibility.unsupplied):
         return {}

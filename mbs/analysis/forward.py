@@ -174,7 +174,7 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
 
 
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """Return limits (2, inputs), lowest and highest torques of motors and voltages of patches; infinite if none."""
+    """Return limits (2, inputs), lowest and highest: motors N·m or N, patches V; infinite if none."""
     most = largest_moments(model, limits=True)
     return np.hstack([np.stack([-most, most]), joined(patches.values()).range])
 

@@ -68,7 +68,7 @@ class Servo:
 
     @cached_property
     def mode_sizes(self) -> Array:
-        """Modal coordinates p (n,) that bend a link by about its length."""
+        """Modal coordinates p (n,), m·√kg, that bend a link by about its length."""
         return modal_sizes(node.body for node in self.model.tree.nodes)
 
     @property

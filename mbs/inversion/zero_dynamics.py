@@ -51,7 +51,7 @@ def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) ->
 
 
 def equilibrium(servo: Servo, t: float) -> Array:
-    """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
+    """Shape p (n,), m·√kg, at rest under path and loads of time t, s. Raises `SolveError` where there is none."""
     p, is_met = _shapes(servo, np.array([t]))
     if is_met[0]:
         return p[0]

@@ -26,7 +26,7 @@ class PlanarJoint(AxialJoint):
     along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Coordinates (…, 3) of the reversed joint: position of the first side in axes of the second, angle."""
+        """Coordinates (…, 3), m, m, rad, of the reversed joint: first side in axes of the second."""
         x, y, angle = np.moveaxis(coordinates, -1, 0)
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)

@@ -65,7 +65,7 @@ class Amplifiers:
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
-        """Voltages (T, k) at `times` (T,), s, of those `wanted` (T, k), linear between; `strain` (T, k) as before."""
+        """Voltages (T, k), V, at `times` (T,), s, of `wanted` (T, k), linear between; `strain` (T, k) as before."""
         late = [np.interp(times - d, times, V) for d, V in zip(self.delay, wanted.T, strict=True)]
         asked, limited = np.stack(late, axis=1), np.zeros_like(wanted)
         limited[0] = np.clip(asked[0], *self.range)

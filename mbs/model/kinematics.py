@@ -242,12 +242,12 @@ class Kinematics:
         )
 
     def constraints(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """C (T, rows) at q (T, n_q) and `times` (T,), and C_v (T, rows, n_v)."""
+        """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and C_v (T, rows, n_v)."""
         values, gradients = self.core.constraints(self._scene, as_list(times), q)
         return self._signs * values, self._signs[:, None] * gradients.reshape(len(q), len(self._signs), self.core.n_v)
 
     def constraint_rates(self, q: Array, v: Array, times: Array) -> Array:
-        """Ċ (T, rows) at q (T, n_q), v (T, n_v) and `times` (T,)."""
+        """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
         return self._signs * self.core.constraint_rates(self._scene, as_list(times), q, v)
 
     def postures(

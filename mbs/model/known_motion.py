@@ -16,7 +16,7 @@ from .system import MultibodySystem
 
 
 class Wrench(NamedTuple):
-    """Force and moment (T, 3), global axes."""
+    """Force (N) and moment (N·m) (T, 3), global axes."""
 
     force: Array
     moment: Array
@@ -43,7 +43,7 @@ class States(Protocol):
 
     @property
     def q(self) -> Array:
-        """Positions (T, n_q)."""
+        """Coordinates q (T, n_q), rad, m and m·√kg."""
 
     @property
     def v(self) -> Array:
@@ -63,7 +63,7 @@ class KnownStates(NamedTuple):
 
 
 class SectionMotion(NamedTuple):
-    """Acceleration, angular acceleration and angular velocity (T, 3) of a triad, global axes."""
+    """Acceleration (m/s²), angular acceleration and velocity (rad/s², rad/s) (T, 3) of a triad, global axes."""
 
     a: Array
     alpha: Array
@@ -72,7 +72,7 @@ class SectionMotion(NamedTuple):
 
 @struct
 class MotionForces:
-    """Forces between bodies and in joints over states (T, …), global axes.
+    """Forces (N) and moments (N·m) between bodies and in joints over states (T, …), global axes.
 
     Moments are about the origins of the sections on which they act: mbs/core/recursion/inverse/motion_forces.h.
     """

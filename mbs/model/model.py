@@ -233,14 +233,14 @@ def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: Ti
 
 
 def constraint_values(model: Model, q: Array, times: Array) -> tuple[Array, Array]:
-    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v)."""
+    """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
     if not model.rows:
         return np.zeros((len(q), 0)), np.zeros((len(q), 0, model.tree.n_v))
     return model.constraints.constraints(q, times)
 
 
 def constraint_rates(model: Model, q: Array, v: Array, times: Array) -> Array:
-    """Ċ (T, rows) at q (T, n_q), v (T, n_v) and `times` (T,)."""
+    """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
     return model.constraints.constraint_rates(q, v, times) if model.rows else np.zeros((len(q), 0))
 
 

@@ -47,7 +47,7 @@ class CompliantGear(NamedTuple):
     damping: float
 
     def twist(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """δ and δ̇ (…,) at q (…, n_q), v (…, n_v)."""
+        """Twist δ (…,), rad or m, and its rate δ̇ at q (…, n_q), v (…, n_v)."""
         a, b = self.motor, self.joint
         way, rate = q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
         return way, rate
@@ -148,7 +148,7 @@ class KinematicTree:
         return q
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """Return positions of frames and sections at q (T, n_q), and their motions with v (T, n_v), else at rest."""
+        """Return positions (m) of frames and sections at q (T, n_q), motions (m/s, rad/s) with v (T, n_v) or 0."""
         return self._moving.places(q, v)
 
     def integrate(self, q: Array, dv: Array) -> Array:

@@ -59,7 +59,7 @@ def posture_search(model: Model) -> PostureSearch:
 
 
 def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None = None) -> tuple[Array, Booleans]:
-    """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,).
+    """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s, as `solve_posture`; with flags (T,) of convergence.
 
     Where C = 0 with a joint or a tool turned over it did not.
     """
@@ -176,7 +176,7 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
 
 
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
-    """The least ratio of `Mobility` at `times` (T,) and q (T, n_q), and at which; `loop_rank` as in `mobilities`."""
+    """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and its time; `loop_rank` as in `mobilities`."""
     ratios = [at.ratio for at in mobilities(model, times, q, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
 

@@ -46,7 +46,7 @@ class BodyMotion:
         return _named(vars(self))
 
     def within(self, space: Space, angle: Array) -> BodyMotion:
-        """Return the components of a 3D motion that `space` has; planar ones have `angle` (T,), not quaternions."""
+        """Return the components of a 3D motion that `space` has; planar ones have `angle` (T,), rad, no quaternions."""
         return replace(
             self,
             position=space.along(self.position),

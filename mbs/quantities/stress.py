@@ -183,7 +183,7 @@ def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: 
 
 
 def von_mises(stress: Array) -> Array:
-    """Return von Mises stress (…,) of stresses (…, 6) xx, yy, zz, yz, xz, xy."""
+    """Return von Mises stress (…,), Pa, of stresses (…, 6), Pa: xx, yy, zz, yz, xz, xy."""
     return np.asarray(np.linalg.norm(stress @ _distortion().T, axis=-1))
 
 

@@ -24,7 +24,7 @@ class PatchedLink(Protocol):
 
     @property
     def per_volt(self) -> Mapping[str, Array]:
-        """Modal forces per volt (n, k), by body."""
+        """Modal forces per volt (n, k), N/(√kg·V), by body."""
 
     @property
     def amplifiers(self) -> Amplifiers:

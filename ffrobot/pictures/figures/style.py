@@ -191,12 +191,12 @@ class SceneAxes:
         self.drawn: list[Array] = []
 
     def plot(self, points: Array, *style: str, **options: Any) -> None:
-        """A line through points (n, 3), or markers."""
+        """Draw a line through points (n, 3), m, or markers."""
         self.drawn.append(seen := projected(points, self.view))
         self.axes.plot(*seen.T, *style, **options)
 
     def body(self, points: Array, cells: Integers, color: Any, width: float = 1.5) -> None:
-        """Draw points (p, 3) and their cells: lines, or an opaque surface."""
+        """Draw points (p, 3), m, and their cells: lines, or an opaque surface."""
         self.drawn.append(seen := projected(points, self.view))
         if cells.shape[1] == 2:
             self._lines(seen[cells], color, width)
