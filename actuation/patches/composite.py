@@ -15,8 +15,8 @@ so that the patches add the stiffness Bᵀ (1 + C R)⁻¹ C B to the link and ha
 Layouts of one link feel each other through its modes, and are taken together.
 
 Patches that bend (or twist) and name no face do that alone: on one face, where the section is free in all else, which
-shifts the neutral axis, but no other mode feels them. On both faces they bend alone by symmetry; on one named face they
-stretch the link, too.
+shifts the neutral axis, but no other mode feels them. On named faces all strains of the section feel them: those on one
+face stretch the link, too, and those off the middle of the width bend it about both axes.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...common.rotations import skew
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.body import Body, BodyPoint
@@ -39,6 +40,7 @@ from .sections import (
     TWIST,
     LayerLoads,
     LinkSections,
+    across_row,
     bending_row,
     felt_rows,
     layer_loads,
@@ -88,7 +90,7 @@ def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Arr
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
     count = len(layers.points)
     density = P.reshape(len(p), count, -1) / np.array([at.weight for at in layers.points])[:, None]
-    along = density[..., 1] if density.shape[2] == 2 else np.zeros((len(p), count))
+    along = density[..., STRETCH] if density.shape[2] > 1 else np.zeros((len(p), count))
     patch = np.array([at.interval for at in layers.points])
     x = np.array([at.x for at in layers.points])
     return SectionLoads(placed.edges, patch, x, density[..., 0], along, P @ layers.B)
@@ -110,10 +112,11 @@ class _OnLink(NamedTuple):
 
 def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
     sections = link_sections(body)
-    felt = np.unique(np.concatenate([felt_rows(layout) for layout, _ in placed]))
     intervals, covering = _intervals(placed)
     points = list(gauss_points(body, intervals))
-    B = _strains(body, np.array([at.x for at in points]))[:, felt].reshape(-1, body.mode_count)
+    strains = _strains(body, np.array([at.x for at in points]))
+    felt = _felt([layout for layout, _ in placed], strains)
+    B = strains[:, felt].reshape(-1, body.mode_count)
     patches = sum(len(edges) for _, edges in placed)
     C, f = np.zeros((len(B), len(B))), np.zeros((len(B), patches))
     straight, exact = np.zeros_like(f), np.zeros(len(B))
@@ -128,6 +131,17 @@ def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
     return _OnLink(points, B, held[:, : B.shape[1]], held[:, B.shape[1] :], straight)
+
+
+def _felt(layouts: Sequence[PztLayout], strains: Array) -> Indices:
+    """Which of the strains (g, 4, n) feel layers; a curvature about their normal only where modes have it."""
+    felt = np.zeros(4, dtype=bool)
+    for layout in layouts:
+        rows = felt_rows(layout)
+        if not layout.offset and not strains[:, across_row(layout)].any():
+            rows = rows[rows != across_row(layout)]
+        felt[rows] = True
+    return np.flatnonzero(felt)
 
 
 def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
@@ -178,8 +192,7 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
     """Extent along the patches' normal (m), as `LinkSections.extent` has it of their face, and β at a station."""
-    shears = layout.lamina.C[0, 1] or layout.lamina.per_volt[1] or layout.lamina.C[1, 1]
-    lever = sections.shear_lever(station, layout.normal, layout.width) if shears else 0.0
+    lever = sections.shear_lever(station, layout.normal, layout.width) if layout.lamina.shears else 0.0
     return float(sections.extent(layout.normal, side(layout))[station]), lever
 
 
@@ -248,16 +261,18 @@ class StructureEffect:
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
     """Add mass and stiffness of patches to a link or a piece of it, as the layouts ask; all modes are kept.
 
-    Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
-    stiffness is that of the `composite` section.
+    Mass lies in the plane of the patches' normal at their offset from the axis, with its moment of inertia about the
+    line that it is on, ∫ρ (η² + ζ²) dA. The stiffness is that of the `composite` section.
     """
     T, sections = spatial.modal_transform, link_sections(body)
     points, masses, spins = [], [], []
     for layout, edges in placed:
         extent = sections.extent(layout.normal, side(layout))
+        arm = layout.offset * np.eye(3)[2 if layout.normal == "y" else 1]
         for place in gauss_points(body, edges) if layout.adds_mass else ():
             at = body.interpolate(place.x)
-            points.append(BodyPoint(at.position, at.translation @ T, at.rotation @ T))
+            moved = at.translation - skew(arm) @ at.rotation
+            points.append(BodyPoint(at.position + arm, moved @ T, at.rotation @ T))
             A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
             line_density = place.weight * (layout.density or 0.0)
             masses.append(line_density * A)

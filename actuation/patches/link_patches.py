@@ -39,7 +39,7 @@ from .patches import (
     weights,
 )
 from .records import PztLayout
-from .sections import check_sections
+from .sections import check_sections, check_width
 
 
 @struct
@@ -226,6 +226,7 @@ def _placed(path: Path, layout: PztLayout, body: ModalBody) -> PlacedLayout:
     key, edges = _key(path, layout.label), patch_edges(layout, body.length)
     check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
     check_edges(key, edges, body.length)
+    check_width(key, body, layout, edges)
     return PlacedLayout(layout, edges)
 
 

@@ -23,6 +23,11 @@ class Lamina(NamedTuple):
     C: Array  # (2, 2) Pa
     per_volt: Array  # (2,) C Λ, Pa/V: the stress that a volt takes off a layer which is held
 
+    @property
+    def shears(self) -> bool:
+        """Whether shear loads it, or is loaded by a voltage."""
+        return bool(self.C[:, 1].any() or self.per_volt[1])
+
 
 class Fibres(NamedTuple):
     """A layer of parallel fibers: E_1, E_2, G_12 in Pa, ν_12, d33 along and d31 across in m/V, angle in rad from x.
@@ -157,6 +162,8 @@ class PztLayout(Record):
     """Length of a patch along the link, m."""
     width: Positive
     """Width of a patch across the link, m."""
+    offset: Annotated[float, IN_SPACE] = 0.0
+    """Middle of the patch across the width, m from the axis of the link: z of faces ±y, y of faces ±z."""
     thickness: Positive
     """Thickness of one layer, m."""
     modulus: Positive
@@ -239,6 +246,9 @@ class PztLayout(Record):
         allowed = FACES.get(self.bends)
         if self.face is not None and allowed is not None and self.face not in allowed:
             raise ValueError(f'expected face {quoted(allowed)} with bends = "{self.bends}", found "{self.face}"')
+        if self.offset and (self.face is None or self.coupling == "surface"):
+            found = "none" if self.face is None else 'coupling = "surface"'
+            raise ValueError(f'expected a face and coupling = "rotation" with an offset, found {found}')
 
     def _check_amplifier(self) -> None:
         for key, found in self.amplifier.lists() if self.amplifier is not None else ():

@@ -4,9 +4,9 @@ The layers of a patch by themselves: where they are on a section, and what a vol
 
 Layers at the distance η from the axis, on faces with the outward sign s, strain as the section does,
 
-    ε = u' − η κ,    γ = β |η| φ_x'
+    ε = u' − η κ − ζ κ_t,    γ = β |η| φ_x'
 
-with the curvature κ towards their normal and β of `sections.LinkSections.shear_lever`, and take C (ε, γ) − C Λ V
+with the curvatures κ towards their normal and κ_t across it, ζ across the width, and β of `sections.LinkSections.shear_lever`, and take C (ε, γ) − C Λ V
 (`lamina`). By virtual work their loads on the section are ∫ Bᵀ (C Λ V − C B e) dA with the rows B of these strains.
 Faces are driven against each other to bend, alike to twist.
 """
@@ -106,6 +106,23 @@ def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twis
         )
 
 
+def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> None:
+    """Raise `InputError` for patches between `edges` (k, 2), m, that are wider than the face that they lie on."""
+    sections = link_sections(body)
+    x, across = sections.x, sections.extent("z" if layout.normal == "y" else "y")
+    ends = np.append(x[1:], np.inf)
+    under = ((x < edges[:, 1:]) & (ends > edges[:, :1])).any(axis=0)
+    face = np.where(sections.is_round, np.pi, 1.0) * across
+    taken = layout.width + 2 * abs(layout.offset - sections.middle[:, 1 if layout.normal == "y" else 0])
+    if (beyond := under & (taken > face * (1.0 + ROUND))).any():
+        k = int(beyond.argmax())
+        where = f", {layout.offset:g} m off its axis," if layout.offset else ""
+        raise InputError(
+            f"{key}: width: expected patches on the face of the link, {face[k]:.3g} m wide at {x[k]:.3g} m, found"
+            f" patches {layout.width:g} m wide{where} which stand out: units are SI; is this in mm?"
+        )
+
+
 def potentials(body: ModalBody, x: Array) -> Array:
     """Return (m, 4, n) at x (m,) whose differences are integrals of the strains e along x: φ_z, u, φ_x, −φ_y."""
     _, translation, rotation = body.along_axis(x)
@@ -139,15 +156,16 @@ def own_row(layout: PztLayout) -> int:
     return TWIST if layout.acts_in == "twist" else bending_row(layout)
 
 
+def across_row(layout: PztLayout) -> int:
+    """Return the index of the curvature across the patches' width among the strains e."""
+    return BEND_Z if layout.normal == "y" else BEND_Y
+
+
 def felt_rows(layout: PztLayout) -> Indices:
     """Return the indices of the strains e that interact with the patches; see `composite`."""
-    found = {own_row(layout)}
-    if side(layout):
-        found |= {bending_row(layout), STRETCH}
-        found |= {TWIST} if layout.lamina.C[0, 1] or layout.lamina.per_volt[1] else set()
-    elif layout.acts_in == "twist" and layout.face == "both":
-        found |= {STRETCH}
-    return np.array(sorted(found))
+    if layout.face is None:
+        return np.array([own_row(layout)])
+    return np.flatnonzero([True, True, layout.lamina.shears, True])
 
 
 def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float]:
@@ -165,18 +183,23 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
     """Return loads of all layers on their strains, for a link `extent` (m) along their normal; `lever` is β."""
     A, S, I = layer_section(layout, extent)  # noqa: E741
-    sign = np.sign(S)
+    sign, middle, w = np.sign(S), layout.offset, layout.width
     arm = A * (extent + layout.layers * layout.thickness) / 2  # ∫ |η| dA
     (E, D), (_, G) = layout.lamina.C
     n_x, n_s = layout.lamina.per_volt
-    C, f, bend = np.zeros((4, 4)), np.zeros(4), bending_row(layout)
-    C[bend, bend], C[bend, STRETCH], C[STRETCH, STRETCH] = E * I, -E * S, E * A
-    C[TWIST, TWIST], C[bend, TWIST], C[STRETCH, TWIST] = G * lever**2 * I, -D * lever * sign * I, D * lever * arm
+    axial = [STRETCH, bending_row(layout), across_row(layout)]  # ε of these: 1, −η, −ζ
+    area = np.array([[A, -S, -A * middle], [-S, I, S * middle], [-A * middle, S * middle, A * (middle**2 + w**2 / 12)]])
+    at_arm = arm * np.array([1.0, 0.0, -middle])  # ∫ |η| (1, −η, −ζ) dA
+    at_arm[1] = -sign * I
+    C, f = np.zeros((4, 4)), np.zeros(4)
+    C[np.ix_(axial, axial)] = E * area
+    C[axial, TWIST] = C[TWIST, axial] = D * lever * at_arm
+    C[TWIST, TWIST] = G * lever**2 * I
     if layout.acts_in == "twist":
-        f[[bend, STRETCH, TWIST]] = -n_x * S, n_x * A, n_s * lever * arm
+        f[axial], f[TWIST] = n_x * area[0], n_s * lever * arm
     else:
-        f[[bend, STRETCH, TWIST]] = n_x * arm, -sign * n_x * A, -sign * n_s * lever * arm
-    return LayerLoads(C + C.T - np.diag(np.diag(C)), f)
+        f[axial], f[TWIST] = n_x * np.array([-sign * A, arm, sign * A * middle]), -sign * n_s * lever * arm
+    return LayerLoads(C, f)
 
 
 def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:

@@ -144,9 +144,7 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             yield f"{label}: a d31 of {layout.d31:g} m/V: units are SI; is it in pm/V?"
         if not is_beam(link := links.get(layout.body)):
             continue
-        thick, face = _thickness_and_face(layout, link)
-        if layout.width > face * (1.0 + ROUNDING):
-            yield f"{label}: patches {layout.width:g} m wide on a face of {face:.3g} m: units are SI; is this in mm?"
+        thick, _ = _thickness_and_face(layout, link)
         if (layers := layout.layers * layout.thickness) > thick:
             yield f"{label}: patches {layers:g} m thick on a link of {thick:g} m: units are SI; is this in mm?"
 

@@ -18,7 +18,7 @@ from ffrobot.mbs.model.body import from_modal_body
 SCENE = Path("scene.toml")
 E, NU, L = 70e9, 0.33, 0.4
 G = E / (2 * (1 + NU))
-START, END, VOLT = 0.06, 0.14, 100.0
+START, END, VOLT, WIDE = 0.06, 0.14, 100.0, 0.005
 PLAIN = {"modulus": 63e9, "d31": 110e-12, "thickness": 0.5e-3}
 FIBRES = {
     "modulus": 30.3e9, "modulus_across": 15.9e9, "shear_modulus": 5.5e9, "poissons_ratio": 0.31, "d33": 400e-12,
@@ -34,7 +34,7 @@ def link(section, count=12, family="all"):
 
 def layout(**keys):
     places = {} if keys.keys() & {"count", "centers"} else {"centers": [(START + END) / 2], "length": END - START}
-    tables = {"body": "link", "width": 0.01, "allocation": "least-squares"} | places | keys
+    tables = {"body": "link", "width": WIDE, "allocation": "least-squares"} | places | keys
     material = FIBRES if "fibre_angle" in tables else PLAIN
     return validate(PztLayout, material | tables, SCENE)
 
@@ -49,16 +49,21 @@ def tip(body, layouts, volts=None):
     return at.translation @ p, at.rotation @ p
 
 
-def bending(h, b, w, faces):
-    """Curvature of the composite Euler–Bernoulli section, layers on faces h apart, N·m over N·m²; (stretch, too)."""
+def bending(h, b, faces, offset=0.0, beside=0.0):
+    """Curvatures towards the layers' normal and across it, and stretch: a fiber at η, ζ strains u' − η κ − ζ κ_t.
+
+    Of the composite section by Gauss points of the layers, on faces h apart; `beside`: other rigidity of bending.
+    """
     t, Ep = PLAIN["thickness"], PLAIN["modulus"]
-    A, S, I = (w * np.diff([(h / 2) ** k, (h / 2 + t) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
-    stiffness = np.diag([E * b * h**3 / 12, E * b * h]) + Ep * faces * np.array([[I, 0], [0, A]])
-    load = np.array([faces * S, 0.0])
-    if faces == 1:
-        stiffness[0, 1] = stiffness[1, 0] = -Ep * S
-        load = np.array([S, -A])
-    return np.linalg.solve(stiffness, Ep * PLAIN["d31"] * VOLT / t * load)
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    stiffness, load = np.diag([E * b * h**3 / 12 + beside, E * h * b**3 / 12, E * b * h]), np.zeros(3)
+    for sign in (1, -1)[:faces]:
+        for i, j in np.ndindex(3, 3):
+            fiber = np.array([-sign * (h + t + t * nodes[i]) / 2, -(offset + WIDE * nodes[j] / 2), 1.0])
+            force = Ep * t * WIDE * weights[i] * weights[j] / 4
+            stiffness += force * np.outer(fiber, fiber)
+            load -= sign * force * PLAIN["d31"] * VOLT / t * fiber
+    return np.linalg.solve(stiffness, load)
 
 
 @pytest.mark.parametrize(("bends", "axis", "names"), [("in-plane", 1, ("+y", "-y")), ("out-of-plane", 2, ("+z", "-z"))])
@@ -70,7 +75,7 @@ def test_tip_of_a_cantilever_in_both_planes(bends, axis, names, face):
     name = names[face] if isinstance(face, int) else face
     translation, rotation = tip(body, [layout(bends=bends, face=name)])
     across = (h, b) if axis == 1 else (b, h)
-    curvature, stretch = bending(*across, 0.01, 2 if face == "both" else 1)
+    curvature, _, stretch = bending(*across, 2 if face == "both" else 1)
     expected = np.zeros(3)
     expected[axis] = curvature * (END - START) * (L - (START + END) / 2)
     if isinstance(face, int):
@@ -78,6 +83,19 @@ def test_tip_of_a_cantilever_in_both_planes(bends, axis, names, face):
     np.testing.assert_allclose(translation, expected, atol=2e-7 * abs(expected[axis]))
     assert rotation[3 - axis] == pytest.approx((1 if axis == 1 else -1) * curvature * (END - START), rel=1e-6)
     assert abs(rotation[0]) < 1e-12 * abs(rotation[3 - axis])
+
+
+@pytest.mark.parametrize(("bends", "face", "normal"), [("in-plane", "+y", 1), ("out-of-plane", "+z", 2)])
+@pytest.mark.parametrize("offset", [0.004, -0.002])
+def test_patches_off_the_middle_bend_about_both_axes(bends, face, normal, offset):
+    sides = (0.01, 0.014)
+    body = link(rectangle(*sides))
+    translation, _ = tip(body, [layout(bends=bends, face=face, offset=offset / normal)])
+    curvature, across, stretch = bending(*sides[:: 3 - 2 * normal], 1, offset / normal)
+    expected = np.zeros(3)
+    expected[[normal, 3 - normal]] = np.array([curvature, across]) * (END - START) * (L - (START + END) / 2)
+    expected[0] = stretch * (END - START)
+    np.testing.assert_allclose(translation, expected, atol=1e-6 * abs(expected[normal]))
 
 
 def classical(angle):
@@ -108,7 +126,7 @@ def test_layer_of_fibres_at_an_angle(angle):
 @pytest.mark.parametrize("angle", [np.pi / 4, -np.pi / 4, 0.4])
 def test_tube_with_fibres_at_an_angle_twists(angle):
     """Layers on both faces of a tube, γ = r φ': (u', φ') of the section with stiffness and coupling of the layers."""
-    body, w, t = link(TUBE), 0.01, FIBRES["thickness"]
+    body, w, t = link(TUBE), WIDE, FIBRES["thickness"]
     _, rotation = tip(body, [layout(bends="twist", face="both", fibre_angle=angle)])
     C, n = classical(angle)
     r = 0.01
@@ -158,14 +176,19 @@ def test_both_faces_driven_apart_are_the_layout_on_both():
 
 
 def test_overlap_of_layouts_is_shared():
-    """Of patches that overlap in part each stretch has its own composite section: curvatures add up to the tip."""
-    h, b = 0.006, 0.014
+    """Of patches that overlap in part each stretch has its own section: curvatures add up to the tip."""
+    h, b, sides = 0.006, 0.014, {"in-plane": (0.06, 0.14), "out-of-plane": (0.12, 0.2)}
     body = link(rectangle(h, b), 8)
-    long, short = layout(name="long", face="both"), layout(name="short", bends="out-of-plane", face="both",
-                                                           centers=[0.16], length=0.08)  # fmt: skip
-    together = tip(body, [long, short])[0]
-    alone = tip(body, [long])[0] + tip(body, [short])[0]  # planes do not feel each other
-    np.testing.assert_allclose(together, alone, rtol=1e-7, atol=1e-12)
+    pair = [
+        layout(name=bends, bends=bends, face="both", centers=[sum(ends) / 2], length=0.08)
+        for bends, ends in sides.items()
+    ]
+    other = PLAIN["modulus"] * 2 * PLAIN["thickness"] * WIDE**3 / 12  # of layers beside the axis of bending
+    expected = np.zeros(3)
+    for axis, across, alone in ((1, (h, b), (0.06, 0.12)), (2, (b, h), (0.14, 0.2))):
+        for (start, end), beside in ((alone, 0.0), ((0.12, 0.14), other)):
+            expected[axis] += bending(*across, 2, beside=beside)[0] * (end - start) * (L - (start + end) / 2)
+    np.testing.assert_allclose(tip(body, pair)[0], expected, atol=1e-6 * expected[1])
 
 
 def test_round_links_do_not_mix_their_planes():
@@ -183,9 +206,9 @@ def test_mass_of_layers():
     body = link(SQUAT)
     keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
     spatial = patched_body(from_modal_body("link", body), body, placed_patches(SCENE, [layout(**keys)], body))
-    A, I = 2 * 0.01 * 0.5e-3, 2 * 0.01 * (0.0035**3 - 0.003**3) / 3  # noqa: E741
+    A, I = 2 * WIDE * 0.5e-3, 2 * WIDE * (0.0035**3 - 0.003**3) / 3  # noqa: E741
     assert spatial.mass - body.mass == pytest.approx(5 * 0.05 * 7600.0 * A, rel=1e-9)
-    layers = 5 * 0.05 * 7600.0 * (I + A * 0.01**2 / 12)
+    layers = 5 * 0.05 * 7600.0 * (I + A * WIDE**2 / 12)
     assert spatial.J_spin - body.J_spin == pytest.approx(layers, rel=1e-9)
     np.testing.assert_allclose(spatial.S_bar_kl.trace(axis1=0, axis2=1) + spatial.S_spin, np.eye(len(body.family)),
                                atol=1e-9)  # fmt: skip
@@ -222,6 +245,7 @@ def test_voltages_of_two_planes_do_not_disturb_each_other():
         ({"d33": 4e-10}, r'expected the keys "fibre_angle", "modulus_across"'),
         ({"fibre_angle": 0.3, "poissons_ratio": 1.5}, "expected a poissons_ratio between -1.38 and 1.38"),
         ({"bends": "sideways"}, "in-plane"),
+        ({"offset": 0.001}, 'expected a face and coupling = "rotation" with an offset, found none'),
     ],
 )
 def test_layouts_that_do_nothing_or_contradict_themselves(keys, message):
@@ -236,6 +260,9 @@ def test_patches_that_do_not_fit_their_link():
         link_patches(SCENE, [layout(name="up", centers=[0.39], length=0.06)], body, spatial)
     with pytest.raises(InputError, match=r"expected as many patches as modes \(\d+\) or more, found 1"):
         check_reach(SCENE, link_patches(SCENE, [layout(allocation="exact")], body, spatial))
+    for wide in ({"width": 0.015}, {"width": 0.01, "offset": 0.003, "face": "+y"}):
+        with pytest.raises(InputError, match=r"width: expected patches on the face of the link, 0.014 m wide at 0"):
+            link_patches(SCENE, [layout(**wide)], body, spatial)
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
     with pytest.raises(InputError, match="recompute it from its link file"):
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)

@@ -150,7 +150,6 @@ PATCH = {"body": "arm", "count": 2, "length": 0.05, "thickness": 3e-4, "width": 
 @pytest.mark.parametrize(
     ("patch", "interface", "joints", "expected"),
     [
-        ({"width": 8.0}, [], 0.0, "patches 8 m wide on a face of 0.0628 m"),
         ({"width": 0.06}, [], 0.0, None),  # around a tube
         ({"thickness": 0.3}, [], 0.0, "patches 0.3 m thick on a link of 0.02 m"),
         ({"modulus": 63.0}, [], 0.0, "a modulus of 63 Pa: units are SI; is it in GPa?"),
