@@ -334,6 +334,8 @@ edges | m | begin and end of each patch
 width | m | along z
 top | m² | modal forces per unit of membrane force
 bottom | m² | likewise
+top_across | m² | of the strain across
+bottom_across | m² | likewise
 []
 remarks | | what the part's file holds and the body does not
 """)

@@ -22,12 +22,14 @@ face stretch the link, too, and those off the middle of the width bend it about 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...common.keys import SMALLEST
 from ...common.rotations import skew
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
@@ -53,6 +55,7 @@ from .sections import (
     straight_loads,
 )
 
+PASSES = 6  # until modes and the stiffness of shunts at their frequencies agree
 SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
@@ -100,7 +103,7 @@ class _OnLink(NamedTuple):
     """Layers on their link, of each Gauss point a row for each strain of e that is felt anywhere.
 
     B (rows, n); P of coordinates p and of voltages: `by_modes` (rows, n) taken off, `by_volts` (rows, k); `straight`
-    (rows, k) of a volt on a link held straight.
+    (rows, k) of a volt on a link held straight. `yielding` (k,): what the residual strains add to capacitances, F.
     """
 
     points: list[GaussPoint]
@@ -108,6 +111,7 @@ class _OnLink(NamedTuple):
     by_modes: Array
     by_volts: Array
     straight: Array
+    yielding: Array
 
 
 def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
@@ -130,7 +134,8 @@ def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
             straight[block, patch] = at.weight * straight_loads(layout, *place_of(layout, sections, at.station))[felt]
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
-    return _OnLink(points, B, held[:, : B.shape[1]], held[:, B.shape[1] :], straight)
+    by_volts = held[:, B.shape[1] :]
+    return _OnLink(points, B, held[:, : B.shape[1]], by_volts, straight, (f * (R @ by_volts)).sum(axis=0))
 
 
 def _felt(layouts: Sequence[PztLayout], strains: Array) -> Indices:
@@ -279,7 +284,36 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout])
             spins.append(line_density * (I + A * layout.width**2 / 12))
     stiff = [one for one in placed if one.layout.adds_stiffness]
     added = T.T @ composite(stiff, body)[0] @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
-    return with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
+    patched = with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
+    return _with_charges(patched, body, stiff) if any(one.layout.gives_way for one in stiff) else patched
+
+
+def _with_charges(patched: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
+    """With what the charges of patches do whose electrodes are open, or behind a resistor of R Ω each.
+
+    With the charge q = C V + Φᵀp and V = −R q̇ a patch has the dynamic stiffness Φ iωR/(1 + iωRC) Φᵀ (Hagood and von
+    Flotow, J. Sound Vib. 146, 1991), ΦΦᵀ/C where R is infinite. Its stiffness and damping are those at the frequency
+    of each mode that they lead to.
+    """
+    layers = _on_link(placed, body)
+    layouts = [one.layout for one in placed for _ in one.edges]
+    share = np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
+    charged = np.flatnonzero([of.gives_way for of in layouts])
+    C = np.array([of.capacitance(clamped=True) for of in layouts]) * share + layers.yielding
+    Phi = (layers.by_volts.T @ layers.B @ patched.modal_transform)[charged] / np.sqrt(C[charged])[:, None]
+    R = np.array([layouts[k].shunt or np.inf for k in charged]) / share[charged]
+    K, modes = np.diag(patched.stiffness), np.eye(patched.n_modes)
+    values, added = patched.stiffness, np.zeros_like(K)
+    for _ in range(PASSES):
+        omega = np.sqrt(values.clip(min=SMALLEST))
+        with np.errstate(divide="ignore"):
+            lag = 1.0 / np.multiply.outer(R * C[charged], omega)  # 1/(ωRC)
+        stiff = Phi @ modes / np.sqrt(1.0 + lag**2) @ modes.T
+        damps = Phi @ modes * np.sqrt(lag / (omega * (1.0 + lag**2))) @ modes.T
+        added = stiff.T @ stiff
+        values, modes = np.linalg.eigh(K + added)
+    with_damping = replace(patched, damping=patched.damping + damps.T @ damps)
+    return with_line_masses(with_damping, (), np.zeros(0), np.zeros(0), added)
 
 
 def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
@@ -335,7 +369,10 @@ def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
     turn = np.add.reduceat(differences[:, own], first)
     Phi_V = np.add.reduceat(np.einsum("ir,irn->in", loads, differences), first)
     if layout.coupling == "surface":
-        Phi_V = (c / (layout.width * extent / 2))[:, None] * _outlined(key, layout, body, edges)
+        membrane = c / (layout.width * extent / 2)
+        if layout.strain == "biaxial":
+            membrane /= 1.0 - (layout.poissons_ratio or 0.0)
+        Phi_V = membrane[:, None] * _outlined(key, layout, body, edges)
     return Effects(extent, c, lever / 2 if layout.acts_in == "twist" else np.ones(len(edges)), turn, Phi_V)
 
 
@@ -399,6 +436,14 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
             f" {layout.width:g} m wide"
         )
     outlined_on = {"+y": patches.top, "-y": patches.bottom}
+    if layout.strain == "biaxial":
+        across = {"+y": patches.top_across, "-y": patches.bottom_across}
+        if any(of is not None and across[face] is None for face, of in outlined_on.items()):
+            raise InputError(
+                f'{key}: strain: expected "uniaxial", or a modal body file with strains across outlined patches, found'
+                " one of an earlier version: recompute it from its link file with `ffrobot link`"
+            )
+        outlined_on = {face: of if of is None else of + across[face] for face, of in outlined_on.items()}
     wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else []
     if missing := [face for face in wanted if outlined_on[face] is None]:
         raise InputError(

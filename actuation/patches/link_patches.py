@@ -7,9 +7,10 @@ by one named face. Modal forces on the other families are left as they are: volt
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -39,7 +40,9 @@ from .patches import (
     weights,
 )
 from .records import PztLayout
-from .sections import check_sections, check_width
+from .sections import check_sections, check_width, link_sections
+
+WIDE = 3.0  # of its length: a link that wide keeps its sections flat, whatever its supports
 
 
 @struct
@@ -86,6 +89,11 @@ class LinkPatches:
     def amplifiers(self) -> Amplifiers:
         """Amplifiers of the k patches."""
         return self.reach.amplifiers
+
+    @property
+    def driven(self) -> Array:
+        """(k,) whether voltages drive them: the modal forces of others are left out."""
+        return driven_patches(self.arrays.values())
 
     @property
     def edges(self) -> Array:
@@ -146,6 +154,11 @@ class LinkPatches:
         return left if self.on_kept is None else left @ self.on_kept
 
 
+def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
+    """(k,) whether voltages drive the patches."""
+    return np.concatenate([np.full(len(one.edges), one.layout.is_driven) for one in placed])
+
+
 def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
     """Return the positions of layouts on their link. Raises `InputError` for patches that do not fit it."""
     return [_placed(path, layout, body) for layout in layouts]
@@ -161,6 +174,7 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     placed = placed_patches(path, layouts, body)
     found = effects(key, placed, body)
     Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
+    driven = driven_patches(placed)
     modes = {one.layout.label: reached_modes(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
     for layout in layouts:
         _check_reached(path, layout, modes[layout.label], body)
@@ -172,8 +186,10 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     if len(layouts) == 1:
         reached, reach = modes[layouts[0].label], arrays[layouts[0].label]
     else:
-        reached = reached_modes(Phi_V.T, body, spatial)
+        reached = reached_modes((Phi_V * driven if driven.any() else Phi_V).T, body, spatial)
         reach = _together(path, layouts, arrays, reached, Phi_V.T)
+    if not driven.all():
+        reach, Phi_V = replace(reach, Phi_V=reach.Phi_V * driven), Phi_V * driven
     own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
     return LinkPatches(arrays, modes, reach, reached, own, _slowness(body))
 
@@ -187,8 +203,8 @@ def _slowness(body: ModalBody) -> float:
 
 def check_reach(path: Path, of_link: LinkPatches) -> None:
     """Raise `InputError` unless patches reach all modes that they are to serve, or the scene is content with less."""
-    layouts = [array.layout for array in of_link.arrays.values()]
-    if all(layout.allocation == "exact" for layout in layouts):
+    layouts = [array.layout for array in of_link.arrays.values() if array.layout.is_driven]
+    if layouts and all(layout.allocation == "exact" for layout in layouts):
         check_all_served(_key(path, layouts[0].label if len(layouts) == 1 else of_link.body), of_link.reach)
 
 
@@ -207,7 +223,7 @@ def on_pieces(
         on_piece = whole.placed_on(start, modal.length)
         found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
         for (which, _), of in zip(on_piece, found, strict=True):
-            Phi_V[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
+            Phi_V[:, which], turn[:, which] = of.Phi_V.T * whole.driven[which], of.turn.T
         bodies[name] = OnBody(Phi_V, turn, to_piece.T)
     return replace(whole, bodies=bodies)
 
@@ -227,7 +243,15 @@ def _placed(path: Path, layout: PztLayout, body: ModalBody) -> PlacedLayout:
     check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
     check_edges(key, edges, body.length)
     check_width(key, body, layout, edges)
-    return PlacedLayout(layout, edges)
+    return PlacedLayout(layout.model_copy(update={"strain": layout.strain or _strain(layout, body)}), edges)
+
+
+def _strain(layout: PztLayout, body: ModalBody) -> Literal["uniaxial", "biaxial"]:
+    """Held across on wide links; outlined faces strain across as the solid does."""
+    across = link_sections(body).extent("z" if layout.normal == "y" else "y")
+    is_wide = layout.coupling == "surface" or bool(np.nanmax(across, initial=0.0) >= WIDE * body.length)
+    plain = layout.fibre_angle is None and layout.poissons_ratio is not None
+    return "biaxial" if plain and is_wide else "uniaxial"
 
 
 def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: ModalBody) -> None:

@@ -2,8 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,71 +14,7 @@ from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
 from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
 from ...mbs.model.amplifiers import Amplifiers
-
-
-class Lamina(NamedTuple):
-    """Stress (σ_x, τ_xs) = C (ε_x, γ_xs) − C Λ V in a layer; x along the link, s across it in the layer."""
-
-    C: Array  # (2, 2) Pa
-    per_volt: Array  # (2,) C Λ, Pa/V: the stress that a volt takes off a layer which is held
-
-    @property
-    def shears(self) -> bool:
-        """Whether shear loads it, or is loaded by a voltage."""
-        return bool(self.C[:, 1].any() or self.per_volt[1])
-
-
-class Fibres(NamedTuple):
-    """A layer of parallel fibers: E_1, E_2, G_12 in Pa, ν_12, d33 along and d31 across in m/V, angle in rad from x.
-
-    `spacing` of the electrodes along the fibers, m: a volt is a field of 1/spacing.
-    """
-
-    E_1: float
-    E_2: float
-    G_12: float
-    nu_12: float
-    d33: float
-    d31: float
-    angle: float
-    spacing: float
-
-
-@lru_cache
-def plain_lamina(modulus: float, d31: float, thickness: float) -> Lamina:
-    """Lamina of a ceramic isotropic in its plane, its electrodes `thickness` (m) apart; γ is computed from the link.
-
-    Its free strain is alike in all directions, too, so that it never shears, at whatever angle it lies.
-    """
-    return _fixed(np.diag([modulus, 0.0]), np.array([modulus * d31 / thickness, 0.0]))
-
-
-@lru_cache
-def fibre_lamina(of: Fibres) -> Lamina:
-    """Return the lamina of fibers at an angle: transformed compliances, σ_s = 0 (Jones 1999, 2.6).
-
-        S̄_11 = S_11 c⁴ + (2 S_12 + S_66) s²c² + S_22 s⁴
-        S̄_16 = (2 S_11 − 2 S_12 − S_66) s c³ − (2 S_22 − 2 S_12 − S_66) s³c
-        S̄_66 = 2 (2 S_11 + 2 S_22 − 4 S_12 − S_66) s²c² + S_66 (s⁴ + c⁴)
-
-    C = [[S̄_11, S̄_16], [S̄_16, S̄_66]]⁻¹; free strains of a unit field ε_x = d33 c² + d31 s², γ_xs = 2 (d33 − d31) s c.
-    Uniaxial as the plain one: C_11 is E_1 at no angle.
-    """
-    c, s = np.cos(of.angle), np.sin(of.angle)
-    S_11, S_22, S_12, S_66 = 1 / of.E_1, 1 / of.E_2, -of.nu_12 / of.E_1, 1 / of.G_12
-    S_xx = S_11 * c**4 + (2 * S_12 + S_66) * s**2 * c**2 + S_22 * s**4
-    S_xs = (2 * S_11 - 2 * S_12 - S_66) * s * c**3 - (2 * S_22 - 2 * S_12 - S_66) * s**3 * c
-    S_ss = 2 * (2 * S_11 + 2 * S_22 - 4 * S_12 - S_66) * s**2 * c**2 + S_66 * (s**4 + c**4)
-    C = np.linalg.inv(np.array([[S_xx, S_xs], [S_xs, S_ss]]))
-    free = np.array([of.d33 * c**2 + of.d31 * s**2, 2 * (of.d33 - of.d31) * s * c]) / of.spacing
-    return _fixed(C, C @ free)
-
-
-def _fixed(C: Array, per_volt: Array) -> Lamina:
-    C.setflags(write=False)
-    per_volt.setflags(write=False)
-    return Lamina(C, per_volt)
-
+from .lamina import Fibres, Lamina, fibre_lamina, plain_lamina
 
 MOST_LAYERS = 1000
 
@@ -145,7 +80,7 @@ class PztLayout(Record):
 
     Layers on both faces have opposite voltages. A positive voltage bends towards +y or +z (with d31 > 0), or twists by
     a positive angle. With their stiffness patches bend the link like a composite section; in the paper they add
-    nothing.
+    nothing. No voltage drives patches with open or shorted `electrodes`, or a `shunt`.
 
     Plain ceramic has one modulus and d31. Macro fiber composites have `fibre_angle`, d33 and `modulus` along the
     fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`. Fibers at an angle wind around
@@ -210,8 +145,15 @@ class PztLayout(Record):
     """Young's modulus across fibers, Pa; `modulus` is that along them."""
     shear_modulus: Annotated[Positive | None, IN_SPACE] = None
     """Shear modulus of a layer of fibers in its plane, Pa."""
-    poissons_ratio: Annotated[float | None, IN_SPACE] = None
-    """Poisson's ratio of a layer of fibers under tension along them."""
+    poissons_ratio: float | None = None
+    """Poisson's ratio −s12/s11 of the ceramic in its plane, for `strain`; of fibers under tension along them."""
+    strain: Literal["uniaxial", "biaxial"] | None = None
+    """Strain across the patch: free, with d31/s11, or held, with d31/(s11 + s12); default: held on links at least
+    three times as wide as long, and on outlined faces, where `poissons_ratio` is given."""
+    electrodes: Literal["driven", "open", "shorted"] = "driven"
+    """Electrodes of the patches: driven by voltages, not connected, or connected with each other."""
+    shunt: Positive | None = None
+    """Resistor across the electrodes of each patch, Ω, in the place of a voltage."""
     electrode_spacing: Annotated[Positive | None, IN_SPACE] = None
     """Spacing of interdigitated electrodes, m; the field per volt is its inverse; default: thickness of a layer."""
 
@@ -222,6 +164,7 @@ class PztLayout(Record):
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
         self._check_amplifier()
+        self._check_electrodes()
         if self.adds_mass and self.density is None:
             raise ValueError(f'expected the key "density" with structural = {_toml(self.structural)}, found none')
         if self.mode_weights is not None and self.point_weights is not None:
@@ -233,7 +176,7 @@ class PztLayout(Record):
 
     def _check_constants(self) -> None:
         """Raise `ValueError` for patches that do nothing, or not what `bends` says."""
-        given = [key for key in (*OF_FIBRES, "electrode_spacing") if getattr(self, key) is not None]
+        given = [key for key in (*OF_FIBRES[:-1], "electrode_spacing") if getattr(self, key) is not None]
         if not given:
             self._check_plain()
         else:
@@ -258,7 +201,7 @@ class PztLayout(Record):
                 )
         if self.limit is not None and self.amplifier is not None and self.amplifier.range is not None:
             raise ValueError('expected one of the keys "limit" and "amplifier.range", found both')
-        uses = self.amplifier is not None or "permittivity" in self.model_fields_set
+        uses = self.amplifier is not None or "permittivity" in self.model_fields_set or self.gives_way
         if uses and self.capacitance(clamped=True) <= 0.0:
             least = self.permittivity * (1.0 - self.capacitance(clamped=True) / self.capacitance())
             raise ValueError(
@@ -270,9 +213,7 @@ class PztLayout(Record):
         """Return the capacitance of one patch with all layers and faces, F: free, or clamped."""
         field = 1.0 / ((self.fibre_angle is not None and self.electrode_spacing) or self.thickness)
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
-        C, per_volt = self.lamina
-        elastic = float(per_volt @ np.linalg.lstsq(C, per_volt, rcond=None)[0]) if clamped else 0.0
-        return volume * (self.permittivity * field**2 - elastic)
+        return volume * (self.permittivity * field**2 - (self.lamina.energy if clamped else 0.0))
 
     def amplifiers(self) -> Amplifiers:
         """Return the amplifiers of all patches."""
@@ -295,14 +236,33 @@ class PztLayout(Record):
     def _check_plain(self) -> None:
         if abs(self.d31) < SMALLEST:
             raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches have no effect")
+        if self.poissons_ratio is not None and not -1.0 < self.poissons_ratio < 1.0:
+            raise ValueError(f"expected a poissons_ratio between -1 and 1, found {self.poissons_ratio:g}")
+        if self.strain == "biaxial" and self.poissons_ratio is None:
+            raise ValueError('expected the key "poissons_ratio" with strain = "biaxial", found none')
         if self.bends == "twist":
             raise ValueError(
                 f'expected the keys {quoted(OF_FIBRES)} with bends = "twist", found none: plain piezoceramic strains'
                 " alike in all directions of its plane and twists at no angle; fibers (macro fiber composites) do"
             )
 
+    def _check_electrodes(self) -> None:
+        """Raise `ValueError` for voltages on patches that have none of an amplifier, and for patches in the air."""
+        if self.shunt is not None and "electrodes" in self.model_fields_set:
+            raise ValueError(f'expected a shunt in the place of electrodes = "{self.electrodes}", found both')
+        if self.is_driven:
+            return
+        what = f'electrodes = "{self.electrodes}"' if self.shunt is None else "a shunt"
+        for key in ("limit", "amplifier", "mode_weights", "point_weights"):
+            if getattr(self, key) is not None:
+                raise ValueError(f'expected no "{key}" with {what}, which takes no voltage, found one')
+        if not (self.adds_stiffness and self.face and self.coupling == "rotation"):
+            raise ValueError(
+                f'expected a face, structural with "stiffness" and coupling = "rotation" with {what}, found others'
+            )
+
     def _check_fibres(self, given: list[str]) -> None:
-        missing = [key for key in OF_FIBRES if key not in given]
+        missing = [key for key in OF_FIBRES if getattr(self, key) is None]
         if missing:
             raise ValueError(f"expected the keys {quoted(missing)} with {given[0]}, found none")
         assert self.modulus_across is not None
@@ -342,11 +302,22 @@ class PztLayout(Record):
     def lamina(self) -> Lamina:
         """One layer by itself."""
         if self.fibre_angle is None:
-            return plain_lamina(self.modulus, self.d31, self.thickness)
+            held = self.strain == "biaxial" and self.coupling == "rotation"
+            return plain_lamina(self.modulus, self.d31, self.thickness, self.poissons_ratio if held else None)
         values = (self.modulus_across, self.shear_modulus, self.poissons_ratio, self.d33)
         across, shear, ratio, d33 = (0.0 if value is None else value for value in values)
         spacing = self.electrode_spacing or self.thickness
         return fibre_lamina(Fibres(self.modulus, across, shear, ratio, d33, self.d31, self.fibre_angle, spacing))
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether voltages drive the patches."""
+        return self.electrodes == "driven" and self.shunt is None
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether the strain of the link charges the patches: their electrodes are open, or behind a resistor."""
+        return self.electrodes == "open" or self.shunt is not None
 
     @property
     def adds_mass(self) -> bool:

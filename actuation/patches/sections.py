@@ -6,8 +6,9 @@ Layers at the distance η from the axis, on faces with the outward sign s, strai
 
     ε = u' − η κ − ζ κ_t,    γ = β |η| φ_x'
 
-with the curvatures κ towards their normal and κ_t across it, ζ across the width, and β of `sections.LinkSections.shear_lever`, and take C (ε, γ) − C Λ V
-(`lamina`). By virtual work their loads on the section are ∫ Bᵀ (C Λ V − C B e) dA with the rows B of these strains.
+with the curvatures κ towards their normal and κ_t across it, ζ across the width and β of
+`sections.LinkSections.shear_lever`, and take C (ε, γ) − C Λ V (`lamina`). By virtual work their loads on the section
+are ∫ Bᵀ (C Λ V − C B e) dA with the rows B of these strains.
 Faces are driven against each other to bend, alike to twist.
 """
 

@@ -36,7 +36,7 @@ OF_PART: dict[type, dict[str, str]] = {
     Interface: {"position": "3", "translation": "3n", "rotation": "3n"},
     StressPoint: {"position": "3", "stress": "6n", "strain": "6n", "static": "6l"},
     MeasuredValues: {"frequency": "n", "damping_ratio": "n", "computed_frequency": "n"},
-    OutlinedPatches: {"edges": "j2", "top": "jn", "bottom": "jn"},
+    OutlinedPatches: {"edges": "j2", **dict.fromkeys(("top", "bottom", "top_across", "bottom_across"), "jn")},
 }  # fmt: skip
 
 

@@ -159,3 +159,6 @@ class OutlinedPatches(Frozen):
     # positive in tension), in m² per unit of modal coordinate; None where no patches are on that face
     top: Array | None = None
     bottom: Array | None = None  # (k, n) likewise
+    # (k, n) the same of the strain across, ∫ ε_zz(Φ) ds; None in files of earlier versions, too
+    top_across: Array | None = None
+    bottom_across: Array | None = None

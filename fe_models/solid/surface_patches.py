@@ -1,7 +1,8 @@
 """Modal forces of piezoelectric patches outlined in the mesh of a solid. Importing this loads dolfinx.
 
 A patch that strains along the link loads the face beneath it by a membrane force N (N/m) along t = e_x: virtual work
-∫ N t·δε t ds. Uniaxial on purpose: an isotropic N would bend the link only (1 − ν) as much.
+∫ N t·δε t ds. One that is held across does the same along e_z, which bends the link back by ν: its N is 1/(1 − ν)
+times as large.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def outlined_patches(
     sides = ("top", "bottom") if record.faces == "both" else (record.faces,)
     forces: dict[str, Array] = {}
     for side in sides:
-        rows = []
+        rows: list[Array] = []
         for k in range(len(edges)):
             area, row = _membrane(space, facet_tags, faces[f"patch/{k}/{side}"], modes)
             wanted = record.length * record.width
@@ -58,12 +59,12 @@ def outlined_patches(
                     f"its facets have {area:.9g} m2, length × width is {wanted:.9g} m2"
                 )
             rows.append(row)
-        forces[side] = np.array(rows)
+        forces[side], forces[f"{side}_across"] = np.stack(rows, axis=1)
     return OutlinedPatches(np.array(edges), record.width, **forces)
 
 
 def _membrane(space: fem.FunctionSpace, facet_tags: MeshTags, tag: int, modes: Array) -> tuple[float, Array]:
-    """Area in m² of the facets tagged `tag`, and (n,) ∫ ε_xx(Φ) ds over them."""
+    """Area in m² of the facets tagged `tag`, and (2, n) ∫ ε_xx(Φ) ds and ∫ ε_zz(Φ) ds over them."""
     mesh = space.mesh
     facets = facet_tags.find(tag)
     # Tag 1 of a set of its own, so that one form serves all patches: its numbers are compiled into it.
@@ -72,7 +73,7 @@ def _membrane(space: fem.FunctionSpace, facet_tags: MeshTags, tag: int, modes: A
     one = fem.Constant(mesh, 1.0)
     area = fem.assemble_scalar(compiled_form(one * ds(1)))
     v = ufl.TestFunction(space)
-    work = fem.assemble_vector(compiled_form(v[0].dx(0) * ds(1)))
+    work = [fem.assemble_vector(compiled_form(v[axis].dx(axis) * ds(1))).array for axis in (0, 2)]
     # What this process adds to the degrees of freedom of others meets their ghosts in `modes`: the sum is complete.
-    total = mesh.comm.allreduce(np.append(modes.T @ work.array, area), op=MPI.SUM)
-    return float(total[-1]), total[:-1]
+    total = mesh.comm.allreduce(np.append(np.array(work) @ modes, area), op=MPI.SUM)
+    return float(total[-1]), total[:-1].reshape(2, -1)

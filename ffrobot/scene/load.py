@@ -31,6 +31,7 @@ from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS
 from .scene import Scene, SceneKeys
 
+DRIVEN = 'that voltages drive (electrodes = "driven", no shunt)'
 MADE_IN_PYTHON = "<scene made in Python>"
 
 # Keys of planar scenes that 3D scenes do not have, by the table in which they stand, and what there is instead.
@@ -290,14 +291,27 @@ def _guess_problems(scene: SceneKeys) -> Iterator[str]:
                 )
 
 
+def _commanded(analysis: Analysis) -> Iterator[str]:
+    """Names of inputs that controllers of an analysis list."""
+    for record in getattr(analysis, "controller", ()):
+        inputs = getattr(record, "inputs", ())
+        yield from () if isinstance(inputs, str) else inputs
+
+
 def _load_problems(scene: SceneKeys) -> Iterator[str]:
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
+    passive = [layout.label for layout in scene.pzt if not layout.is_driven]
+    for analysis, name in ((one, name) for one in scene.analysis for name in _commanded(one)):
+        if name.removeprefix("pzt/").rpartition("/")[0] in passive:
+            yield f'analysis "{analysis.name}": inputs: expected patches {DRIVEN}, found "{name}"'
     joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     for k, load in enumerate(scene.load, 1):
         count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
         if count and found != count:
             of = f'one for each patch of "{load.pzt}"'
             yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
+        if load.pzt in passive:
+            yield f'load no. {k}: pzt: expected patches {DRIVEN}, found "{load.pzt}"'
         joint = joints.get(load.joint or "")
         if joint is None or not _moves(joint):
             continue

@@ -8,8 +8,9 @@ import pytest
 from beam_links import beam_link, modal_body, rectangle, tube
 
 from ffrobot.actuation.patches.composite import patched_body
+from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina, plain_lamina
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
-from ffrobot.actuation.patches.records import Fibres, PztLayout, fibre_lamina
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear
@@ -121,6 +122,19 @@ def test_layer_of_fibres_at_an_angle(angle):
     C, per_volt = classical(angle)
     np.testing.assert_allclose(found.C, C, rtol=1e-12, atol=1e-3)
     np.testing.assert_allclose(found.per_volt, per_volt, rtol=1e-12, atol=1e-9 * np.abs(per_volt).max())
+
+
+def test_ceramic_held_across_in_compliances():
+    """σ_x = ε_x/s11 − d31 V/(t s11), free across; with ε_s = 0: (s11 ε_x − (s11 − s12) d31 V/t)/(s11² − s12²)."""
+    s11, nu, d31, t = 1 / 63e9, 0.35, -179e-12, 0.5e-3
+    s12 = -nu * s11
+    for held, stiffness, stress in (
+        (None, 1 / s11, d31 / s11),
+        (nu, s11 / (s11**2 - s12**2), d31 / (s11 + s12)),
+    ):
+        found = plain_lamina(1 / s11, d31, t, held)
+        np.testing.assert_allclose([found.C[0, 0], found.per_volt[0]], [stiffness, stress / t], rtol=1e-14)
+    assert found.energy == pytest.approx(2 * d31**2 / (s11 + s12) / t**2, rel=1e-14)
 
 
 @pytest.mark.parametrize("angle", [np.pi / 4, -np.pi / 4, 0.4])

@@ -63,6 +63,13 @@ def test_one_named_face_stretches_the_link_by_either_coupling(face):
     np.testing.assert_allclose(by_faces, (1 + 0.75 / 15) * by_sections, atol=1e-2 * np.abs(by_sections).max())
 
 
+def test_ceramic_held_across_bends_a_solid_as_one_that_strains_along_it_alone():
+    """N = E d31/(1 − ν) in both directions of a face that contracts by ν: 1 in the middle of a slender bar."""
+    body = link("both")
+    along, both = (on_link(body, coupling="surface", **keys).Phi_V for keys in ({}, {"poissons_ratio": 0.3}))
+    assert difference(both[:1], along[:1]).max() < 5e-3
+
+
 @pytest.mark.parametrize(("faces", "face"), [("top", "-y"), ("bottom", "+y"), ("top", "both")])
 def test_patches_on_faces_without_outlines_are_refused(faces, face):
     with pytest.raises(InputError, match="face: expected patches on faces that the link file outlines"):

@@ -1,0 +1,126 @@
+"""Patches without a voltage of an amplifier: open electrodes in closed form, resistors by their charge as a state."""
+
+import numpy as np
+import pytest
+from beam_links import beam_link, modal_body, rectangle
+from patches_on_links import SCENE
+
+import ffrobot
+from ffrobot.actuation.patches.composite import patched_body
+from ffrobot.actuation.patches.link_patches import link_patches, placed_patches
+from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.common.errors import InputError
+from ffrobot.common.validation import validate
+from ffrobot.mbs.model.body import from_modal_body
+
+E, L, H, B = 70e9, 0.3, 0.004, 0.02
+E_P, D31, T_P, EPS = 61e9, -179e-12, 1e-3, 1700 * 8.8541878128e-12
+LINK = beam_link(L, rectangle(H, B), 20, E=E, nu=0.3, name="strip", modes={"count": 8, "family": "in-plane-bending"})
+PATCH = {
+    "body": "strip", "centers": (L / 2,), "length": L, "width": B, "thickness": T_P, "modulus": E_P, "d31": D31,
+    "face": "both", "permittivity": EPS,
+}  # fmt: skip
+
+PLACE = {"centers": (0.06,), "length": 0.1}
+
+
+@pytest.fixture(scope="module")
+def strip():
+    return modal_body(LINK)
+
+
+def patched(strip, **keys):
+    layout = validate(PztLayout, PATCH | keys, SCENE)
+    return patched_body(from_modal_body("strip", strip), strip, placed_patches(SCENE, [layout], strip))
+
+
+def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip):
+    """EI κ = M + c V with one voltage, c ∫κ dx + C V = 0: the tip moves by (F L³/3 + c V L²/2)/EI."""
+    A, S, I = (2 * B * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
+    EI, c = E * B * H**3 / 12 + E_P * I, E_P * D31 * S / T_P
+    C = A * L / T_P**2 * (EPS - E_P * D31**2)
+    V = -c * L**2 / 2 / (C * EI + c**2 * L)
+    for electrodes, expected in (("shorted", L**3 / 3 / EI), ("open", (L**3 / 3 + c * V * L**2 / 2) / EI)):
+        body = patched(strip, electrodes=electrodes)
+        tip = body.points["tip"].translation[1]
+        assert tip**2 @ (1.0 / body.stiffness) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0, 4.0])
+def test_resistor_against_the_charge_as_a_state(strip, share):
+    """R q̇ + (q − Φᵀp)/C = 0; the stiffness and damping of each mode's own frequency miss it by (k² of it)²."""
+    shorted, opened = (patched(strip, electrodes=of, **PLACE) for of in ("shorted", "open"))
+    omega = np.sqrt(shorted.stiffness)
+    T = np.linalg.lstsq(opened.modal_transform, shorted.modal_transform, rcond=None)[0]
+    values, vectors = np.linalg.eigh(T.T @ np.diag(opened.stiffness) @ T - np.diag(shorted.stiffness))
+    Phi, n = vectors[:, -1] * np.sqrt(values[-1]), len(omega)  # over √C
+    assert np.abs(values[:-1]).max() < 1e-9 * values[-1]
+    lag = share / omega[0]  # R C
+    zero, none = np.zeros((n, n)), np.zeros((n, 1))
+    A = np.block(
+        [
+            [zero, np.eye(n), none],
+            [-np.diag(omega**2) - np.outer(Phi, Phi), zero, Phi[:, None]],
+            [Phi[None] / lag, none.T, -np.ones((1, 1)) / lag],
+        ]
+    )
+    exact = np.linalg.eigvals(A)
+    exact = exact[np.argsort(np.abs(exact - 1j * omega[0]))[0]]
+    driven = link_patches(SCENE, [validate(PztLayout, PATCH | PLACE, SCENE)], strip, shorted)
+    C = np.sum((shorted.modal_transform.T @ driven.Phi_V[:, 0]) ** 2) / (Phi @ Phi)
+    body = patched(strip, shunt=lag / C, **PLACE)
+    Z, I = np.zeros((n, n)), np.eye(n)  # noqa: E741
+    found = np.linalg.eigvals(np.block([[Z, I], [-np.diag(body.stiffness), -body.damping]]))
+    found = found[np.argsort(np.abs(found - 1j * omega[0]))[0]]
+    assert -exact.real / abs(exact) > 0.002
+    assert found.real == pytest.approx(exact.real, rel=0.05)
+    assert abs(found) - omega[0] == pytest.approx(abs(exact) - omega[0], rel=0.05, abs=2e-5 * omega[0])
+
+
+def test_voltages_leave_out_passive_patches(strip):
+    """Whatever is asked, they get none, and nothing drives the link."""
+    spatial = from_modal_body("strip", strip)
+    driven, open_ = (
+        validate(PztLayout, PATCH | {"name": name, "centers": [x], "length": 0.1, "allocation": "least-squares"} | keys,
+                 SCENE)
+        for name, x, keys in (("driven", 0.06, {}), ("sensor", 0.2, {"electrodes": "open"}))
+    )  # fmt: skip
+    alone, both = (link_patches(SCENE, layouts, strip, spatial) for layouts in ([driven], [driven, open_]))
+    only = link_patches(SCENE, [open_], strip, spatial)
+    F_p = np.ones((1, strip.mode_count))
+    found = both.voltages(F_p)
+    assert found["sensor"].required.tolist() == [[0.0]]
+    assert only.voltages(F_p)["sensor"].within_limit.tolist() == [[0.0]]
+    assert found["driven"].required == pytest.approx(alone.voltages(F_p)["driven"].required, rel=0.1)
+    assert not both.Phi_V[:, 1].any()
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"shunt": 1e4, "electrodes": "driven"}, 'expected a shunt in the place of electrodes = "driven", found both'),
+        ({"shunt": 1e4, "limit": 100.0}, 'expected no "limit" with a shunt, which takes no voltage, found one'),
+        ({"electrodes": "open", "amplifier": {"slew": 1.0}}, 'expected no "amplifier" with electrodes = "open"'),
+        ({"shunt": 0.0}, "greater than 0"),
+        ({"permittivity": 0.0}, "greater than 0"),
+        ({"permittivity": 1e-9, "shunt": 1e4}, "expected a permittivity above 1.955e-09 F/m"),
+        ({"electrodes": "open", "structural": False}, 'expected a face, structural with "stiffness"'),
+        ({"amplifier": {"range": [200.0, -50.0]}}, "expected a negative and a positive voltage"),
+        ({"strain": "biaxial"}, 'expected the key "poissons_ratio" with strain = "biaxial"'),
+        ({"poissons_ratio": 1.2}, "expected a poissons_ratio between -1 and 1"),
+    ],
+)
+def test_contradictions(keys, message):
+    with pytest.raises(InputError, match=message):
+        validate(PztLayout, PATCH | keys, SCENE)
+
+
+def test_voltages_for_passive_patches_are_refused():
+    scene = {
+        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "strip", "link": LINK}],
+        "joint": [{"name": "wall", "type": "weld", "between": ["ground", "strip.root"]}],
+        "pzt": [PATCH | {"shunt": 1e4}], "load": [{"pzt": "strip", "voltage": ["1.0"]}],
+        "analysis": [{"name": "bent", "kind": "static"}],
+    }  # fmt: skip
+    with pytest.raises(InputError, match=r'load no. 1: pzt: expected patches that voltages drive .*, found "strip"'):
+        ffrobot.make_scene(**scene)
