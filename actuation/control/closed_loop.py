@@ -59,8 +59,8 @@ class ClosedLoop(SampledAnalysis):
     """Motion under sampled control; reference, feed-forward and start are those of the inverse analysis `actuation`.
 
     Samples are at 0, sample_time, …; a zero-order hold applies the command of each `delay` later. Torques and voltages
-    are limited as in the scene unless `unlimited`; bandwidth and delay of amplifiers act in any case, but the linear
-    model of the loop leaves them out. An initial state of [initial] is on the trajectories.
+    are limited as in the scene unless `unlimited`; bandwidth and delay of amplifiers act in any case, also in margins.
+    Hysteresis is not linear, and margins leave it out. An initial state of [initial] is on the trajectories.
 
     Sensors name patches by their layout. Joints with several coordinates have one signal per coordinate, "joint/NAME
     1", "joint/NAME 2", with the same gains.
@@ -212,7 +212,11 @@ def loops_about(
         return None if inner is None else observed.schedule.at(float(setup.times[first])).closed(inner)
 
     found = [(model, at(min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
-    known = [(model, feedback.behind(*filtering)) for model, feedback in found if feedback is not None]
+    of, motors = joined(setup.patches.values()), np.zeros((2, len(setup.robot.motors)))
+    late = np.hstack([motors, np.stack([of.lag, of.delay])])
+    known = [
+        (model, replace(feedback.behind(*filtering), late=late)) for model, feedback in found if feedback is not None
+    ]
     return known if len(known) == len(found) else []
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, NDArray, as_floats
+from ...common.arrays import Array, ComplexArray, Indices, NDArray, as_floats
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
@@ -262,26 +262,32 @@ class SampledModel:
 
     A: Array
     B: Array
+    last: Indices  # (inputs,) of the state, commands that act until the sample
 
 
-def sampled(A: Array, B: Array, T: float, delay: float, *, with_last: bool = False) -> SampledModel:
+def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bool = False) -> SampledModel:
     """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3).
 
-    `with_last`: without delay, too, the last command is a state, which acts until the sample.
+    `delay` (s) of all inputs, or of each. `with_last`: without delay, too, the last command is a state, which acts
+    until the sample.
     """
     n, m = B.shape
-    late, fraction = divmod(delay, T)
+    late, fraction = np.divmod(np.broadcast_to(delay, m), T)
     is_whole = fraction <= 1e-9 * T
-    waiting = max(int(late) + (not is_whole), int(with_last))
+    ages = np.maximum(late + ~is_whole, int(with_last)).astype(int)  # of the command that acts until the sample
+    waiting = int(ages.max(initial=0))
     Phi, Gamma = zero_order_hold(A, B, T)
-    early = Gamma if is_whole else zero_order_hold(A, B, T - fraction)[1]
+    early = Gamma.copy()
+    for part in np.unique(fraction[~is_whole]):
+        early[:, fraction == part] = zero_order_hold(A, B[:, fraction == part], T - float(part))[1]
     columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
     columns[:n, :n] = Phi
     columns[n:, n + m :] = np.eye(waiting * m)
-    columns[:n, n : n + m] = Gamma - early  # the oldest command acts for the first part of the interval
-    next_one = n + m * (waiting - int(late))
-    columns[:n, next_one : next_one + m] = early
-    return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :])
+    places = n + m * (waiting - late.astype(int)) + np.arange(m)
+    columns[:n, places] = early
+    columns[:n, (places - m)[~is_whole]] = (Gamma - early)[:, ~is_whole]  # the older one acts first in the interval
+    last = n + m * (waiting - ages) + np.arange(m)
+    return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :], last)
 
 
 def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:

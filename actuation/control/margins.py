@@ -49,6 +49,8 @@ class Feedback:
     # of commands and readings; a reading's rate is "NAME/rate", its acceleration "NAME/acceleration"
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    # (2, inputs) time constants and further delays of commands behind amplifiers, s; None without
+    late: Array | None = None
 
     def times(self, factor: float) -> Feedback:
         """All commands times a factor."""
@@ -152,11 +154,18 @@ def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: fl
     """Return eigenvalues of the sampled loop: plant, commands on their way, and controller states."""
     seen, felt = _readings(model, feedback.outputs)
     columns = model.inputs(feedback.inputs)
-    plant = sampled(model.A, model.B[:, columns], T, delay, with_last=bool(felt.any()))
+    lag, wait = np.zeros((2, len(columns))) if feedback.late is None else feedback.late
+    slow = np.flatnonzero(lag)
+    A, B, n = model.A, model.B[:, columns], len(model.A)
+    A = np.block([[A, B[:, slow]], [np.zeros((len(slow), n)), -np.diag(1.0 / lag[slow])]])
+    B = np.vstack([np.where(lag > 0.0, 0.0, B), (np.eye(len(columns)) / np.where(lag > 0.0, lag, 1.0))[slow]])
+    plant = sampled(A, B, T, delay + wait, with_last=bool(felt.any()))
     y = np.zeros((len(seen), len(plant.A)))
-    y[:, : len(model.A)] = seen
-    if felt.any():  # accelerations under the oldest command on its way, which acts until the sample
-        y[:, len(model.A) : len(model.A) + len(columns)] = felt[:, columns]
+    y[:, :n] = seen
+    if felt.any():  # accelerations under the voltages of slow amplifiers, or the command that acts until the sample
+        places = plant.last.copy()
+        places[slow] = n + np.arange(len(slow))
+        y[:, places] = felt[:, columns]
     F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
     return np.asarray(np.linalg.eigvals(F), dtype=complex)
 

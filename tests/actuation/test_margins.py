@@ -1,15 +1,19 @@
 """Margins of sampled joint loops against closed forms and simulated boundaries; suggested gains on random arms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from beam_links import beam_link, tube
+from scipy.linalg import expm
 
-from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies
+from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies, sampled
 from ffrobot.actuation.control.margins import (
     FRACTION,
     joint_gains,
     joint_inertia,
     light_roots,
+    loop_eigenvalues,
     lowest_frequency,
     margins,
     spectral_radius,
@@ -94,6 +98,29 @@ def test_delay_margin_of_a_fast_sampled_loop_is_that_of_the_continuous_one():
     phase = np.arctan2(D * omega, P)
     found = margins([(plants[0], joint_gains(plants[0], [pid(P, D)], fast))], fast, 0.0)
     assert found.delay == pytest.approx(phase / omega - fast / 2, rel=5e-3)  # holding is T/2 to (ωT)²/12 = 1e-4
+
+
+def test_amplifiers_are_in_the_loop():
+    """A lag is a state, V' = (u − V)/τ, a delay of the amplifier one more of the loop; of two inputs each its own."""
+    plant, tau = models(wheel())[0], 0.7 * T
+    gains = joint_gains(plant, [pid(20.0, 4.0)], T)
+    slow = np.block([[plant.A, plant.B], [np.zeros((1, 2)), -np.ones((1, 1)) / tau]])
+    both = np.block([[slow, np.array([[0.0], [0.0], [1 / tau]])], [np.zeros((1, 4))]])
+    step = expm(both * T)
+    expected = step[:3, :3] + step[:3, 3:] @ np.array([[-20.0, -4.0, 0.0]])
+    found = loop_eigenvalues(plant, replace(gains, late=np.array([[tau], [0.0]])), T, 0.0)
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.linalg.eigvals(expected)), atol=1e-10)
+    late = loop_eigenvalues(plant, replace(gains, late=np.array([[0.0], [1.3 * T]])), T, 0.5 * T)
+    np.testing.assert_allclose(np.abs(late).max(), spectral_radius(plant, gains, T, 1.8 * T), rtol=1e-10)
+    two = np.hstack([plant.B, 3.0 * plant.B])
+    model, (single, waiting) = (
+        sampled(plant.A, two, T, np.array([0.0, T])),
+        (sampled(plant.A, column, T, delay) for column, delay in ((two[:, :1], 0.0), (two[:, 1:], T))),
+    )
+    x = np.random.default_rng(0).standard_normal(4)  # the state, and both inputs a sample ago
+    u = np.array([1.0, -2.0])
+    alone = single.A @ x[:2] + single.B[:, 0] * u[0] + (waiting.A @ np.append(0.0 * x[:2], x[3]))[:2]
+    np.testing.assert_allclose((model.A @ x + model.B @ u)[:2], alone, rtol=1e-12)
 
 
 def test_integral_and_differences_are_in_the_loop():
