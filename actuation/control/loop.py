@@ -10,6 +10,7 @@ from ...common.arrays import Array, Booleans, ComplexArray
 from ...common.peaks import largest, root_mean_square
 from ...common.structs import struct
 from ...mbs.model.amplifiers import Amplifiers
+from ...mbs.model.hysteresis import Played
 from ...mbs.run.record import Details
 from ...mbs.run.samples import in_order
 from .controllers import Controller
@@ -107,7 +108,10 @@ class AmplifiedLoop:
         self.times: Array = (samples[:, None] + self._h * np.arange(self._parts)).ravel()
         self.first, self.taken = loop.first, 0
         self.commands = np.zeros((len(self.times), len(self.first)))
-        self._now = self.first[len(self.first) - len(directions) :]
+        self._compensated, self._played = Played(amplifiers.compensator), Played(amplifiers.hysteresis)
+        motors = len(self.first) - len(directions)
+        self._now = self._compensated.at(self.first[motors:])
+        self.first = np.append(self.first[:motors], self._played.at(self._now))
 
     def __call__(self, k: int, t: float, state: Array) -> Array:
         """Commands in step k."""
@@ -116,10 +120,11 @@ class AmplifiedLoop:
         loop, motors = self._loop, len(self.first) - len(self._now)
         last = loop.commands[loop.taken - 1]
         wanted = np.array([self._wanted(t, motors + j, d) for j, d in enumerate(self._amplifiers.delay)])
+        wanted = self._compensated.at(wanted)
         self._now, mean = self._amplifiers.advance(
             self._h, self._now, (wanted, wanted), self._directions @ state[self._v]
         )
-        command: Array = np.concatenate([last[:motors], mean])
+        command: Array = np.concatenate([last[:motors], self._played.at(mean, self._now)])
         self.commands[k], self.taken = command, k + 1
         return command
 

@@ -14,6 +14,7 @@ from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
 from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
 from ...mbs.model.amplifiers import Amplifiers
+from ...mbs.model.hysteresis import MOST_PLAYS
 from .lamina import Fibres, Lamina, fibre_lamina, plain_lamina
 
 MOST_LAYERS = 1000
@@ -75,6 +76,29 @@ class Amplifier(Record):
         return self.model_copy(update={**least, "range": range, "delay": float(np.max(self.delay))})
 
 
+class HysteresisKeys(Record):
+    """Hysteresis of the patches of a layout in forward runs, closed loops and loads: a sum of play operators.
+
+    Under a voltage V a patch acts as under Σ w z: z follows V at the distance of a threshold. The other analyses plan
+    without it.
+    """
+
+    weights: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PLAYS)]
+    """Weights w."""
+    thresholds: tuple[NotNegative, ...]
+    """Thresholds, V, ascending from 0."""
+    compensate: bool = False
+    """Inverse of the hysteresis in front of voltages of replays and controllers."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.thresholds) != len(self.weights):
+            raise ValueError(f"expected {len(self.weights)} thresholds, as weights, found {len(self.thresholds)}")
+        if self.thresholds[0] != 0.0 or min(np.diff(self.thresholds), default=1.0) <= 0.0:
+            raise ValueError(f"thresholds: expected ascending voltages from 0 on, found {list(self.thresholds)}")
+        return self
+
+
 class PztLayout(Record):
     """Equal piezoelectric patches along one link; several layouts on a body have names.
 
@@ -111,6 +135,8 @@ class PztLayout(Record):
     """Largest voltage, V: of all, or of each."""
     amplifier: Amplifier | None = None
     """Amplifier of the patches."""
+    hysteresis: HysteresisKeys | None = None
+    """Hysteresis of the patches."""
     permittivity: Positive = PERMITTIVITY
     """Permittivity along the field at constant stress, F/m, for the capacitance; default: that of PZT-5A."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
@@ -224,8 +250,14 @@ class PztLayout(Record):
 
         limit = each(self.limit)
         range = np.stack([-limit, limit]) if of.range is None else np.broadcast_to(np.array(of.range), (k, 2)).T
+        plays, hysteresis = np.zeros((2, MOST_PLAYS, k)), self.hysteresis
+        given = ((1.0,), (0.0,)) if hysteresis is None else (hysteresis.weights, hysteresis.thresholds)
+        plays[:, : len(given[0])] = np.array(given)[:, :, None]
         capacitance = each(self.capacitance(clamped=True))
-        return Amplifiers(range, each(of.slew), each(of.current), capacitance, each(of.bandwidth), each(of.delay))
+        compensated = each(float(hysteresis is not None and hysteresis.compensate))
+        return Amplifiers(
+            range, each(of.slew), each(of.current), capacitance, each(of.bandwidth), each(of.delay), plays, compensated
+        )
 
     def with_one_limit(self, **changes: object) -> Self:
         """Return a changed copy with one limit for all patches, whose number may change."""
@@ -253,7 +285,7 @@ class PztLayout(Record):
         if self.is_driven:
             return
         what = f'electrodes = "{self.electrodes}"' if self.shunt is None else "a shunt"
-        for key in ("limit", "amplifier", "mode_weights", "point_weights"):
+        for key in ("limit", "amplifier", "hysteresis", "mode_weights", "point_weights"):
             if getattr(self, key) is not None:
                 raise ValueError(f'expected no "{key}" with {what}, which takes no voltage, found one')
         if not (self.adds_stiffness and self.face and self.coupling == "rotation"):

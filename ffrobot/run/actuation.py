@@ -6,10 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
-from ..common.arrays import Array, Indices
+from ..common.arrays import Array, Indices, as_floats, as_list
 from ..common.structs import struct
+from ..mbs.fields.waypoints import spline
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model, modal_directions
 from ..mbs.quantities.supply import actuator_forces, motors_fit
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from ..actuation.patches.patches import Voltages
 
 Bodies = Mapping[str, LoadedBody]
+HYSTERESIS_TIMES = 20_001  # between which voltages of loads are straight
 FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
 
 
@@ -76,13 +80,19 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
 
 
 def given_voltages(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
-    """Yield the drives of voltages that the scene prescribes for patches."""
+    """Yield the drives of voltages that the scene prescribes for patches, behind their hysteresis."""
+    last = max((analysis.last_time for analysis in model.scene.analysis), default=0.0) or 1.0
+    times = as_floats(np.linspace(0.0, last, HYSTERESIS_TIMES))
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
     for load in model.scene.load:
         if load.pzt is not None:
             of_link = patches[bodies[load.pzt]]
             directions = modal_directions(model, of_link.per_volt)[of_link.columns(load.pzt)]
-            yield from map(Drive, directions, load.voltage or ())
+            voltage, amplifiers = load.voltage or (), of_link.arrays[load.pzt].amplifiers
+            if amplifiers.hysteresis.acts:
+                wanted = np.stack([function.sample(as_list(times))[0] for function in voltage], axis=1)
+                voltage = tuple(spline(times, amplifiers.hysteresis.output(wanted), 1))
+            yield from map(Drive, directions, voltage)
 
 
 def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:

@@ -7,13 +7,14 @@ of a volt, C is the capacitance of the patch on a link that stands still (Lee an
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Protocol
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.structs import struct
+from .hysteresis import MOST_PLAYS, Hysteresis
 
 
 @struct
@@ -26,6 +27,8 @@ class Amplifiers:
     capacitance: Array  # (k,) F, see above
     bandwidth: Array  # (k,) of first order, Hz
     delay: Array  # (k,) s
+    plays: Array  # (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis
+    compensated: Array  # (k,) 1.0 where wanted voltages go through the inverse of the hysteresis first, else 0.0
 
     @property
     def lag(self) -> Array:
@@ -40,12 +43,26 @@ class Amplifiers:
     @property
     def acts(self) -> bool:
         """Whether voltages may arrive late."""
-        return self.has_rates or bool(self.lag.any() or self.delay.any())
+        return self.has_rates or self.hysteresis.acts or bool(self.lag.any() or self.delay.any())
+
+    @property
+    def hysteresis(self) -> Hysteresis:
+        """Of the patches."""
+        return Hysteresis(*self.plays)
+
+    @property
+    def compensator(self) -> Hysteresis:
+        """What wanted voltages go through before the amplifier."""
+        inverse = self.hysteresis.inverse
+        none = 1.0 - self.compensated
+        weights = self.compensated * inverse.weights
+        weights[0] += none
+        return Hysteresis(weights, inverse.thresholds)
 
     def unlimited(self) -> Amplifiers:
-        """Return amplifiers with the same lag and delay, without limits."""
+        """Return the same amplifiers without limits."""
         none = np.full_like(self.slew, np.inf)
-        return Amplifiers(np.stack([-none, none]), none, none, self.capacitance, self.bandwidth, self.delay)
+        return replace(self, range=np.stack([-none, none]), slew=none, current=none)
 
     def advance(self, h: float, now: Array, wanted: tuple[Array, Array], strain: Array) -> tuple[Array, Array]:
         """Voltages (k,) after a step `h` (s) from those `now`, and their means, V.
@@ -65,13 +82,17 @@ class Amplifiers:
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
-        """Voltages (T, k), V, at `times` (T,), s, of `wanted` (T, k), linear between; `strain` (T, k) as before."""
+        """Voltages (T, k), V, that patches act under at `times` (T,), s, of `wanted` (T, k), linear between.
+
+        `strain` (T, k) as before.
+        """
+        wanted = self.compensator.output(wanted)
         late = [np.interp(times - d, times, V) for d, V in zip(self.delay, wanted.T, strict=True)]
         asked, limited = np.stack(late, axis=1), np.zeros_like(wanted)
         limited[0] = np.clip(asked[0], *self.range)
         for k, h in enumerate(np.diff(times)):
             limited[k + 1] = self.advance(h, limited[k], (asked[k], asked[k + 1]), (strain[k] + strain[k + 1]) / 2)[0]
-        return limited
+        return self.hysteresis.output(limited)
 
 
 class Driven(Protocol):
@@ -85,6 +106,9 @@ class Driven(Protocol):
 def joined(links: Iterable[Driven]) -> Amplifiers:
     """Return the amplifiers of all patches of links, one link after the other."""
     none = np.zeros(0)
-    parts = [Amplifiers(np.zeros((2, 0)), *[none] * 5), *(of_link.amplifiers for of_link in links)]
+    parts = [
+        Amplifiers(np.zeros((2, 0)), none, none, none, none, none, np.zeros((2, MOST_PLAYS, 0)), none),
+        *(of_link.amplifiers for of_link in links),
+    ]
     keys = [field.name for field in fields(Amplifiers)]
     return Amplifiers(*(as_floats(np.concatenate([getattr(of, key) for of in parts], axis=-1)) for key in keys))

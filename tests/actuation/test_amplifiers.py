@@ -112,16 +112,15 @@ def test_unequal_ranges(solved):
         np.testing.assert_array_equal(results.attributes("carried/pzt/arm")["range"], np.transpose(ranges))
 
 
+OPEN_LOOP = (
+    'kind = "forward"\nactuation = "carried"\napply = "joints"\n',
+    'kind = "closed-loop"\nsample_time = 1e-4\ndelay = 0.0\nfeed_forward = "joints+pzt"\nactuation = "carried"\n',
+)
+
+
 def test_amplifiers_in_replays_and_loops(solved):
     """A lag of 1 kHz costs microns; a loop without controllers, sampled fast, has the same voltages and motion."""
-    loop = """kind = "closed-loop"
-sample_time = 1e-4
-delay = 0.0
-feed_forward = "joints+pzt"
-actuation = "carried"
-"""
-    changes = ('kind = "forward"\nactuation = "carried"\napply = "joints"\n', loop)
-    with solved("bandwidth = 1000.0\ndelay = 2e-4", changes) as results:
+    with solved("bandwidth = 1000.0\ndelay = 2e-4", OPEN_LOOP) as results:
         assert 5e-6 < off_path(results, "replay") < 4e-5
         found = [results[f"{name}/points/arm.tip/position"] for name in ("replay", "without_patches")]
         assert np.abs(found[1] - found[0]).max() < 0.1 * off_path(results, "replay")
@@ -142,3 +141,59 @@ actuation = "carried"
 def test_amplifiers_that_do_not_fit(keys, text):
     with pytest.raises(ValueError, match=text):
         layout(**keys)
+
+
+HYSTERESIS = {"weights": (0.8, 0.1, 0.06, 0.04), "thresholds": (0.0, 10.0, 30.0, 55.0)}
+
+
+def test_inverse_of_hysteresis_and_loop_area():
+    """H⁻¹ H = H H⁻¹ = 1 from rest; a cycle of amplitude A loses Σ 4 w r (A − r); a play operator written otherwise."""
+    of = layout(count=1, hysteresis=HYSTERESIS).amplifiers().hysteresis
+    rng = np.random.default_rng(59)
+    V = np.cumsum(rng.normal(0.0, 8.0, 4000))[:, None]
+    for first, second in ((of, of.inverse), (of.inverse, of)):
+        np.testing.assert_allclose(second.output(first.output(V)), V, atol=1e-12 * np.abs(V).max())
+    A = 100.0
+    cycle = A * np.concatenate([np.linspace(0, 1, 101), np.linspace(1, -1, 401), np.linspace(-1, 1, 401)])[:, None]
+    turn = np.s_[100:]
+    found = of.output(cycle)
+    lost = np.sum((found[turn][1:] + found[turn][:-1]) / 2 * np.diff(cycle[turn], axis=0))
+    wanted = sum(4 * w * r * (A - r) for w, r in zip(*HYSTERESIS.values(), strict=True))
+    assert -lost == pytest.approx(wanted, rel=1e-12)
+    expected = np.zeros_like(V)
+    for w, r in zip(*HYSTERESIS.values(), strict=True):
+        z = 0.0
+        for k, now in enumerate(V[:, 0]):
+            if abs(now - z) > r:
+                z = now - np.sign(now - z) * r
+            expected[k] += w * z
+    np.testing.assert_allclose(of.output(V), expected, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"thresholds": (0.0, 1.0)}, "expected 4 thresholds, as weights, found 2"),
+        ({"thresholds": (0.0, 30.0, 10.0, 55.0)}, "expected ascending voltages from 0 on"),
+        ({"thresholds": (1.0, 10.0, 30.0, 55.0)}, "expected ascending voltages from 0 on"),
+        ({"weights": (0.8, 0.1, 0.0, 0.1)}, "greater than 0"),
+    ],
+)
+def test_hysteresis_without_an_inverse_is_refused(keys, message):
+    with pytest.raises(ValueError, match=message):
+        layout(count=1, hysteresis=HYSTERESIS | keys)
+
+
+def test_hysteresis_leaves_a_path_and_its_inverse_comes_back(solved):
+    """Tracking plans without it; replays and a loop without controllers, sampled fast, act through it.
+
+    The inverse asks for more than the limits here and there: both are without.
+    """
+    text = "delay = 0.0\n[pzt.hysteresis]\nweights = [0.8, 0.1, 0.1]\nthresholds = [0.0, 5.0, 15.0]\n"
+    off = {}
+    for name, amplifier in (("without", "delay = 0.0"), ("with", text), ("inverse", f"{text}compensate = true\n")):
+        with solved(amplifier, (OPEN_LOOP[0], f"{OPEN_LOOP[1]}unlimited = true\n")) as results:
+            off[name] = np.array([off_path(results, of) for of in ("replay", "without_patches")])
+    assert (off["with"] > 1e-5).all()
+    assert off["with"][1] == pytest.approx(off["with"][0], rel=0.01)
+    np.testing.assert_allclose(off["inverse"], off["without"], atol=0.01 * off["with"][0])

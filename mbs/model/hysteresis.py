@@ -1,0 +1,56 @@
+"""Hysteresis of patches by play operators, and its inverse.
+
+Of a voltage V over time the play operator of threshold r has z = max(V − r, min(V + r, z)), and a patch acts as under
+the voltage Σ w z (Prandtl and Ishlinskii). The inverse has the same form (Kuhnen, Eur. J. Control 9, 2003, eq. 20):
+with W_i = w_0 + … + w_i its weights are 1/W_i − 1/W_(i−1), its thresholds Σ_(j≤i) w_j (r_i − r_j).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.structs import struct
+
+MOST_PLAYS = 32
+
+
+@struct
+class Hysteresis:
+    """Play operators of k patches; thresholds ascend from 0, spare ones have no weight."""
+
+    weights: Array  # (MOST_PLAYS, k)
+    thresholds: Array  # (MOST_PLAYS, k) V
+
+    @property
+    def acts(self) -> bool:
+        """Whether any patch acts otherwise than its voltage says."""
+        return bool(self.weights[1:].any() or (self.weights[:1] != 1.0).any())
+
+    @property
+    def inverse(self) -> Hysteresis:
+        """Voltages that patches take to act as wanted, from rest on."""
+        W = np.cumsum(self.weights, axis=0)
+        weights = np.diff(1.0 / W, axis=0, prepend=0.0)
+        return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
+
+    def output(self, V: Array) -> Array:
+        """(T, k) voltages that patches act under of V (T, k), straight between these, from rest."""
+        played = Played(self)
+        return np.array([played.at(now) for now in V]).reshape(V.shape)
+
+
+class Played:
+    """Play operators on their way, from rest."""
+
+    def __init__(self, of: Hysteresis) -> None:
+        self._of, self._z = of, np.zeros_like(of.weights)
+
+    def at(self, V: Array, last: Array | None = None) -> Array:
+        """(k,) voltages that patches act under at V (k,); they go straight there, and on to the `last` (k,)."""
+        found = as_floats((self._of.weights * self._after(V)).sum(axis=0))
+        self._z = self._after(V if last is None else last)
+        return found
+
+    def _after(self, V: Array) -> Array:
+        return np.clip(self._z, V - self._of.thresholds, V + self._of.thresholds)
