@@ -246,10 +246,11 @@ def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None =
     A patch reads its charge c [φ'(x2) − φ'(x1)] over its capacitance. By reciprocity the charge of a rotation is the
     moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The free capacitance of a patch is that of its
     layers; one that also drives the link is read through a bridge, which leaves this voltage (Dosch, Inman and Garcia,
-    J. Intell. Mater. Syst. Struct. 3, 1992).
+    J. Intell. Mater. Syst. Struct. 3, 1992). Without charge a strained patch has the clamped capacitance.
     """
     array, columns = of_link.arrays[layout], of_link.columns(layout)
-    volts = array.moment_per_volt / (array.layout.capacitance() if capacitance is None else capacitance)
+    own = array.layout.capacitance(clamped=array.layout.electrodes == "open")
+    volts = array.moment_per_volt / (own if capacitance is None else capacitance)
     return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
 
 

@@ -438,12 +438,15 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
     outlined_on = {"+y": patches.top, "-y": patches.bottom}
     if layout.strain == "biaxial":
         across = {"+y": patches.top_across, "-y": patches.bottom_across}
-        if any(of is not None and across[face] is None for face, of in outlined_on.items()):
+        if any((of is None) != (across[face] is None) for face, of in outlined_on.items()):
             raise InputError(
                 f'{key}: strain: expected "uniaxial", or a modal body file with strains across outlined patches, found'
                 " one of an earlier version: recompute it from its link file with `ffrobot link`"
             )
-        outlined_on = {face: of if of is None else of + across[face] for face, of in outlined_on.items()}
+        outlined_on = {
+            face: None if of is None or (more := across[face]) is None else of + more
+            for face, of in outlined_on.items()
+        }
     wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else []
     if missing := [face for face in wanted if outlined_on[face] is None]:
         raise InputError(

@@ -155,7 +155,7 @@ class LinkPatches:
 
 
 def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
-    """(k,) whether voltages drive the patches."""
+    """Return (k,) whether voltages drive the patches."""
     return np.concatenate([np.full(len(one.edges), one.layout.is_driven) for one in placed])
 
 

@@ -42,7 +42,7 @@ def find_stresses(
     """
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None and has_stresses(body.modal)}
     stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}
-    unknown = {name for name, of in stiff.items() if _in_plane(of) is None}
+    unknown = {name for name, of in stiff.items() if _in_plane(of, bodies[name].spatial) is None}
     unknown |= {piece for name in stiff.keys() & divided.keys() for piece in divided[name].names}
     known = [name for name, link in links.items() if link.stress_loads and name not in unknown]
     loads = loads_on_links(run, known) if known else {}
@@ -68,10 +68,14 @@ def _of_pieces(stresses: Sequence[BodyStress], p: Array) -> BodyStress:
     return BodyStress(points, None, replace(mode_displacement(p), method=method))
 
 
-def _in_plane(of_link: LinkPatches) -> PatchArray | None:
+def _in_plane(of_link: LinkPatches, spatial: Body) -> PatchArray | None:
     """The patches of a link where all that they do to its sections is to bend them in the plane, and to stretch."""
     array, *others = of_link.arrays.values()
-    is_plain = array.layout.acts_in == "in-plane" and array.layout.fibre_angle is None
+    layout, moves = array.layout, spatial.modal_transform.any(axis=1)
+    feels_across = layout.face and any(
+        moves[k] for k, of in enumerate(array.link.family) if of == "out-of-plane-bending"
+    )
+    is_plain = layout.acts_in == "in-plane" and layout.fibre_angle is None and not layout.gives_way and not feels_across
     return array if is_plain and not others else None
 
 
@@ -83,7 +87,7 @@ def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, lo
     from ..actuation.patches.composite import PlacedLayout, section_loads
     from ..actuation.patches.patches import voltage_gain
 
-    array = _in_plane(of_link)
+    array = _in_plane(of_link, spatial)
     if array is None or not np.isfinite(array.authority).all():
         return None
     F_p = of_link.reached.forces(loads.modal_force @ spatial.on_file)

@@ -35,7 +35,7 @@ class Hysteresis:
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
 
     def output(self, V: Array) -> Array:
-        """(T, k) voltages that patches act under of V (T, k), straight between these, from rest."""
+        """Return (T, k) voltages that patches act under of V (T, k), straight between these, from rest."""
         played = Played(self)
         return np.array([played.at(now) for now in V]).reshape(V.shape)
 
@@ -47,7 +47,7 @@ class Played:
         self._of, self._z = of, np.zeros_like(of.weights)
 
     def at(self, V: Array, last: Array | None = None) -> Array:
-        """(k,) voltages that patches act under at V (k,); they go straight there, and on to the `last` (k,)."""
+        """Return the voltages (k,) that patches act under at V (k,), on their way to the `last` (k,)."""
         found = as_floats((self._of.weights * self._after(V)).sum(axis=0))
         self._z = self._after(V if last is None else last)
         return found

@@ -12,12 +12,12 @@ from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.validation import validate
 from ffrobot.mbs.model.body import from_modal_body
 
-STRIP = {"size": (0.3, 0.003, 0.04), "E": 70e9, "nu": 0.33, "rho": 2700.0}
+STRIP = {"size": (0.4, 0.003, 0.02), "E": 70e9, "nu": 0.33, "rho": 2700.0}
 CERAMIC = {"E": 61e9, "nu": 0.35, "rho": 7700.0, "d31": -179e-12, "permittivity": 1700 * 8.8541878128e-12}
 PLACES = {  # begin and end, thickness, width, offset, m
-    "wide": (0.1, 0.16, 0.25e-3, 0.04, 0.0),
-    "offset": (0.1, 0.16, 0.25e-3, 0.012, 0.012),
-    "near the clamp": (0.01, 0.07, 0.25e-3, 0.02, 0.0),
+    "wide": (0.1, 0.16, 0.25e-3, 0.02, 0.0),
+    "offset": (0.1, 0.16, 0.25e-3, 0.008, 0.006),
+    "near the clamp": (0.005, 0.065, 0.25e-3, 0.02, 0.0),
 }
 
 
@@ -34,7 +34,7 @@ def strip():
 def test_one_patch_on_a_strip(strip, name, frequency, tip):
     """The clamp keeps sections flat over half their width: a patch there is held across, and the model's is not."""
     start, end, t, w, offset = PLACES[name]
-    solid = SolidStrip(STRIP, CERAMIC | {"place": PLACES[name]}, size=0.006)
+    solid = SolidStrip(STRIP, CERAMIC | {"place": PLACES[name]}, size=0.005)
     keys = {
         "body": "link", "centers": ((start + end) / 2,), "length": end - start, "thickness": t, "width": w,
         "offset": offset, "face": "+y", "modulus": CERAMIC["E"], "d31": CERAMIC["d31"], "density": CERAMIC["rho"],
