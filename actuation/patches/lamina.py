@@ -40,16 +40,19 @@ class Fibres(NamedTuple):
 
 
 @lru_cache
-def plain_lamina(modulus: float, d31: float, thickness: float, held: float | None = None) -> Lamina:
+def plain_lamina(
+    modulus: float, d31: float, thickness: float, nu: float | None = None, *, held: bool = False
+) -> Lamina:
     """Lamina of a ceramic isotropic in its plane, its electrodes `thickness` (m) apart; γ is computed from the link.
 
     Its free strain is alike in all directions, too, so that it never shears, at whatever angle it lies. Free across:
-    E = 1/s_11 and E d31. With ν = −s_12/s_11 held across (σ_s ≠ 0): E/(1 − ν²) and d31/(s_11 + s_12) = E d31/(1 − ν).
+    E = 1/s_11 and E d31. With ν = −s_12/s_11 `held` across (σ_s ≠ 0): E/(1 − ν²) and d31/(s_11 + s_12) = E d31/(1 − ν).
+    A link that stands still holds it in both directions.
     """
-    nu = held or 0.0
-    stress = modulus * d31 / thickness
-    C, per_volt = np.diag([modulus / (1.0 - nu**2), 0.0]), np.array([stress / (1.0 - nu), 0.0])
-    return _fixed(C, per_volt, 0.0 if held is None else stress * d31 / thickness)
+    ratio, stress = nu or 0.0, modulus * d31 / thickness
+    across = ratio if held else 0.0
+    C, per_volt = np.diag([modulus / (1.0 - across**2), 0.0]), np.array([stress / (1.0 - across), 0.0])
+    return _fixed(C, per_volt, stress * d31 / thickness * (1.0 if nu is None else 2.0 / (1.0 - ratio)))
 
 
 @lru_cache
@@ -70,10 +73,10 @@ def fibre_lamina(of: Fibres) -> Lamina:
     S_ss = 2 * (2 * S_11 + 2 * S_22 - 4 * S_12 - S_66) * s**2 * c**2 + S_66 * (s**4 + c**4)
     C = np.linalg.inv(np.array([[S_xx, S_xs], [S_xs, S_ss]]))
     free = np.array([of.d33 * c**2 + of.d31 * s**2, 2 * (of.d33 - of.d31) * s * c]) / of.spacing
-    return _fixed(C, C @ free)
+    return _fixed(C, C @ free, float(free @ C @ free))
 
 
-def _fixed(C: Array, per_volt: Array, across: float = 0.0) -> Lamina:
+def _fixed(C: Array, per_volt: Array, energy: float) -> Lamina:
     C.setflags(write=False)
     per_volt.setflags(write=False)
-    return Lamina(C, per_volt, across + float(per_volt @ np.linalg.lstsq(C, per_volt, rcond=None)[0]))
+    return Lamina(C, per_volt, energy)

@@ -335,7 +335,7 @@ class PztLayout(Record):
         """One layer by itself."""
         if self.fibre_angle is None:
             held = self.strain == "biaxial" and self.coupling == "rotation"
-            return plain_lamina(self.modulus, self.d31, self.thickness, self.poissons_ratio if held else None)
+            return plain_lamina(self.modulus, self.d31, self.thickness, self.poissons_ratio, held=held)
         values = (self.modulus_across, self.shear_modulus, self.poissons_ratio, self.d33)
         across, shear, ratio, d33 = (0.0 if value is None else value for value in values)
         spacing = self.electrode_spacing or self.thickness

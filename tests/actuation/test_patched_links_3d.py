@@ -128,13 +128,11 @@ def test_ceramic_held_across_in_compliances():
     """σ_x = ε_x/s11 − d31 V/(t s11), free across; with ε_s = 0: (s11 ε_x − (s11 − s12) d31 V/t)/(s11² − s12²)."""
     s11, nu, d31, t = 1 / 63e9, 0.35, -179e-12, 0.5e-3
     s12 = -nu * s11
-    for held, stiffness, stress in (
-        (None, 1 / s11, d31 / s11),
-        (nu, s11 / (s11**2 - s12**2), d31 / (s11 + s12)),
-    ):
-        found = plain_lamina(1 / s11, d31, t, held)
+    for held, stiffness, stress in ((False, 1 / s11, d31 / s11), (True, s11 / (s11**2 - s12**2), d31 / (s11 + s12))):
+        found = plain_lamina(1 / s11, d31, t, nu, held=held)
         np.testing.assert_allclose([found.C[0, 0], found.per_volt[0]], [stiffness, stress / t], rtol=1e-14)
-    assert found.energy == pytest.approx(2 * d31**2 / (s11 + s12) / t**2, rel=1e-14)
+        assert found.energy == pytest.approx(2 * d31**2 / (s11 + s12) / t**2, rel=1e-14)
+    assert plain_lamina(1 / s11, d31, t).energy == pytest.approx(d31**2 / s11 / t**2, rel=1e-14)
 
 
 @pytest.mark.parametrize("angle", [np.pi / 4, -np.pi / 4, 0.4])

@@ -28,11 +28,12 @@ def strip():
     return modal_body(beam_link(L, rectangle(h, b), 30, E=STRIP["E"], nu=STRIP["nu"], rho=STRIP["rho"], modes=modes))
 
 
-@pytest.mark.parametrize(
-    ("name", "frequency", "tip"), [("wide", 0.005, 0.02), ("offset", 0.005, 0.02), ("near the clamp", 0.01, 0.06)]
-)
-def test_one_patch_on_a_strip(strip, name, frequency, tip):
-    """The clamp keeps sections flat over half their width: a patch there is held across, and the model's is not."""
+@pytest.mark.parametrize(("name", "close"), [("wide", 0.02), ("offset", 0.02), ("near the clamp", 0.045)])
+def test_one_patch_on_a_strip(strip, name, close):
+    """Frequency 0.5 %, tip per volt 2 %; open electrodes raise the frequency by as much within a tenth.
+
+    The clamp keeps sections flat over half their width: a patch there is held across, and that of the model is not.
+    """
     start, end, t, w, offset = PLACES[name]
     solid = SolidStrip(STRIP, CERAMIC | {"place": PLACES[name]}, size=0.005)
     keys = {
@@ -44,11 +45,10 @@ def test_one_patch_on_a_strip(strip, name, frequency, tip):
     bodies = [patched_body(from_modal_body("link", strip), strip, placed_patches(SCENE, [of], strip)) for of in layouts]
     shorted, opened = (np.sqrt(body.stiffness.min()) / (2 * np.pi) for body in bodies)
     found = solid.frequency("shorted"), solid.frequency("open")
-    assert shorted == pytest.approx(found[0], rel=frequency)
-    assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=0.15)
+    assert shorted == pytest.approx(found[0], rel=0.005)
+    assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=0.12)
     of_link = link_patches(SCENE, layouts[:1], strip, bodies[0])
     p = bodies[0].modal_transform.T @ of_link.Phi_V[:, 0] / bodies[0].stiffness
     moved, expected = bodies[0].points["tip"].translation @ p, solid.tip_per_volt()
-    print(name, shorted / found[0] - 1, opened / shorted - 1, found[1] / found[0] - 1, moved[1:] / expected[1:] - 1)
-    assert moved[1] == pytest.approx(expected[1], rel=tip)
-    assert moved[2] == pytest.approx(expected[2], rel=tip, abs=1e-4 * abs(expected[1]))
+    assert moved[1] == pytest.approx(expected[1], rel=close)
+    assert moved[2] == pytest.approx(expected[2], rel=close, abs=1e-4 * abs(expected[1]))
