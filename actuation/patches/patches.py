@@ -261,9 +261,10 @@ class PatchArray(Reach):
         felt = "included in the model" if self.layout.adds_stiffness else "not included (structural = false)"
         what = "twist" if self.layout.acts_in == "twist" else "curvature"
         left = f"patch stiffness reduces the induced {what} to {authority} of its value, {felt}"
-        charge = {None: f"electrodes {self.layout.electrodes}"}.get(self.layout.shunt, f"shunt {self.layout.shunt} Ω")
-        built = f"strain {self.layout.strain}, {charge}, {1e9 * self.layout.capacitance():.3g} nF each"
-        return f"{self.layout.label}: stiffness ratio ψ {psi}: {left}; {built}"
+        layout = self.layout
+        charge = f"electrodes {layout.electrodes}" if layout.shunt is None else f"shunt {layout.shunt:g} Ω"
+        built = f"strain {layout.strain}, {charge}, {1e9 * layout.capacitance():.3g} nF each"
+        return f"{layout.label}: stiffness ratio ψ {psi}: {left}; {built}"
 
     @property
     def surface_distance(self) -> Array:

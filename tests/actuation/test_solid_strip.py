@@ -30,7 +30,7 @@ def strip():
 
 @pytest.mark.parametrize(("name", "close"), [("wide", 0.02), ("offset", 0.02), ("near the clamp", 0.045)])
 def test_one_patch_on_a_strip(strip, name, close):
-    """Frequency 0.5 %, tip per volt 2 %; open electrodes raise the frequency by as much within a tenth.
+    """Frequency 0.5 %, tip per volt 2 %; open electrodes raise the frequency by as much within 15 %.
 
     The clamp keeps sections flat over half their width: a patch there is held across, and that of the model is not.
     """
@@ -46,7 +46,7 @@ def test_one_patch_on_a_strip(strip, name, close):
     shorted, opened = (np.sqrt(body.stiffness.min()) / (2 * np.pi) for body in bodies)
     found = solid.frequency("shorted"), solid.frequency("open")
     assert shorted == pytest.approx(found[0], rel=0.005)
-    assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=0.12)
+    assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=0.15)
     of_link = link_patches(SCENE, layouts[:1], strip, bodies[0])
     p = bodies[0].modal_transform.T @ of_link.Phi_V[:, 0] / bodies[0].stiffness
     moved, expected = bodies[0].points["tip"].translation @ p, solid.tip_per_volt()
