@@ -27,7 +27,7 @@ from ..run.context import Context, PatchedLink
 from ..run.drive import drive_robot
 from ..run.gears import DEGREE, with_motor_coordinates
 from ..run.record import Run
-from ..run.replay import left_paths, path_numbers, point_numbers, replay_times, supplied
+from ..run.replay import functions_within, left_paths, path_numbers, point_numbers, replay_times, supplied
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 
 STEPS = 20  # of the shortest lag or delay of amplifiers, and of outputs, between which voltages are linear
@@ -155,6 +155,9 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
     wanted = np.hstack([in_motors.moments[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
+    for joint, of_gear in source.twists.items():
+        for number in numbers_of_motors(model)[joint] if of_gear.torque is not None else ():
+            (sizes[number],) = functions_within(of_gear.torque, -most[number], most[number])
     forces: _core.ForceSource = _core.ForcesOfTime(sizes)
     commands = actuator_commands(model, context.patches)
     motors, patches = commands[: len(most)], commands[len(most) :]

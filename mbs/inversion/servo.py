@@ -157,6 +157,10 @@ class Servo:
         states = self.motion.motion(as_list(times), p, v, a, self.postures(times))
         return states.left[:, self.of_modes], states.tau
 
+    def quasi_static(self, times: Array, p: Array) -> Array:
+        """What the motors do (N, motors) with the shapes p (N, n) if these did not move."""
+        return self.forces(times, p, 0 * p, 0 * p)[1]
+
     @cached_property
     def of_modes(self) -> Indices:
         """Places (n,) of all modes along v."""

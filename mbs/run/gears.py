@@ -23,11 +23,11 @@ from ..model.known_motion import KnownStates, States, required_forces, rotor_tor
 from ..model.model import Model
 from ..model.motors import MotorForces, motor_forces, turning_motors
 from ..model.nodes import Node, rotor
-from .record import GearMotion, Run
+from .record import GearCurve, GearMotion, Run
 from .replay import supplied_in
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+    from scipy.interpolate import BSpline, PPoly
 
 REPEATS = 1e-12  # of what bodies feel of twists: a change that no longer counts
 CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bodies feel their own twist, or it is noise
@@ -41,14 +41,15 @@ class Supplied(NamedTuple):
 
 
 def supplied_through_gears(
-    model: Model, state: States, time: Array, wanted: Array, twists: Mapping[str, BSpline] | None = None
+    model: Model, state: States, time: Array, wanted: Array, twists: Mapping[str, GearCurve] | None = None
 ) -> Supplied:
     """Return motor and modal forces of the motion `state` at `time` (T,); rigid gears need `wanted` (T, n_v).
 
     Compliant gears let their rotors turn by N δ more. Then the rotor needs J N² δ̈ of its motor, and
     the body that carries it, which turns with Ω_a, the moment J N (δ̈ z + δ̇ Ω_a × z): the rate of J N δ̇ z. That is
     shared among motors and modes as all else. Moments in front of one gear contain what others add: all follow again,
-    gear by gear inwards, and until they repeat. `twists`: δ(t) by joint where they are known.
+    gear by gear inwards, and until they repeat. `twists`: δ(t) by joint where they are known; with
+    torques, nothing else counts.
 
     Raises `InputError` for such a joint without a motor, or with a load.
     """
@@ -59,7 +60,7 @@ def supplied_through_gears(
     _refuse_loads(model, elastic)
     compliant, torques = with_compliance(model), rotor_torques(model, state, time)
     rigid = required_forces(compliant, _in_motor_coordinates(compliant, state, None), time)
-    change = np.inf
+    is_found, change = twists is not None and all(of.torque is not None for of in twists.values()), np.inf
     for passes in count(1):
         forces = motor_forces(model, state.q, wanted + felt)
         gears = {
@@ -74,6 +75,8 @@ def supplied_through_gears(
             )
             for node in elastic
         }
+        if is_found:
+            break
         needed = required_forces(compliant, _in_motor_coordinates(compliant, state, gears), time) - rigid
         before, felt = felt, needed[:, : felt.shape[1]]
         for gear in compliant.tree.gears:  # but for what their springs do along their own joints
@@ -104,7 +107,7 @@ def _gear(
     node: Node,
     torque: Array,
     forces: MotorForces,
-    twists: Mapping[str, BSpline] | None,
+    twists: Mapping[str, GearCurve] | None,
 ) -> GearMotion:
     """Of the gear in the joint of `node`, whose rotor takes `torque` (T,), J u̇, where it is rigid."""
     joint, (inertia, N) = node.joint.name, rotor(node)
@@ -154,7 +157,7 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
             f" linear and modes tilt the joint's axis ({quoted(sorted(turning))}),"
             ' found "frame"'
         )
-    forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run))
+    forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run), run.twists or None)
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
     return MotorCoordinates(q, v, a, gears, forces.moments)
 
@@ -182,11 +185,11 @@ class GearSpring(NamedTuple):
 
 
 def gear_motion(
-    spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: BSpline | None = None
+    spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: GearCurve | None = None
 ) -> GearMotion:
     """Return the motion of a gear from torque `tau` (T,) with a rigid gear, of which its rotor takes `rotor` (T,).
 
-    `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t) where it is known.
+    `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t), and τ(t), where they are known.
     Raises `InputError` where damping holds it so long that its moments say nothing of its twist.
     """
     lasts, longest = spring.damping / min(spring.spring.slopes), SLOWEST * (time[-1] - time[0])
@@ -198,9 +201,10 @@ def gear_motion(
         )
     transmitted, unresolved = tau - rotor, 0.0
     is_known = curve is not None
-    curve = curve if is_known or len(time) <= DEGREE else _twist(spring, time, transmitted)
-    twist = _read(curve, time) if curve else np.pad(spring.spring.twist(transmitted)[:, None], ((0, 0), (0, 2)))
-    moment = tau + spring.inertia * twist[:, 2]
+    if curve is None and len(time) > DEGREE:
+        curve = GearCurve(_twist(spring, time, transmitted))
+    twist = _read(curve.twist, time) if curve else np.pad(spring.spring.twist(transmitted)[:, None], ((0, 0), (0, 2)))
+    moment = tau + spring.inertia * twist[:, 2] if curve is None or curve.torque is None else curve.torque(time)
     largest = float(np.abs(moment).max())
     if not is_known and len(time) > 2 * DEGREE + 1 and largest:
         coarse = tau[::2] + spring.inertia * _read(_twist(spring, time[::2], transmitted[::2]), time[::2])[:, 2]
@@ -218,7 +222,7 @@ def gear_motion(
     )
 
 
-def _read(curve: BSpline, time: Array) -> Array:
+def _read(curve: BSpline | PPoly, time: Array) -> Array:
     return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
 
 

@@ -23,7 +23,7 @@ from .integrators import NOT_INTEGRATED, Choice
 from .samples import path_times
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+    from scipy.interpolate import BSpline, PPoly
 
     from ..model.divided_link import LinkInPieces
 
@@ -77,6 +77,13 @@ class Continuation:
     samples: _core.Samples | None = None
 
 
+class GearCurve(NamedTuple):
+    """The twist δ(t) of a compliant gear, rad, and the torque of its motor behind it, N·m, where that is known too."""
+
+    twist: BSpline | PPoly
+    torque: PPoly | None = None
+
+
 @struct
 class GearMotion:
     """Motion of a compliant gear in an inverse analysis, one row per output."""
@@ -89,7 +96,7 @@ class GearMotion:
     moment: Array  # (T,) τ_s + J N ψ̈ of the motor, behind its gear
     unresolved: float  # part of the largest moment by which it changes when only every second output is known
     twist: Array  # (T, 3) δ = θ_m − γ and its derivatives
-    curve: BSpline | None  # δ(t) between outputs; None where there are too few
+    curve: GearCurve | None  # δ(t) between outputs; None where there are too few
 
 
 class Details:
@@ -109,8 +116,7 @@ class Prescription(NamedTuple):
     motion: Callable[[], _core.SpatialPrescribedMotion]  # makes its equations, each time new ones
     shape: Sequence[Sequence[TimeFunction]]  # p(t) of each body
     near: Array  # (n_q,) a posture near the first
-    # by body times (B,), s, and V (B, k), linear between, of patches where the analysis itself finds them
-    voltages: Mapping[str, tuple[Array, Array]] = MappingProxyType({})
+    voltages: Mapping[str, PPoly] = MappingProxyType({})  # V(t) (k,) by body, where the analysis itself finds them
 
 
 @struct
@@ -148,7 +154,7 @@ class Run:
     voltages: Mapping[str, Array] = field(default_factory=dict)
     applied: tuple[PointDrive, ...] = ()
     is_at_rest: bool = False
-    twists: Mapping[str, BSpline] = field(default_factory=dict)
+    twists: Mapping[str, GearCurve] = field(default_factory=dict)
     links: Mapping[str, LinkInPieces] = field(default_factory=dict)
     statistics: Statistics = field(default=Statistics())
     details: Details = field(default=Details())

@@ -7,7 +7,7 @@ solved anew.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,10 @@ from ..scene.loads import OF_POINT
 from .context import ActuationPoints, PatchedLink
 from .record import Run
 
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+PARTS = 20  # of each piece of a curve, between which it is linear where limits cut it
 OFF_PATH = 0.01  # sizes of the robot, rad: a replay that is off by more has left its path
 
 Reader = Callable[[Any], Any]
@@ -73,10 +77,23 @@ def _with_known_voltages(
     assert run.prescribed is not None
     voltages: list[TimeFunction] = []
     for name, of_link in patches.items():
-        breaks, V = run.prescribed.voltages[name]
-        within = np.clip(V, *of_link.amplifiers.range) if limited else V
-        voltages += [function.held(breaks[0], breaks[-1]) for function in spline(breaks, within, 1)]
+        curve = run.prescribed.voltages[name]
+        voltages += functions_within(curve, *of_link.amplifiers.range) if limited else functions_within(curve)
     return _core.ForcesOfBoth(torques, _core.ForcesOfTime(voltages)) if voltages else torques
+
+
+def functions_within(curve: PPoly, least: Array | float = -np.inf, most: Array | float = np.inf) -> list[TimeFunction]:
+    """Functions of time of a curve (k,), which rest outside it; linear in parts of its pieces where limits cut it."""
+    parts = np.linspace(0.0, 1.0, 1 if len(curve.c) == 2 else PARTS, endpoint=False)
+    times = np.append((curve.x[:-1, None] + np.diff(curve.x)[:, None] * parts).ravel(), curve.x[-1])
+    values = curve(times)
+    within = np.clip(values, least, most)
+    if np.array_equal(values, within):
+        columns = curve.c.reshape(*curve.c.shape[:2], -1).transpose(2, 1, 0)
+        functions = [TimeFunction.polynomial(curve.x, np.ascontiguousarray(of_one)) for of_one in columns]
+    else:
+        functions = spline(times, within.reshape(len(times), -1), 1)
+    return [function.held(curve.x[0], curve.x[-1]) for function in functions]
 
 
 class OfPaths(NamedTuple):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
-from ...common.errors import SolveError
+from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..inversion.motors_only import decay_times
@@ -172,6 +172,20 @@ def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
         where = " and ".join(f"where it {name}" for name, of in rough if of == order)
         cost = "no voltage without jumps makes up for that" if order == 2 else "that takes several times the voltage"
         yield (f"the path's {names[order]} jumps {where}: {cost}. Smoother ends: 35*s**4 - 84*s**5 + 70*s**6 - 20*s**7")
+
+
+def check_ends_for_gears(servo: Servo) -> float:
+    """The power of time with which the path begins and ends, the lower of both.
+
+    Raises `InputError` where it is not smooth enough for motors behind compliant gears: at rest a gear has no rate, nor
+    has τ_s, of which ÿ is a part.
+    """
+    for text in rough_ends(servo.functions, servo.end):
+        raise InputError(
+            f"{servo.where}: trajectory: expected jerk and acceleration without jumps for compliant gears, whose motors"
+            f" would need impulses, found that {text}"
+        )
+    return min(path_orders(servo.functions, servo.end))
 
 
 def singular_times(linear: Linearisation) -> Iterator[str]:

@@ -58,7 +58,7 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
     r, tau = asked.driven.forces(times, *motion)
     r = r - tracked.voltage(times) @ asked.Phi_V.T
     unmet = np.abs(r).max(axis=1) / float(np.abs(asked.driven.scale**2 * motion[0]).max())
-    beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
+    beyond = (np.abs(tau[:, : len(asked.limits.torque)]) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
     return float(unmet.max()), np.maximum(unmet, beyond).reshape(len(breaks) - 1, -1).max(axis=1) / tolerance
 
 

@@ -9,12 +9,17 @@ points of `collocation`, V is linear between breaks: limits at breaks are limits
 or the least share of the limits of voltages, currents or torques, of the linearized equations; τ_qs carries the links
 as they sag. Links rest at both ends. Output transition with free internal states: Perez and Devasia, Automatica 39
 (2003).
+
+A motor behind a compliant gear supplies τ + I τ̈_s/K, with what the gear transmits, τ_s: there V̈ is linear between
+breaks, and T_r⁴|V̈|² takes the place of T_r²|V̇|².
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import field, replace
+from itertools import product
+from math import comb
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -25,6 +30,8 @@ from ..inversion.collocation import GAUSS, Elimination, bernstein_integral, piec
 from ..inversion.servo import Servo
 from ..inversion.zero_dynamics import shape_along
 from ..model.amplifiers import Amplifiers
+from ..run.record import GearCurve
+from .geared import Gears
 from .interior_point import GAP, Minimum, Program, minimize
 
 if TYPE_CHECKING:
@@ -35,8 +42,15 @@ Objective = Literal["effort", "least-voltage", "least-current", "least-torque"]
 MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
 RATE = 0.005  # s, T_r where nothing is said
+RATE_BEHIND_GEARS = 0.002  # s, the same where gears give
+# second derivative by ξ of the cubic through values at the Gauss points, four by four
+POWERS = np.arange(2, len(GAUSS.c))
+CURVATURE = (GAUSS.c[:, None] ** (POWERS - 2) * POWERS * (POWERS - 1)) @ GAUSS.to_powers[2:]
 # of a polynomial's integral by its values at the Gauss points, five coefficients by four
 BERNSTEIN = bernstein_integral(GAUSS)
+FIFTHS = np.linspace(0.0, 1.0, len(BERNSTEIN))
+# Bernstein's coefficients of a polynomial by its values at `FIFTHS`
+OF_FIFTHS = np.linalg.inv(np.array([[comb(4, k) * x**k * (1 - x) ** (4 - k) for k in range(5)] for x in FIFTHS]))
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
 FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
@@ -65,7 +79,7 @@ class Weights:
 
 @struct
 class Transition:
-    """Boundary conditions: `rest` is p at both ends; `is_free` whether V may start and end at any value.
+    """Boundary conditions: `rest` is p at both ends; `is_free` whether V, or V̈, may start and end at any value.
 
     `rate` is that of the slowest zero, 1/s: voltages matter less by e^{−rate t} at the time t from the nearer end.
     """
@@ -78,6 +92,7 @@ class Transition:
     objective: Objective = "effort"
     is_free: bool = False
     rate: float = 0.0
+    gears: Gears | None = None  # those that give; V then begins and ends at zero, with its rate
 
     @property
     def is_limited(self) -> bool:
@@ -124,6 +139,7 @@ class Tracked:
     step: float = np.inf
     found: Minimum | None = None
     added: float = 0.0  # what the effort adds to the objective "least-…"
+    gears: Mapping[str, GearCurve] = field(default_factory=dict)  # by joint, behind which motors are
     # of the share, relative: twice its change by the last finer intervals, and what the effort may add
     doubt: float = np.inf
 
@@ -147,12 +163,13 @@ def track(
     N, s, n, m = *times.shape, *asked.Phi_V.shape
     flat = times.ravel()
     p_s = shape_along(driven, np.concatenate([breaks, flat]))
-    p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m))
+    p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m if asked.gears is None else 3 * m))
     K, sag_at = np.zeros((N, s, n)), p_s[N + 1 :]
-    tau_qs = driven.forces(flat, sag_at, 0 * sag_at, 0 * sag_at)[1].reshape(N, s, -1)
+    tau_qs = driven.quasi_static(flat, sag_at).reshape(N, s, -1)
     size = max(float(np.abs(driven.scale * p_s).max()), 1e-300)
     if near is not None:
-        p, v, u = near.curve(breaks), near.curve(breaks, 1), near.voltage(breaks)
+        p, v = near.curve(breaks), near.curve(breaks, 1)
+        u = np.hstack([near.voltage(breaks, order) for order in ((0,) if asked.gears is None else (2, 0, 1))])
         K = near.curve(flat, 2).reshape(K.shape)
     steps = _Steps(asked, breaks, tau_qs, size)
     steps.tolerance = within if calm is None else WHILE_SETTLING
@@ -178,7 +195,10 @@ def track(
 
 @struct
 class _Iterate:
-    """p, ṗ, V at breaks (N+1, …), p̈ at stages (N, 4, n) and σ, and the minimum they come from."""
+    """p, ṗ, V at breaks (N+1, …), p̈ at stages (N, 4, n) and σ, and the minimum they come from.
+
+    Behind gears V are V̈, V and V̇ side by side.
+    """
 
     p: Array
     v: Array
@@ -192,15 +212,12 @@ class _Iterate:
 
     def tracked(self, steps: _Steps) -> Tracked:
         """As piecewise polynomials."""
-        from scipy.interpolate import PPoly
-
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
-        slope = np.diff(self.V, axis=0) / steps.h[:, None]
         cost = steps.cost(self.found)
         return Tracked(
             piecewise(GAUSS, breaks, self.p, self.v, self.K),
-            PPoly(np.array([slope, self.V[:-1]]), breaks),
+            steps.voltage(self.V),
             self.converged,
             self.iterations,
             self.share,
@@ -241,7 +258,8 @@ def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
 class _Steps:
     """Newton's steps, each the minimum of the linearized problem in x = (V, p, ṗ, σ) at breaks.
 
-    What happens between two breaks depends on z_k = (x_k, V_{k+1}).
+    What happens between two breaks depends on z_k = (x_k, V_{k+1}). Behind gears x = (V̈, p, ṗ, V, V̇, σ), and V̈ takes
+    the place of V there.
 
     σ, the share of limits, is a constant, and there where it is the objective. A little of the effort then picks one of
     many V(t); where Newton's steps would wander among them, enough of it for steps that shrink, and then less.
@@ -260,12 +278,49 @@ class _Steps:
         self.n, self.m = asked.Phi_V.shape
         self.has_share = asked.objective != "effort"
         self.V, self.y = slice(0, self.m), slice(self.m, self.m + 2 * self.n)
-        self.width = 2 * self.n + self.m + self.has_share
-        self.y_unit = np.concatenate([size / asked.driven.scale, np.full(self.n, size)])
+        self.states = slice(self.m, self.y.stop + (0 if asked.gears is None else 2 * self.m))
+        self.width = self.states.stop + self.has_share
+        pace = asked.weights.rate or RATE
         volts = np.full(self.m, asked.weights.voltage)
-        self.unit = np.concatenate([volts, self.y_unit, np.ones(int(self.has_share))])
-        self.unit_z = np.concatenate([self.unit, volts])
+        slow = [] if asked.gears is None else [volts, volts / pace]
+        y_unit = np.concatenate([size / asked.driven.scale, np.full(self.n, size)])
+        self.state_unit = np.concatenate([y_unit, *slow])
+        control = volts if asked.gears is None else volts / pace**2
+        self.unit = np.concatenate([control, self.state_unit, np.ones(int(self.has_share))])
+        self.unit_z = np.concatenate([self.unit, control])
         self.sigma = 1.0
+
+    def voltage(self, u: Array) -> PPoly:
+        """V(t) of what it follows from at breaks (N+1, …)."""
+        from scipy.interpolate import PPoly
+
+        h, (V, *states) = self.h[:, None], np.split(u, u.shape[1] // self.m, axis=1)
+        if not states:
+            return PPoly(np.array([np.diff(V, axis=0) / h, V[:-1]]), self.breaks)
+        return PPoly(np.array([np.diff(V, axis=0) / (6 * h), V[:-1] / 2, states[1][:-1], states[0][:-1]]), self.breaks)
+
+    def _volts(self, xi: Array, order: int = 0) -> tuple[Array, Array]:
+        """A derivative of V at shares ξ (S,) of intervals by what it follows from: (N, S, parts), and where in z."""
+        h, x = self.h[:, None], xi[None]
+        one, none = np.ones_like(h * x), np.zeros_like(h * x)
+        starts = np.array([0, self.width, self.y.stop, self.y.stop + self.m])
+        if self.asked.gears is None:
+            parts = ([one - x, one * x], [-one / h, one / h])[order]
+            return np.stack(parts, axis=2), starts[:2]
+        by = (
+            [h**2 * (x**2 / 2 - x**3 / 6), h**2 * x**3 / 6, one, h * x],
+            [h * (x - x**2 / 2), h * x**2 / 2, none, one],
+            [one - x, one * x, none, none],
+        )
+        return np.stack(by[order], axis=2), starts
+
+    def _volts_by_z(self, xi: Array, order: int = 0) -> Array:
+        """The same (N, S, m, width + m) for all patches."""
+        parts, starts = self._volts(xi, order)
+        by_z, each = np.zeros((*parts.shape[:2], self.m, len(self.unit_z))), np.arange(self.m)
+        for k, start in enumerate(starts):
+            by_z[:, :, each, start + each] = parts[:, :, k, None]
+        return by_z
 
     def take(self, now: _Iterate) -> tuple[Array, Array, Array, Array, Minimum]:
         """The next p, ṗ at breaks, K at stages and V at breaks, and the minimum they come from."""
@@ -276,33 +331,43 @@ class _Steps:
         r, tau = self.asked.driven.forces(times, *at)
         slopes = [x.reshape(N, s, -1, n) for x in self.asked.driven.slopes(times, *at)]
         stages = Elimination(GAUSS, h, [x[:, :, :n] for x in slopes])
-        x = np.concatenate([u, p, v, np.full((N + 1, int(self.has_share)), self.sigma)], axis=1)
-        V = u[:-1, None] + GAUSS.c[:, None] * np.diff(u, axis=0)[:, None]
-        left = (r.reshape(N, s, n) - V @ self.asked.Phi_V.T).reshape(N, s * n, 1)
-        moved = -(stages.E_inverse @ left).reshape(N, s, n)  # of K, with p, ṗ and V at breaks as they are
-        K_z = self._stages_by_z(stages)
+        sigma = np.full((N + 1, int(self.has_share)), self.sigma)
+        x = np.concatenate([u[:, self.V], p, v, u[:, self.m :], sigma], axis=1)
+        z, V_z = np.hstack([x[:-1], x[1:, self.V]]), self._volts_by_z(GAUSS.c)
+        left = r.reshape(N, s, n) - np.einsum("Nsmz,Nz->Nsm", V_z, z, optimize=True) @ self.asked.Phi_V.T
+        moved = -(stages.E_inverse @ left.reshape(N, s * n, 1)).reshape(N, s, n)  # of K, with all at breaks as it is
+        K_z = (stages.E_inverse @ (self.asked.Phi_V @ V_z).reshape(N, s * n, -1)).reshape(N, s, n, -1)
+        K_z[..., self.y] += stages.response
         starts = np.zeros((2, n, len(self.unit_z)))
         starts[:, :, self.y] = np.eye(2 * n).reshape(2, n, 2 * n)
-        ends = np.concatenate(stages.at_end(starts[0], starts[1], K_z), axis=1)
-        offset = np.concatenate(stages.at_end(p[:-1], v[:-1], K + moved), axis=1) - x[1:, self.y]
+        ends = [*stages.at_end(starts[0], starts[1], K_z)]
+        reached = [*stages.at_end(p[:-1], v[:-1], K + moved)]
+        for order in range((self.states.stop - self.y.stop) // self.m):
+            ends.append(self._volts_by_z(np.ones(1), order)[:, 0])
+            reached.append(np.einsum("Nmz,Nz->Nm", ends[-1], z))
+        offset = np.concatenate(reached, axis=1) - x[1:, self.states]
         of_torques = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
-        self.program = self._program(ends, offset, *of_torques, x, self._charges(v, K + moved, (starts[1], K_z)))
+        tau_0, tau_z = (self._at_motors(of) for of in of_torques)
+        charges = self._charges(v, K + moved, (starts[1], K_z))
+        self.program = self._program(np.concatenate(ends, axis=1), offset, tau_0, tau_z, x, charges)
         least = minimize(self.program, self.gap, now.found)
         change = least.x * self.unit
         K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, self.program.z(change), optimize=True)
         x = x + change
         self.sigma = float(x[0, -1]) if self.has_share else 1.0
-        return *np.split(x[:, self.y], 2, axis=1), K_new, x[:, self.V], least
+        u = np.hstack([x[:, self.V], x[:, self.y.stop : self.states.stop]])
+        return *np.split(x[:, self.y], 2, axis=1), K_new, u, least
 
-    def _stages_by_z(self, stages: Elimination) -> Array:
-        """Derivatives (N, s, n, width + m) of K by z."""
-        N, s, n, _ = stages.response.shape
-        shares = np.stack([1 - GAUSS.c, GAUSS.c])  # of V at both ends
-        by_V = np.einsum("es,nm->snem", shares, self.asked.Phi_V).reshape(s * n, 2 * self.m)
-        K_by_V = (stages.E_inverse @ by_V).reshape(N, s, n, 2, self.m)
-        return np.concatenate(
-            [K_by_V[..., 0, :], stages.response, np.zeros((N, s, n, int(self.has_share))), K_by_V[..., 1, :]], axis=3
-        )
+    def _at_motors(self, values: Array) -> Array:
+        """Torques of motors (N, s, motors, …) at stages, or slopes, by those with rigid gears and transmitted ones."""
+        if (gears := self.asked.gears) is None:
+            return values
+        motors = values.shape[2] - len(gears.joints)
+        h = self.h.reshape(-1, *(1 for _ in values.shape[1:]))
+        second = np.einsum("ij,Nj...->Ni...", CURVATURE, values[:, :, motors:]) / h**2
+        of_motors = values[:, :, :motors].copy()
+        of_motors[:, :, gears.columns] += (second.swapaxes(2, -1) * (gears.inertia / gears.stiffness)).swapaxes(2, -1)
+        return of_motors
 
     def _torques(self, tau: Array, slopes: list[Array], moved: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
         """τ (N, s, motors) at stages once K has `moved`, and its derivatives (N, s, motors, width + m) by z."""
@@ -332,12 +397,12 @@ class _Steps:
         self, ends: Array, offset: Array, tau_0: Array, tau_z: Array, x: Array, charges: tuple[Array, Array]
     ) -> Program:
         """For changes of `x` (N+1, width) in `unit`: what is left stays small against what cancels."""
-        n, width, N = self.n, self.width, len(offset)
+        n, width, (N, states) = self.n, self.width, offset.shape
         tau_z = tau_z * self.unit_z
-        ends = ends * self.unit_z / self.y_unit[:, None]
-        F, G = -ends[..., :width], np.zeros((N, 2 * n, width))
-        G[..., self.V], G[..., self.y] = -ends[..., width:], np.eye(2 * n)
-        c = offset / self.y_unit
+        ends = ends * self.unit_z / self.state_unit[:, None]
+        F, G = -ends[..., :width], np.zeros((N, states, width))
+        G[..., self.V], G[..., self.states] = -ends[..., width:], np.eye(states)
+        c = offset / self.state_unit
         now = x / self.unit
         H, g = self._effort(tau_0, tau_z, now)
         if self.has_share:
@@ -346,10 +411,10 @@ class _Steps:
             keep = np.zeros((N, 1, width))
             keep[..., -1] = 1.0
             F, G, c = np.hstack([F, -keep]), np.hstack([G, keep]), np.hstack([c, np.zeros((N, 1))])
-        C, d = self._inequalities({"torque": (tau_0, tau_z)} | self._of_patches(now, charges))
-        rows = np.eye(width)[self.y if self.asked.is_free else slice(self.y.stop)]
+        C, d = self._inequalities({"torque": (tau_0, tau_z)} | self._of_patches(x, charges))
+        rows = np.eye(width)[self.states if self.asked.is_free else slice(self.states.stop)]
         rest = np.zeros((2, width))
-        rest[:, self.y.start : self.y.start + n] = self.asked.rest / self.y_unit[:n]
+        rest[:, self.y.start : self.y.start + n] = self.asked.rest / self.state_unit[:n]
         start, end = (rest - now[[0, -1]]) @ rows.T
         return Program(H, g, F, G, c, start=(rows, start), end=(rows, end), C=C, d=d)
 
@@ -362,17 +427,14 @@ class _Steps:
         H = np.einsum("Ns,Nsta,Nstb->Nab", b, tau_z, tau_z, optimize=True)
         g = np.einsum("Ns,Nsta,Nst->Na", b, tau_z, off, optimize=True)
         of_voltages = np.zeros_like(H)
-        first = np.arange(self.m)
-        second = first + self.width
-        rate = weights.rate**2 / self.h
-        same, other = (self.of_voltages * size / whole for size in (self.h / 3 + rate, self.h / 6 - rate))  # V / V_ref
-        for i, j, size in (
-            (first, first, same),
-            (second, second, same),
-            (first, second, other),
-            (second, first, other),
-        ):
-            of_voltages[:, i, j] += size[:, None]
+        each, orders = np.arange(self.m), (0, 1 if self.asked.gears is None else 2)
+        for order in orders:
+            parts, starts = self._volts(GAUSS.c, order)
+            parts = parts * self.unit_z[starts] * weights.rate**order / weights.voltage
+            share = (self.of_voltages * self.h)[:, None] * GAUSS.end_once / whole
+            squares = np.einsum("Ns,Nsa,Nsb->abN", share, parts, parts)
+            for (i, first), (j, second) in product(enumerate(starts), repeat=2):
+                of_voltages[:, first + each, second + each] += squares[i, j][:, None]
         z = np.hstack([now[:-1], now[1:, self.V]])[..., None]
         pull = (of_voltages @ z)[..., 0]
         constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2) + (pull * z[..., 0]).sum())
@@ -381,24 +443,23 @@ class _Steps:
         self.effort = H + of_voltages, g + pull, constant
         return self.effort[:2]
 
-    def _of_patches(self, now: Array, charges: tuple[Array, Array]) -> dict[str, tuple[Array, Array]]:
+    def _of_patches(self, x: Array, charges: tuple[Array, Array]) -> dict[str, tuple[Array, Array]]:
         """What patches may have limits of: values (N, rows, m) and derivatives by z; "end" are voltages at the end."""
-        N, m, volt, each = len(now) - 1, self.m, self.asked.weights.voltage, np.arange(self.m)
-        V = volt * now[:, self.V]
+        z, C = np.hstack([x[:-1], x[1:, self.V]]), self.asked.limits.patches.capacitance
 
-        def by_z(start: float | Array, end: float | Array, of: slice = slice(None)) -> Array:
-            slopes = np.zeros((N, 1, m, self.width + m))
-            slopes[of, 0, each, each], slopes[of, 0, each, self.width + each] = volt * start, volt * end
-            return slopes
+        def values(by_z: Array, of: Array | float = 0.0, slopes: Array | float = 0.0) -> tuple[Array, Array]:
+            return of + np.einsum("Nsmz,Nz->Nsm", by_z, z, optimize=True), (slopes + by_z) * self.unit_z
 
-        limited = {"voltage": (V[:-1, None], by_z(1.0, 0.0))}
-        if self.asked.is_free:  # else V ends at zero
-            limited["end"] = np.broadcast_to(V[-1], (N, 1, m)), by_z(0.0, 1.0, slice(-1, None))
+        within = np.zeros(1) if self.asked.gears is None else np.append(0.0, GAUSS.c)
+        limited = {"voltage": values(self._volts_by_z(within))}
+        if self.asked.is_free and self.asked.gears is None:  # else V ends at zero
+            by_end = self._volts_by_z(np.ones(1))
+            by_end[:-1] = 0.0
+            limited["end"] = values(by_end)
         if charges[0].shape[1] or self.asked.limits.patches.has_rates:
-            C, pace = self.asked.limits.patches.capacitance, 1.0 / self.h[:, None]
-            slope, of_slope = (np.diff(V, axis=0) * pace)[:, None], by_z(-pace, pace)
-            limited["slew"] = slope, of_slope
-            limited["current"] = charges[0] + C * slope, charges[1] * self.unit_z + C[:, None] * of_slope
+            limited["slew"] = values(self._volts_by_z(within, 1))
+            rates = np.einsum("ij,Njmz->Nimz", OF_FIFTHS, self._volts_by_z(FIFTHS, 1))
+            limited["current"] = values(C[:, None] * rates, *charges)
         return limited
 
     def _inequalities(self, values: Mapping[str, tuple[Array, Array]]) -> tuple[Array, Array]:

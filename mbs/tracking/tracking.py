@@ -23,10 +23,9 @@ from ..analysis.forward import Forward, largest_moments
 from ..fields.field_types import NotNegative, Positive
 from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along, where
 from ..inversion.servo import Servo, Stopped, make_servo
-from ..inversion.stable_inversion import with_corners
+from ..inversion.stable_inversion import halved, with_corners
 from ..inversion.zero_dynamics import Linearisation, equilibrium, linearise
 from ..model.amplifiers import joined
-from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors
 from ..run.context import Context, PatchedLink
 from ..run.integrators import Choice
@@ -36,6 +35,7 @@ from ..scene.robustness import Robustness
 from .advice import (
     Bounds,
     bounds_of_zeros,
+    check_ends_for_gears,
     check_within_reach,
     enough_path_time,
     enough_time,
@@ -44,12 +44,16 @@ from .advice import (
     singular_times,
     slowest,
 )
-from .intervals import SETTLED, refined, settled, start_breaks
-from .problem import RATE, Limits, Objective, Tracked, Transition, Weights, track
+from .gear_motion import behind_gears, largest_share, smooth
+from .geared import GearedServo, with_gears
+from .intervals import MOST_INTERVALS, SETTLED, refined, settled, start_breaks
+from .problem import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights, track
 
 VOLT = 200.0  # V_ref where patches have no limits
+SNAP = 4.5  # power of time with which a path begins whose fourth derivative is zero there, at least
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
+MOST_SHRINKINGS = 3  # of limits, for voltages of motions behind gears
 RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
 REPLAYED = 1e-5  # tolerance of torques alone, at most
@@ -64,8 +68,9 @@ class EffortWeights(Record):
     """Torque, N·m or N, by default half the range of quasi-static torques."""
     voltage: Positive | None = None
     """Voltage, V, by default the largest limit of patches."""
-    rate: NotNegative = RATE
-    """Time, s, in which a voltage may change by its own size: larger values smooth voltages."""
+    rate: NotNegative | None = None
+    """Time, s, in which a voltage may change by its own size: larger values smooth voltages. Default: 5 ms; 2 ms with
+    compliant gears."""
 
 
 class Tracking(TimedAnalysis):
@@ -148,7 +153,8 @@ class Tracking(TimedAnalysis):
         except Stopped:
             place = where(model.scene.path, self)
             raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
-        (pre, post), servo = posed.around, posed.servo
+        pre, servo = posed.around[0], posed.servo
+        post = float(tracked.curve.x[-1]) - self.end
         most = float(posed.asked.units.max())
         around = TrackedPath(
             pre_actuation=pre,
@@ -171,7 +177,7 @@ class Tracking(TimedAnalysis):
         times = output_times(self.end, self.output_step, pre, post)
 
         def at(times: Array) -> Run:
-            return replace(_outcome(self, model, servo, tracked, context, times), details=around)
+            return replace(_outcome(self, model, servo, tracked, context, times), details=around, twists=tracked.gears)
 
         run = at(times)
         around = _with_torques_alone(context, run, around)
@@ -220,27 +226,23 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
     """The least voltage on the first breaks. Raises as `Tracking.run`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
-    if elastic := elastic_joints(model):
-        raise InputError(
-            f'{place}: expected rigid gears for kind = "tracking", found stiffness in joint "{elastic[0].joint.name}":'
-            " a motor behind a spring needs the second derivative of the joint's torque, which kinks where voltages do."
-            ' Leave stiffness out, or use kind = "motors-only"'
-        )
-    servo = make_servo(model, end, place, progress, 1.0, analysis.kind)
+    servo = with_gears(make_servo(model, end, place, progress, 1.0, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
+    gears = servo.gears if isinstance(servo, GearedServo) else None
     per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in patches.values()]
     Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
     limits = Limits(joined(patches.values()), largest_moments(model, limits=True))
     if not np.any(Phi_V):
         raise InputError(f'{place}: expected patches on flexible links for kind = "tracking", found none that bend one')
     linear = linearise(servo, end)
+    is_free = gears is not None and check_ends_for_gears(servo) < SNAP
     pre, post = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
     needs_future = bool(linear.is_future[0].any())
     around = durations(linear, (pre, post), analysis.output_step, needs_future=needs_future)
     first, last = -around[0], end + around[1]
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
     rate, weights = slowest(linear.zeros[[0, -1]]), _weights(servo, analysis, limits)
-    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage", rate=rate)
+    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage", is_free, rate, gears)
     meshes = (
         with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
         for k in (1, 2)
@@ -307,12 +309,47 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     kept = Limits(within, limits.torque * (1.0 - analysis.tolerance))
     asked = replace(posed.asked, objective=objective, limits=kept)
     breaks = posed.breaks if objective == "effort" and least.share < AMPLE else least.voltage.x
-    tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
+    if asked.gears is None:
+        tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
+    else:
+        tracked = _behind_gears(asked, breaks, least, analysis)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = _causes(context, posed) or "loosen limits or tolerance"
         raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
     return tracked, objective
+
+
+def _behind_gears(asked: Transition, breaks: Array, near: Tracked, analysis: Tracking) -> Tracked:
+    """With gears that give; limits shrink by what voltages of a motion without jumps exceed them between breaks."""
+    near = _without_jumps(asked, breaks, near, analysis.tolerance)
+    for _ in range(MOST_SHRINKINGS):
+        if not near.converged:
+            return near
+        tracked = behind_gears(asked, near, analysis.output_step)
+        share = largest_share(asked, tracked)
+        if asked.objective == "least-voltage" or not asked.is_limited or share <= 1.0:
+            break
+        of = asked.limits.patches
+        asked = replace(asked, limits=replace(asked.limits, patches=replace(of, range=of.range / share**1.1)))
+        near = track(asked, near.voltage.x, near)
+    return tracked
+
+
+def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: float) -> Tracked:
+    """On intervals that are halved, all of them, while that leaves less on modes of a motion without jumps.
+
+    Splines swing where intervals are unlike, and where a zero passes through infinity finer ones do not help.
+    """
+    best = track(asked, breaks, near)
+    left = smooth(asked, best).unmet if best.converged else 0.0
+    while left > tolerance and 2 * len(best.voltage.x) <= MOST_INTERVALS and asked.driven.goes_on():
+        finer = track(asked, halved(best.voltage.x), best)
+        left, last = smooth(asked, finer).unmet if finer.converged else np.inf, left
+        if left > 0.5 * last:
+            break
+        best = finer
+    return best
 
 
 def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
@@ -365,7 +402,8 @@ def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> Trac
     replay = alone.run(replace(context, outcomes={analysis.name: run}, earlier=None))
     if replay.failed:
         return around
-    off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, replay.q).values())
+    of_links = replay.q[:, : around.held.tree.n_q]  # motors behind gears come after them
+    off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, of_links).values())
     inside = run.time[(run.time >= 0.0) & (run.time <= analysis.end)]
     way = max(float(np.ptp(target.sample(inside)[0])) for row in around.held.rows if (target := row.target))
     return replace(around, without_patches=off, is_needed=off > analysis.tolerance * way)
@@ -376,25 +414,27 @@ def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     if torque is None:
         times = as_floats(np.linspace(0.0, analysis.end, len(servo.near_times)))
         rest = np.zeros((len(times), len(servo.scale)))
-        tau = servo.forces(times, rest, rest, rest)[1]
+        tau = servo.quasi_static(times, rest)
         torque = 0.5 * float(np.ptp(tau, axis=0).max()) or 1.0
     known = np.abs(limits.patches.range)[np.isfinite(limits.patches.range)]
     voltage = given.voltage or (float(known.max()) if known.size else VOLT)
-    return Weights(torque, voltage, given.rate)
+    rate = RATE_BEHIND_GEARS if isinstance(servo, GearedServo) else RATE
+    return Weights(torque, voltage, rate if given.rate is None else given.rate)
 
 
 def _outcome(analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array) -> Run:
     curve, voltage = tracked.curve, tracked.voltage
     how, steps = Choice("collocation", "interior-point method"), len(curve.x) - 1
     statistics = Statistics("completed", how, steps=steps, evaluations=tracked.iterations)
-    run, breaks = outcome_along(curve, servo, analysis, model, statistics, times), voltage.x
+    times = times.clip(voltage.x[0], voltage.x[-1])
+    run = outcome_along(curve, servo, analysis, model, statistics, times)
     assert run.prescribed is not None
-    between = {body: (breaks, V) for body, V in _by_body(context, voltage(breaks)).items()}
+    between = {body: type(voltage)(c, voltage.x) for body, c in _by_body(context, voltage.c).items()}
     voltages = _by_body(context, voltage(times))
     return replace(run, voltages=voltages, prescribed=run.prescribed._replace(voltages=between))
 
 
 def _by_body(context: Context, V: Array) -> Mapping[str, Array]:
     counts = [len(of_link.edges) for of_link in context.patches.values()]
-    parts: Sequence[Array] = np.split(V, np.cumsum(counts)[:-1], axis=1)
+    parts: Sequence[Array] = np.split(V, np.cumsum(counts)[:-1], axis=-1)
     return dict(zip(context.patches, parts, strict=True))

@@ -145,6 +145,16 @@ def slider_crank(mass=0.01):
     )  # fmt: skip
 
 
+def geared(tables, f, **inertias):
+    """With gears of f Hz, rotors behind a ratio of 100 and 2 % of damping in joints with so much inertia, kg·m²."""
+    for joint in tables["joint"]:
+        if (inertia := inertias.get(joint["name"])) is not None:
+            K = inertia * (2 * np.pi * f) ** 2
+            joint |= {"rotor_inertia": inertia / 1e4, "gear_ratio": 100.0, "stiffness": K}
+            joint |= {"damping": 0.04 * K / (2 * np.pi * f)}
+    return tables
+
+
 TWO = [patches("arm", 0.02, name=name, centers=at, face=face, **more) for name, at, face, more in (
     ("near", [0.1, 0.3], "both", {}), ("far", [0.6, 0.9], "+y", PART),
 )]  # fmt: skip
@@ -156,13 +166,17 @@ ROBOTS = {
     "3D, stiffening": lambda: in_3d(patch={"structural": ["stiffness"]}, geometric_stiffening=True),
     "3D, solid with patches as parts": lambda: in_3d(solid=True, patch=PART),
     "3D, loop": slider_crank,
+    "gear": lambda: geared(in_plane(), 20, hub=0.05),
+    "3D, gears": lambda: geared(in_3d(), 30, waist=0.05, shoulder=0.05),
+    "3D, loop, gear": lambda: geared(slider_crank(), 40, crank=0.01),
 }
+SLOW = {"loop, gears": lambda: geared(five_bar(), 40, A=0.02, D=0.02)}
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", [*ROBOTS, *(pytest.param(name, marks=pytest.mark.nightly) for name in SLOW)])
 def test_replay_follows_the_path(robot):
     """Torques and voltages in the nonlinear equations: 1e-8 of the way; torques alone are a hundred times farther."""
-    model = ffrobot.make_scene(**ROBOTS[robot]())
+    model = ffrobot.make_scene(**(ROBOTS | SLOW)[robot]())
     with ffrobot.solve(model) as results:
         wanted, found = (
             results[f"{name}/points/{model.trajectory[0].point}/position"] for name in ("carried", "replay")

@@ -146,6 +146,8 @@ def test_what_takes_more_voltage(scene, changes, text):
         assert results.attributes("carried/tracking")["least_share"] > 1.8
 
 
+QUINTIC, STEPS = "10*(t/0.6)**3 - 15*(t/0.6)**4 + 6*(t/0.6)**5", "{ values = [40.0, 60.0], torques = [1.0] }"
+GEAR = "motor = true", "motor = true\nrotor_inertia = 1e-3\nstiffness = 40.0"
 TOLERANCE, CUBIC = "tolerance = 1e-4", "3*(t/0.6)**2 - 2*(t/0.6)**3"
 
 
@@ -215,7 +217,9 @@ def off_path_of_first(results):
         ([(SEPTIC, "where(t > 0.3, 0.2 + t, t/0.6)")], "expected a continuous velocity"),
         ([('body = "arm"\ncount', 'body = "hand"\ncount'), ("[[joint]]", HAND)], 'flexible body, found "hand"'),
         ([("motor = true\nmoment_limit = 2.0         # N·m\n", "motor = false\n")], "as many motors"),
-        ([("motor = true", "rotor_inertia = 1e-6\nstiffness = 400.0")], 'rigid gears .*found stiffness in joint "hub"'),
+        ([GEAR, (SEPTIC, QUINTIC)], "without jumps for compliant gears.*the path's jerk jumps where it begins and"),
+        ([(GEAR[0], GEAR[1].replace("40.0", STEPS))], 'one stiffness of each gear .*found steps in joint "hub"'),
+        ([(GEAR[0], GEAR[1].replace("true", "false"))], "stiffness: expected a joint with a motor|as many motors"),
         ([('apply = "joints+pzt"', 'apply = "points"')], 'apply: expected "joints" or "joints\\+pzt"'),
         ([("tolerance = 1e-4", 'objective = "speed"')], "objective"),
         ([("tolerance = 1e-4", "path_tolerance = 1e-4")], 'expected no "path_tolerance": this kind follows its path'),

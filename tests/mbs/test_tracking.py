@@ -31,7 +31,7 @@ from ffrobot.run.watcher import Watcher
 SEPTIC = "(35*{s}**4 - 84*{s}**5 + 70*{s}**6 - 20*{s}**7)"
 
 
-def strip_scene(modes, T, pairs=4, **of_analysis):
+def strip_scene(modes, T, pairs=4, of_hub=None, **of_analysis):
     link = beam_link(
         1.0, rectangle(0.004, 0.02), 24, damping={"ratio": 0.005},
         modes={"family": "in-plane-bending", "count": modes, "attachment_modes": False},
@@ -41,7 +41,7 @@ def strip_scene(modes, T, pairs=4, **of_analysis):
     return ffrobot.make_scene(
         name="strip", space="spatial", gravity=[0.0, 0.0, 0.0], body=[{"name": "arm", "link": link}],
         joint=[{"name": "O", "type": "revolute", "axis": [0.0, 0.0, 1.0], "between": ["ground", "arm.root"],
-                "motor": True}],
+                "motor": True} | (of_hub or {})],
         initial={"joints": {"O": -np.pi / 8}}, pzt=[{"body": "arm"} | patches],
         trajectory=[{"name": "tip", "point": "arm.tip", "y": f"sin(pi/4*{SEPTIC.format(s=f'(t/{T})')} - pi/8)"}],
         analysis=[{"name": "carried", "kind": "tracking", "end": T, "output_step": T} | of_analysis],
@@ -79,6 +79,9 @@ class OneMode:
     def slopes(self, times, p, v, a):
         return tuple(np.broadcast_to([[[x], [0.0]]], (len(times), 2, 1)) for x in (self.m, self.d, self.k))
 
+    def quasi_static(self, times, p):
+        return 0 * p
+
 
 def test_closed_form_of_one_mode():
     """Checkpoint 1: least ∫V², V free at both ends, from the matrix exponential of its Hamiltonian; order 2."""
@@ -97,14 +100,16 @@ def test_closed_form_of_one_mode():
     assert np.sqrt(mean_square) == pytest.approx(0.535967, abs=2e-4)
 
 
-def arm(modes, patches, T):
-    """The paper's arm on its line, with so many eigenmodes and patches a link."""
+def arm(modes, patches, T, of_joints=()):
+    """The paper's arm on its line, with so many eigenmodes and patches a link, and more keys of joints."""
     case = Path(__file__).parents[2] / "cases" / "two_link_tracking" / "scene.toml"
     tables = tomllib.loads(case.read_text(encoding="utf-8"))
     for body in tables["body"]:
         del body["modes"]
         body["link"] = link_keys(case.parent / body["link"])
         body["link"]["modes"]["count"] = modes
+    for joint, keys in zip(tables["joint"], of_joints, strict=False):
+        joint |= keys
     for layout in tables["pzt"]:
         layout["count"] = patches
     timing, ours = "(560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7)", SEPTIC.format(s=f"(t/{T})")

@@ -1,0 +1,184 @@
+"""Twists of compliant gears and torques of motors behind them, of a motion that carries the path: exact by intervals.
+
+A spline through outputs would make pulses of what jumps in δ̈. Instead p(t) has four continuous derivatives, as a
+quintic spline through the breaks of the optimum, and the voltages make up for what that leaves on modes: for all of it
+where patches reach all modes, and p is a flat output (Fliess et al., Int. J. Control 61, 1995). On each interval
+torques are then polynomials, and so is δ but for c e^{−K t/D}.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil, factorial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ..inversion.collocation import gauss
+from ..run.record import GearCurve
+from .geared import GearedServo, Gears
+from .problem import Tracked, Transition
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline, PPoly
+
+TEN = gauss(10)
+REACHES = 1e-6  # of the largest singular value of Φ_V: smaller ones are none
+ROUNDING = 1e-13  # of the largest value, coefficients of Legendre's polynomials
+LASTS = 20.0  # D/K after which a gear has come to rest
+GONE = 1e-12  # of the largest twist: decaying parts below it are none
+DEGREES = np.arange(len(TEN.c))
+ON_UNIT = [  # Legendre's polynomials of ξ
+    np.polynomial.Legendre.basis(k, [0, 1])  # type: ignore[no-untyped-call, unused-ignore]
+    for k in DEGREES.tolist()
+]
+TO_SERIES = np.linalg.inv(np.column_stack([of(TEN.c) for of in ON_UNIT]))  # their coefficients by values at the points
+# powers of ξ, lowest first, by these coefficients
+POWERS: Array = np.column_stack(
+    [np.pad(of.convert(kind=np.polynomial.Polynomial).coef, (0, len(DEGREES) - 1 - k)) for k, of in enumerate(ON_UNIT)]
+)
+# of e^{−x} on [0, 1], lowest power first
+EXPONENTIAL: Array = np.polynomial.Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
+    np.linspace(0, 1, 101), np.exp(-np.linspace(0, 1, 101)), 10, domain=[0, 1], window=[0, 1]
+).coef
+
+
+class Motion(NamedTuple):
+    """Curves, and the largest force left on modes, relative to the largest elastic one."""
+
+    curve: PPoly
+    voltage: PPoly
+    unmet: float
+
+
+def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
+    """The motion of `tracked` with its gears; it goes on until damped ones have come to rest, by whole steps (s)."""
+    driven, gears = asked.driven, asked.gears
+    assert isinstance(driven, GearedServo)
+    assert gears is not None
+    motion = smooth(asked, tracked)
+    breaks = motion.curve.x
+    times = _nodes(breaks)
+    torques = driven.forces(times, *(motion.curve(times, k) for k in range(3)))[1]
+    lasts = step * ceil(LASTS * float((gears.damping / gears.stiffness).max()) / step)
+    torques_at_rest = driven.forces(breaks[-1:], asked.rest[1][None], *np.zeros((2, 1, len(asked.rest[1]))))[1]
+    polynomials = _held(_through(breaks, torques), torques_at_rest[0], lasts)
+    motors = torques.shape[1] - len(gears.joints)
+    return replace(
+        tracked,
+        curve=_held(motion.curve, asked.rest[1], lasts),
+        voltage=_held(motion.voltage, np.zeros(asked.Phi_V.shape[1]), lasts),
+        gears={
+            joint: _gear(gears, k, _column(polynomials, motors + k), _column(polynomials, gears.columns[k]))
+            for k, joint in enumerate(gears.joints)
+        },
+        unmet=motion.unmet,
+    )
+
+
+def smooth(asked: Transition, tracked: Tracked) -> Motion:
+    """P as a quintic spline at rest at both ends, and voltages that leave as little on modes as patches can."""
+    from scipy.interpolate import make_interp_spline
+
+    breaks, elastic = tracked.voltage.x, asked.driven.scale**2
+    still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2)]
+    curve = _on(make_interp_spline(breaks, tracked.curve(breaks), k=5, bc_type=(still, still)), breaks)
+    times = _nodes(breaks)
+    p = curve(times)
+    wanted = tracked.voltage(times)
+    left = asked.driven.residuals(times, p, curve(times, 1), curve(times, 2)) - wanted @ asked.Phi_V.T
+    more = left @ np.linalg.pinv(asked.Phi_V, rcond=REACHES).T
+    unmet = float(np.abs(left - more @ asked.Phi_V.T).max() / np.abs(elastic * p).max())
+    return Motion(curve, _through(breaks, wanted + more), unmet)
+
+
+def largest_share(asked: Transition, tracked: Tracked) -> float:
+    """Of the limits of patches, or sizes where they have none, that voltages reach anywhere."""
+    times = np.concatenate([tracked.voltage.x, _nodes(tracked.voltage.x)])
+    least, most = asked.ranges["voltage"]
+    V = tracked.voltage(times)
+    return float(np.maximum(V / most, V / least).max())
+
+
+def _gear(gears: Gears, k: int, transmitted: PPoly, rigid: PPoly) -> GearCurve:
+    """δ of a gear, and the torque of its motor: what a rigid gear takes, and I δ̈."""
+    twist = _twist(transmitted, gears.stiffness[k], gears.damping[k])
+    torque, second = _on(rigid, twist.x), twist.derivative(2).c
+    torque.c[-len(second) :] += gears.inertia[k] * second
+    return GearCurve(twist, torque)
+
+
+def _nodes(breaks: Array) -> Array:
+    """Ten Gauss points of each interval, one after the other."""
+    return as_floats((breaks[:-1, None] + np.diff(breaks)[:, None] * TEN.c).ravel())
+
+
+def _through(breaks: Array, values: Array) -> PPoly:
+    """Polynomials through values (N · 10, k) at `_nodes`, without what is rounding: their derivatives are used."""
+    from scipy.interpolate import PPoly
+
+    h, at_nodes = np.diff(breaks), values.reshape(len(breaks) - 1, len(TEN.c), -1)
+    series: Array = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
+    series = as_floats(np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0))
+    powers = np.einsum("ij,Njk->iNk", POWERS, series) / h[None, :, None] ** DEGREES[:, None, None]
+    return PPoly(powers[::-1], breaks)
+
+
+def _on(curve: PPoly | BSpline, breaks: Array) -> PPoly:
+    """The same with pieces between other breaks, which contain its own."""
+    from scipy.interpolate import BSpline, PPoly
+
+    degree = curve.k if isinstance(curve, BSpline) else len(curve.c) - 1
+    return PPoly(np.array([curve(breaks[:-1], order) / factorial(order) for order in range(degree, -1, -1)]), breaks)
+
+
+def _column(curve: PPoly, k: int) -> PPoly:
+    from scipy.interpolate import PPoly
+
+    return PPoly(np.ascontiguousarray(curve.c[:, :, k]), curve.x)
+
+
+def _held(curve: PPoly, values: Array, lasts: float) -> PPoly:
+    """The same, and then `values` (k,) for so long (s)."""
+    from scipy.interpolate import PPoly
+
+    if not lasts:
+        return curve
+    still = np.zeros_like(curve.c[:, :1])
+    still[-1, 0] = values
+    return PPoly(np.concatenate([curve.c, still], axis=1), np.append(curve.x, curve.x[-1] + lasts))
+
+
+def _twist(transmitted: PPoly, stiffness: float, damping: float) -> PPoly:
+    """δ with K δ + D δ̇ = τ_s from rest on: Σ (−D/K)^j τ_s^{(j)}/K, and what decays as e^{−K t/D} from each break."""
+    from scipy.interpolate import PPoly
+
+    breaks, lag = transmitted.x, damping / stiffness
+    series, derivative = transmitted.c / stiffness, transmitted
+    if not lag:
+        return PPoly(series, breaks)
+    for order in range(1, len(series)):
+        derivative = derivative.derivative()
+        series[order:] += (-lag) ** order * derivative.c / stiffness
+    steady, h = PPoly(series, breaks), np.diff(breaks)
+    first = series[-1]
+    last = np.array([np.polyval(series[:, k], h[k]) for k in range(len(h))])
+    none = GONE * float(np.abs(first).max())
+    starts, sizes = list[Array](), list[Array]()
+    decaying = float(transmitted.c[-1, 0] / stiffness - first[0])
+    for k, step in enumerate(h):
+        parts = 1 if abs(decaying) <= none else min(ceil(step / lag), ceil(np.log(abs(decaying) / none)) + 1)
+        at = lag * np.arange(parts)
+        at = at[at < step * (1 - 1e-9)]
+        starts.append(breaks[k] + at)
+        gone = np.exp(-at / lag) * decaying
+        sizes.append(np.where(np.abs(gone) > none, gone, 0.0))
+        decaying = float(decaying * np.exp(-step / lag) + last[k] - (first[k + 1] if k + 1 < len(h) else last[k]))
+    fine = _on(steady, np.append(np.concatenate(starts), breaks[-1]))
+    degree = max(len(fine.c), len(EXPONENTIAL))
+    coefficients = np.zeros((degree, fine.c.shape[1]))
+    coefficients[degree - len(fine.c) :] = fine.c
+    powers = EXPONENTIAL[::-1, None] / lag ** np.arange(len(EXPONENTIAL) - 1, -1, -1.0)[:, None]
+    coefficients[degree - len(EXPONENTIAL) :] += powers * np.concatenate(sizes)
+    return PPoly(coefficients, fine.x)

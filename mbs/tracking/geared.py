@@ -1,0 +1,133 @@
+"""The robot on its path with motors behind compliant gears: what gears transmit beside what motors would do without.
+
+Links do not feel the gear of a motor: with its rotor as behind a rigid gear the same p(t) and V(t) carry them (Spong,
+J. Dyn. Syst. Meas. Control 109, 1987). The gear transmits τ_s, the torque of a rigid gear without its own rotor. Its
+twist is that of K δ + D δ̇ = τ_s, and the motor supplies I δ̈ more, I = J N². The moment J N δ̈ on the body that carries
+the rotor, 1/N of that, is left out.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import KW_ONLY, replace
+
+import numpy as np
+
+from ...common.arrays import Array, Indices, as_list
+from ...common.errors import InputError, quoted
+from ...common.structs import struct
+from ..inversion.servo import Servo
+from ..joints.twist_spring import TwistSpring
+from ..model.gears import compliance, elastic_joints
+from ..model.model import Model
+from ..model.motors import turning_motors
+from ..model.nodes import rotor
+
+SAMPLES = 5  # along the path, at which the torque of a gear is found in two ways
+SAME = 1e-8  # of the largest torque of a gear, these two
+
+
+@struct
+class Gears:
+    """Compliant gears (k,): `columns` among all motors, K (N·m/rad), D (N·m·s/rad) and I = J N² (kg·m²)."""
+
+    joints: tuple[str, ...]
+    columns: Indices
+    stiffness: Array
+    damping: Array
+    inertia: Array
+
+
+@struct
+class GearedServo(Servo):
+    """A path's robot whose torques (N, motors + k) are those of motors with rigid gears, then those of the gears.
+
+    `without` (k,) are the same robots, each without the rotor of one gear.
+    """
+
+    _: KW_ONLY
+    gears: Gears
+    without: tuple[Servo, ...]
+
+    def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        """R (N, n), and torques (N, motors + k)."""
+        r, tau = super().forces(times, p, v, a)
+        return r, np.hstack([tau, *(column[:, None] for column in self._transmitted(times, p, v, a))])
+
+    def _transmitted(self, times: Array, p: Array, v: Array, a: Array) -> Iterator[Array]:
+        for servo, column in zip(self.without, self.gears.columns, strict=True):
+            yield servo.motion.motion(as_list(times), p, v, a, self.postures(times)).tau[:, column]
+
+    def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Derivatives (N, n + motors + k, n) by p̈, ṗ and p."""
+        n, found = p.shape[1], [super().slopes(times, p, v, a)]
+        for servo, column in zip(self.without, self.gears.columns, strict=True):
+            M, D, K = (x[:, [n + column]] for x in servo.slopes(times, p, v, a))
+            found.append((M, D, K))
+        M, D, K = (np.concatenate(parts, axis=1) for parts in zip(*found, strict=True))
+        return M, D, K
+
+    def quasi_static(self, times: Array, p: Array) -> Array:
+        """Torques of motors alone (N, motors)."""
+        return super().quasi_static(times, p)[:, : -len(self.without)]
+
+    def slowed(self, factor: float) -> Servo:
+        """The same path in `factor` times the time."""
+        slower = tuple(servo.slowed(factor) for servo in self.without)
+        return replace(super().slowed(factor), without=slower)  # type: ignore[call-arg]
+
+
+def with_gears(servo: Servo) -> Servo:
+    """The same robot with what its compliant gears transmit; itself where all gears are rigid.
+
+    Raises `InputError` for gears and motors that tracking does not take.
+    """
+    model = servo.model
+    elastic = elastic_joints(model)
+    if not elastic:
+        return servo
+    springs = dict[str, tuple[TwistSpring, float]]()
+    for node in elastic:
+        known = compliance(node)
+        assert known is not None
+        if known[0].knots:
+            raise InputError(
+                f'{servo.where}: expected one stiffness of each gear for kind = "tracking", found steps in joint'
+                f' "{node.joint.name}": a torque that is smooth would need a motor that is not. Use a mean stiffness'
+            )
+        springs[node.joint.name] = known
+    if turning := set(turning_motors(model)).intersection(springs):
+        raise InputError(
+            f'{model.scene.path}: motors: expected "section" for kind = "tracking" with compliant gears in joints whose'
+            f' axes modes tilt ({quoted(sorted(turning))}), found "frame"'
+        )
+    if loaded := sorted({load.joint for load in model.scene.load if load.joint in springs}):
+        raise InputError(
+            f'{model.scene.path}: expected no [[load]] on joints with stiffness, found one on "{loaded[0]}"'
+        )
+    places, count = {}, 0
+    for joint, columns in model.motors.items():
+        places[joint], count = count, count + len(columns)
+    rotors = [rotor(node) for node in elastic]
+    gears = Gears(
+        joints=tuple(springs),
+        columns=np.array([places[joint] for joint in springs]),
+        stiffness=np.array([spring.slopes[0] for spring, _ in springs.values()]),
+        damping=np.array([damping for _, damping in springs.values()]),
+        inertia=np.array([inertia * ratio**2 for inertia, ratio in rotors]),
+    )
+    without = tuple(replace(servo, model=_without_rotor(model, node.joint.name)) for node in elastic)
+    return GearedServo(**{name: getattr(servo, name) for name in _FIELDS}, gears=gears, without=without)
+
+
+_FIELDS = ("model", "end", "factor", "near_times", "near", "where", "goes_on", "offset")
+
+
+def _without_rotor(model: Model, joint: str) -> Model:
+    tree = copy.copy(model.tree)
+    tree.nodes = tuple(
+        replace(node, joint=node.joint.model_copy(update={"rotor_inertia": 0.0})) if node.joint.name == joint else node
+        for node in tree.nodes
+    )
+    return replace(model, tree=tree)

@@ -1,0 +1,185 @@
+"""Motors behind compliant gears and patches on a path: against an independent planar prototype, and closed forms.
+
+The numbers are those of ../shared/tracking_gears_notes.md, section 6: the soft strip of `test_tracking` with a gear.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from patch_sets import amplifiers
+from test_tracking import arm, strip_scene
+
+from ffrobot.mbs.inversion.servo import make_servo
+from ffrobot.mbs.inversion.zero_dynamics import equilibrium
+from ffrobot.mbs.model.model import modal_directions
+from ffrobot.mbs.quantities.supply import motor_moments
+from ffrobot.mbs.tracking.gear_motion import behind_gears
+from ffrobot.mbs.tracking.geared import Gears, with_gears
+from ffrobot.mbs.tracking.intervals import graded
+from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
+from ffrobot.run.solve import prepare_scene, solve_scene
+from ffrobot.run.watcher import Watcher
+
+pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+
+INERTIA, ZETA = 0.05, 0.02  # kg·m², of the strip's rotor and the damping ratio of its gear
+
+
+def gear(f, inertia=INERTIA, zeta=ZETA, ratio=1.0):
+    """Keys of a joint, for a gear with the frequency f (Hz) of its rotor."""
+    K = inertia * (2 * np.pi * f) ** 2
+    of_gear = {"rotor_inertia": inertia / ratio**2, "gear_ratio": ratio, "stiffness": K}
+    return of_gear | {"damping": 2 * zeta * K / (2 * np.pi * f)}
+
+
+class OneMode:
+    """m p̈ + d ṗ + k p = f ÿ + b V, τ_s = A ÿ + β p̈, φ̈ = ÿ + γ p̈ for y = 1e-5 σ(t/0.1), σ of seventh degree."""
+
+    m, d, k, f, b = -0.137651546149, 0.206722272026, 427.340977517, 0.264366315876, -0.00123900364914
+    A, beta, gamma = 0.072, 0.0454723678125, 4.30331505123
+    scale, mode_sizes, where, doubt = np.array([np.sqrt(k / -m)]), np.ones(1), "", ""
+
+    def residuals(self, times, p, v, a):
+        return self.m * a + self.d * v + self.k * p - self.f * self.acceleration(times)
+
+    def acceleration(self, times):
+        s = np.asarray(times)[:, None] / 0.1
+        return 1e-5 / 0.1**2 * (420 * s**2 - 1680 * s**3 + 2100 * s**4 - 840 * s**5)
+
+    def forces(self, times, p, v, a):
+        y = self.acceleration(times)
+        tau_s = self.A * y + self.beta * a
+        return self.residuals(times, p, v, a), np.hstack([tau_s + INERTIA * (y + self.gamma * a), tau_s])
+
+    def slopes(self, times, p, v, a):
+        columns = [self.m, self.beta + INERTIA * self.gamma, self.beta], [self.d, 0.0, 0.0], [self.k, 0.0, 0.0]
+        return tuple(np.broadcast_to(np.array(x)[None, :, None], (len(times), 3, 1)) for x in columns)
+
+    def quasi_static(self, times, p):
+        return 0 * p
+
+
+@pytest.mark.parametrize(
+    ("f", "J", "V"),
+    [(10, 0.600174, (0.735006, 1.441963, -0.005720, -1.442344)),
+     (20, 0.448077, (1.030954, 0.856156, -0.001961, -0.867326)),
+     (50, 0.408954, (0.659630, 0.973251, -0.001201, -0.982756))],
+)  # fmt: skip
+def test_closed_form_of_one_mode(f, J, V):
+    """Checkpoint 1: least ∫τ²/τ_ref² + V² without damping, by the matrix exponential of the Hamiltonian."""
+    gears = Gears(("O",), np.array([0]), np.array([INERTIA * (2 * np.pi * f) ** 2]), np.zeros(1), np.array([INERTIA]))
+    limits, rest = Limits(amplifiers(np.full(1, np.inf)), np.full(1, np.inf)), (np.zeros(1), np.zeros(1))
+    asked = Transition(
+        OneMode(), np.array([[OneMode.b]]), limits, Weights(1e-3, 1.0, 0.0), rest, is_free=True, gears=gears
+    )
+    found = track(asked, np.linspace(0.0, 0.1, 129))
+    assert found.converged
+    assert found.cost == pytest.approx(J, rel=1e-4)
+    assert np.abs(found.voltage([0.01, 0.02, 0.05, 0.08])[:, 0] - V).max() < 2e-4 * np.abs(V).max()
+
+
+def strip(modes, T, f):
+    solution = prepare_scene(strip_scene(modes, T, of_hub=gear(f)), Watcher())
+    servo = with_gears(make_servo(solution.model, T, "strip", lambda: True, 1.0))
+    return servo, modal_directions(servo.model, solution.patches["arm"].per_volt)[:, servo.of_modes].T
+
+
+def asked(servo, Phi_V, span, V_max, tau_max=np.inf, tau_ref=1.0):
+    limits = Limits(amplifiers(np.full(Phi_V.shape[1], V_max)), np.full(len(servo.model.motors), tau_max))
+    rest = tuple(equilibrium(servo, t) for t in span)
+    return Transition(servo, Phi_V, limits, Weights(tau_ref, 100.0, 0.002), rest, is_free=True, gears=servo.gears)
+
+
+AT = np.array([0.1, 0.2, 0.35, 0.5])
+THREE = {
+    "tau_s": (0.812223, 1.028419, -0.617156, -0.808822), "tau": (1.228408, 1.505330, -0.900774, -1.215851),
+    "twist": (1.025225e-3, 1.304545e-3, -7.77234e-4, -1.027866e-3), "V": (75.06, 198.09, 200.0, 118.28),
+}  # fmt: skip
+FOUR = {
+    "tau_s": (0.812573, 1.028428, -0.617160, -0.809785), "tau": (1.229580, 1.505355, -0.900783, -1.217956),
+    "twist": (1.025673e-3, 1.304556e-3, -7.77239e-4, -1.029077e-3), "V": (86.22, 182.63, 199.99, 145.91),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("modes", "J", "expected"), [(3, 0.858386, THREE), (4, 0.8352893, FOUR)])
+def test_soft_strip(modes, J, expected):
+    """Checkpoint 2, at its 128 intervals: costs, torques, twists."""
+    tau_ref = 1.999503
+    servo, Phi_V = strip(modes, 0.6, 20)
+    problem = asked(servo, Phi_V, (0.0, 0.6), 200.0, 1.2 * tau_ref, tau_ref)
+    breaks = 0.3 * (1 + np.tanh(1.5 * np.linspace(-1, 1, 129)) / np.tanh(1.5))
+    tracked = track(problem, breaks)
+    assert tracked.converged
+    assert tracked.cost == pytest.approx(J, rel=1e-2)
+    moved = behind_gears(problem, tracked, 0.001)
+    of_gear = moved.gears["O"]
+    tau_s = servo.forces(AT, *(moved.curve(AT, k) for k in range(3)))[1][:, 1]
+    for found, name in ((tau_s, "tau_s"), (of_gear.torque(AT), "tau"), (of_gear.twist(AT), "twist")):
+        assert np.abs(found - expected[name]).max() < 1e-4 * np.abs(expected[name]).max(), name
+    assert np.abs(moved.voltage(0.03) - expected["V"]).max() < 0.01 * 200
+
+
+def test_slower_strip():
+    """Checkpoint 3: four modes in 0.8 s, within 100 V."""
+    servo, Phi_V = strip(4, 0.8, 20)
+    problem = asked(servo, Phi_V, (0.0, 0.8), 100.0, 1.2 * 1.124806, 1.124806)
+    tracked = track(problem, 0.4 * (1 + np.tanh(1.5 * np.linspace(-1, 1, 161)) / np.tanh(1.5)))
+    assert tracked.cost == pytest.approx(0.0587522, rel=1e-3)
+    moved, at = behind_gears(problem, tracked, 0.001), np.array([0.1, 0.2, 0.35, 0.7])
+    tau_s = servo.forces(at, *(moved.curve(at, k) for k in range(3)))[1][:, 1]
+    assert np.abs(tau_s - [0.330447, 0.632900, 0.272957, -0.330017]).max() < 1e-4 * 0.6329
+    assert np.abs(moved.gears["O"].torque(at) - [0.547467, 0.992770, 0.426956, -0.545148]).max() < 1e-4 * 1.125
+    assert moved.gears["O"].twist(0.2) == pytest.approx(8.01152e-4, rel=1e-4)
+    assert np.abs(moved.voltage(0.03) - [12.24, 33.27, 60.90, 24.37]).max() < 0.61
+
+
+def test_two_links():
+    """Checkpoint 4: the paper's arm, two modes and five patches a link, with Spong's simple rotors.
+
+    These do not feel how the body that carries them turns, as rotors of a very large ratio.
+    """
+    servo, Phi_V = arm(2, 5, 0.7, [gear(20, inertia, ratio=1e7) for inertia in (1.0, 0.25)])
+    servo = with_gears(servo)
+    problem = asked(servo, Phi_V, (0.0, 0.7), 120.0, tau_ref=31.93794)
+    tracked = track(problem, 0.35 * (1 + np.tanh(1.5 * np.linspace(-1, 1, 97)) / np.tanh(1.5)))
+    assert tracked.cost == pytest.approx(0.0723870, rel=1e-3)
+    moved, at = behind_gears(problem, tracked, 0.001), np.array([0.1, 0.2, 0.6])
+    torques = np.column_stack([moved.gears[joint].torque(at) for joint in "OA"])
+    expected = [[49.25696, 7.39006], [31.65145, 10.81182], [63.96855, -7.89102]]
+    assert np.abs(torques - expected).max() < 1e-4 * 76.67
+    assert moved.gears["O"].twist(0.1) == pytest.approx(3.153320e-3, rel=1e-5)
+    assert moved.gears["A"].twist(0.1) == pytest.approx(1.843755e-3, rel=1e-5)
+
+
+def test_stiff_gears_are_rigid():
+    """At 1e5 Hz costs and voltages are those of a rigid gear with the same rotor, and torques but for 1e-6."""
+    servo, Phi_V = strip(3, 0.6, 1e5)
+    problem, breaks = asked(servo, Phi_V, (0.0, 0.6), 200.0), graded(0.0, 0.6, 64)
+    rigid = replace(servo.gears, stiffness=np.array([np.inf]))
+    stiff, stiffest = (track(replace(problem, gears=of), breaks) for of in (servo.gears, rigid))
+    assert stiff.cost == pytest.approx(stiffest.cost, rel=1e-6)
+    assert np.abs(stiff.voltage(breaks) - stiffest.voltage(breaks)).max() < 1e-3
+    moved = behind_gears(problem, stiff, 0.001)
+    tau = servo.forces(AT, *(moved.curve(AT, k) for k in range(3)))[1][:, 0]
+    assert np.abs(moved.gears["O"].torque(AT) - tau).max() < 1e-6
+
+
+def test_without_voltage_motors_alone_carry():
+    """Checkpoint 5: V → 0 with 0.34 s before and after is stable inversion, then the gear: of `motors-only`, too."""
+    before, at = 0.34, np.array([0.0, 0.03, 0.1, 0.2, 0.5])
+    expected = np.array([0.287258, 0.561637, 1.250342, 1.505511, -1.245614])
+    alone = {"kind": "motors-only", "output_step": 5e-4, "tolerance": 1e-7, "pre_actuation": before}
+    scene = strip_scene(3, 0.6, of_hub=gear(20), post_actuation=before, **alone)
+    run = solve_scene(scene, Watcher()).analyses["carried"].run
+    moments = motor_moments(run)["O"][np.abs(run.time[:, None] - at).argmin(axis=0), 0]
+    assert np.abs(moments - expected).max() < 2e-4  # a spline through outputs
+    servo, Phi_V = strip(3, 0.6, 20)
+    problem = asked(servo, Phi_V, (-before, 0.6 + before), 1e-3)
+    breaks = np.unique(np.concatenate([graded(-before, 0.0, 40), np.linspace(0, 0.6, 97), graded(0.6, 0.94, 40)]))
+    tracked = track(problem, breaks)
+    assert np.abs(tracked.voltage(breaks)).max() < 1e-5
+    moved = behind_gears(problem, tracked, 0.001)
+    off = moved.gears["O"].torque(at) - expected
+    assert np.abs(off[1:]).max() < 1e-5
+    assert abs(off[0]) < 2e-2  # where the fourth derivative of the path jumps, and that of p, a spline, does not
