@@ -6,6 +6,7 @@ import numpy as np
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.amplifiers import Amplifiers
+from ffrobot.mbs.model.hysteresis import MOST_PLAYS
 
 N = 3  # modes of a link
 UNLIMITED = np.full(N, np.inf)
@@ -13,8 +14,10 @@ UNLIMITED = np.full(N, np.inf)
 
 def amplifiers(limit):
     """Those that limit voltages alone, between -limit and limit (k,)."""
-    none = np.full_like(limit, np.inf)
-    return Amplifiers(np.stack([-limit, limit]), none, none, np.ones_like(limit), none, np.zeros_like(limit))
+    none, zeros = np.full_like(limit, np.inf), np.zeros_like(limit)
+    plays = np.zeros((2, MOST_PLAYS, len(limit)))
+    plays[0, 0] = 1.0
+    return Amplifiers(np.stack([-limit, limit]), none, none, np.ones_like(limit), none, zeros, plays, zeros)
 
 
 @dataclass(frozen=True)
