@@ -49,7 +49,9 @@ class LqrControl:
         model = design_model(record, setup, beside if record.inputs == "patches" else ())
         motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.robot.motors]
         patches = {} if record.inputs == "motors" else setup.robot.patches
-        self.inputs = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
+        acting = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
+        left_out = {of for of in setup.inputs if record.pzt is not None and of.split("/")[1] not in record.pzt}
+        self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
         names = [setup.inputs[i] for i in self.inputs]
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)

@@ -363,6 +363,9 @@ def make_observed(
     """
     record, robot = analysis.observer, setup.robot
     tip, origin = analysis.tip or default_tip(robot.model), setup.reference
+    assert record is not None
+    if record.about == "zero":
+        origin, nominal, reference = (np.zeros_like(of) for of in (origin, nominal, reference))
     unseen: list[str] = []
     try:
         if isinstance(record, KalmanRecord):
@@ -371,8 +374,6 @@ def make_observed(
         else:
             assert isinstance(record, GainsObserver)
             schedule = Schedule(np.zeros(1), (given(record, setup),))
-            if record.about == "zero":
-                origin, nominal = np.zeros_like(origin), np.zeros_like(nominal)
             reference = origin[:, setup.columns(*record.outputs)]
         if (radius := schedule.radius) >= 1.0:
             raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")

@@ -175,6 +175,8 @@ class Lqr(ControllerRecord):
     kind: Literal["lqr"]
     inputs: Literal["all", "motors", "patches"] = "all"
     """Inputs: motors and patches, or one of them."""
+    pzt: tuple[Name, ...] | None = None
+    """Layouts of patches that act; by default all."""
     modes: ModeCount = 1
     """Number of the lowest modes per link in the design model."""
     time: NotNegative = 0.0
@@ -191,6 +193,8 @@ class Lqr(ControllerRecord):
     """Acceptable voltage of patches, V."""
     sensor: Literal["pzt", "ideal"] = "pzt"
     """Measured signals: voltages of patches, or modal coordinates and velocities directly."""
+
+    refers_to = (("pzt", "patches"),)
 
 
 def _python_function(value: object, info: ValidationInfo) -> object:
@@ -238,6 +242,8 @@ class ObserverRecord(Record):
 
     settle: Annotated[int, Field(ge=0, le=1_000_000)] = 0
     """Samples for which observer and controllers see the first readings before the run; 0: start on the reference."""
+    about: Literal["reference", "zero"] = "reference"
+    """Origin of commands, readings and estimates: what they are on the reference, or zero."""
 
 
 class FilterRecord(Record):
@@ -305,8 +311,6 @@ class GainsObserver(ObserverRecord):
     """File .npz or .mat with A, B, C and gain."""
     scale: tuple[float, ...] | None = None
     """Factor of each reading, such as 1000 for y in mm; by default 1."""
-    about: Literal["reference", "zero"] = "reference"
-    """Origin of u and y: what they are on the reference, or zero."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -16,7 +16,7 @@ from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
 from ffrobot.actuation.control.observer import Schedule, kalman
 from ffrobot.actuation.control.records import KalmanObserver, Sensor
 from ffrobot.actuation.control.signals import Filter, Signal
-from ffrobot.common.errors import InputError
+from ffrobot.common.errors import InputError, SolveError
 from ffrobot.exchange.export import export_file
 from ffrobot.exchange.fmu.forward_model import joint_units, linear_variables
 from ffrobot.scene.load import make_scene
@@ -286,6 +286,33 @@ def test_sensors_are_outputs_of_linear_models():
 def test_what_an_observer_cannot_be_made_of(keys, said):
     with pytest.raises(InputError, match=said):
         ffrobot.solve(wheel(controller=[{"kind": "lqr"}] if "sensor" in keys else [], **keys))
+
+
+def test_a_slower_sensor_keeps_its_reading_and_an_observer_takes_it():
+    """Read every third sample; x̂⁺ = x̂/2 + u + (y − x̂)/10 of a published predictor, u = −x̂ of its state."""
+    slow = ENCODER | {"sample_time": 3 * T, "delay": T}
+    feedback = {"kind": "state-feedback", "inputs": ["joint/O"], "gain": [[1.0]]}
+    push = [{"point": "w.rim", "y": "1"}]
+    results = ffrobot.solve(wheel(sensor=[slow], controller=[feedback], observer=GAINS, disturbance=push, seed=3))
+    y, x, expected = results["loop/control/readings"][:, 0], 0.0, []
+    for k, now in enumerate(y):
+        assert now == y[k - k % 3]
+        expected.append(x)
+        x = 0.5 * x - x + 0.1 * (now - x)
+    assert np.ptp(y) > 1e-3
+    np.testing.assert_allclose(results["loop/control/estimate/state/1"][()], expected, atol=1e-12)
+    np.testing.assert_allclose(results["loop/control/wanted"][:, 0], -np.array(expected), atol=1e-12)
+
+
+def test_an_estimate_that_diverges_ends_the_run_with_its_cause():
+    """A user's function pushes the observer's model away, which a filter for small signals cannot follow."""
+
+    def pushing(setup):
+        return lambda k, y: np.full(len(setup.inputs), 1e12 * (-30.0) ** k)
+
+    sensor = ENCODER | {"range": 1e-3}  # which hides from it what the wheel does
+    with pytest.raises(SolveError, match=r"observer: the estimate diverges at t = .*does not fit the motion"):
+        ffrobot.solve(wheel(sensor=[sensor], observer=KALMAN, controller=[{"kind": "python", "python": pushing}]))
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
