@@ -110,12 +110,12 @@ class _Search:
         """Of the shortest that leaves little, also with wrong stiffness; of a longer one while limits are exceeded."""
         least, _ = self._first(averaged, self._left_inverted)
         for motion in [motion for motion in averaged if motion[0] >= least][:TRIALS]:
-            inverse = self._inverse(*motion)
-            if self._excess(inverse[1]) <= 1.0:
+            name, command, moments = self._inverse(*motion)
+            if max(self._excess(command), float((np.abs(moments) / self.limits.sizes[3]).max())) <= 1.0:
                 break
-        return inverse
+        return name, command, motion[1], moments
 
-    def _inverse(self, span: float, values: Array) -> Motion:
+    def _inverse(self, span: float, values: Array) -> tuple[str, Array, Array]:
         """Links sag at its ends as they do under its own set points, with which it begins and ends."""
         smooth = np.vstack([values, values[-1:]])
         times = as_floats(self.step * np.arange(len(smooth)))
@@ -123,7 +123,7 @@ class _Search:
         links = smooth + (1 - blend) * self.sag[0] + blend * self.sag[1]
         command, moments = self.robot.inverted(times, interpolated(times, links))
         command[[0, -1]] = values[[0, -1]]
-        return f"inverted, averaged over {1e3 * span:.3g} ms", command, smooth, moments
+        return f"inverted, averaged over {1e3 * span:.3g} ms", command, moments
 
     def simulated(self, name: str, values: Array, smooth: Array, moments: Array | None) -> Candidate:
         """The robot under the set points."""

@@ -147,6 +147,7 @@ FAULTS = {
     "acceleration": (lambda: (TIMES, motion(averaged_step(np.array([0.6, 0.3])))), {"jump of acceleration"}),
     "coarse": (_coarse, {"coarse sampling"}),
     "limit": (lambda: (TIMES / 2, motion(SMOOTH)), {"limit"}),
+    "place": (lambda: _rows(np.full(len(TIMES), 2.9)), {"limit"}),
     "resonance": (lambda: _rows(4e-4 * np.sin(2 * np.pi * 8.0 * TIMES) * SMOOTH.sample(TIMES, 1)[:, 0]), {"resonance"}),
     "noise": (lambda: _rows(np.random.default_rng(3).normal(0.0, 2e-4, len(TIMES))), {"noise"}),
 }
