@@ -2,9 +2,13 @@
 
 import importlib.util
 import re
+import tomllib
 
+import numpy as np
 import pytest
 from checkpoints import CASES
+
+import ffrobot
 
 CASE = CASES / "piezo_beam_measured"
 
@@ -45,6 +49,21 @@ def test_the_readme_has_these_numbers(printed):
     assert [name for name, *_ in written] == [name for name, *_ in printed]
     for (name, *values), (_, *found) in zip(written, printed, strict=True):
         assert found == pytest.approx(values, rel=0.01), name
+
+
+def test_designed_gains_settle_sooner_and_have_a_margin():
+    """Keys and numbers of the README, against 1.26 s and 1.07-fold of the published gains."""
+    text = (CASE / "README.md").read_text(encoding="utf-8")
+    scene = tomllib.loads((CASE / "scene.toml").read_text(encoding="utf-8"))
+    still = next(one for one in scene["analysis"] if one["name"] == "still")
+    scene["analysis"] = [still, *tomllib.loads(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1])["analysis"]]
+    results = ffrobot.solve(ffrobot.make_scene(folder=CASE, **scene))
+    y = results["designed/points/beam.tip/position"][:, 1]
+    end = results.time("designed")[np.flatnonzero(np.abs(y) > 0.5e-3)[-1]] - 0.12
+    margin = results.attributes("designed/control")["gain_margin"]
+    written = re.search(r"settle within 0.5 mm after ([\d.]+) s, and may grow ([\d.]+)-fold", text)
+    assert [end, margin] == pytest.approx([float(written[1]), float(written[2])], rel=0.01)
+    assert end < 1.26
 
 
 def test_static_gain_in_closed_form(printed):
