@@ -53,6 +53,7 @@ VOLT = 200.0  # V_ref where patches have no limits
 SNAP = 4.5  # power of time with which a path begins whose fourth derivative is zero there, at least
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
+NEAR_OPTIMUM = 1e-5  # last Newton step where gears give: voltages make an exact motion of any that is smooth
 MOST_SHRINKINGS = 3  # of limits, for voltages of motions behind gears
 RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
@@ -332,7 +333,7 @@ def _behind_gears(asked: Transition, breaks: Array, near: Tracked, analysis: Tra
             break
         of = asked.limits.patches
         asked = replace(asked, limits=replace(asked.limits, patches=replace(of, range=of.range / share**1.1)))
-        near = track(asked, near.voltage.x, near)
+        near = track(asked, near.voltage.x, near, within=NEAR_OPTIMUM)
     return tracked
 
 
@@ -341,10 +342,10 @@ def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: f
 
     Splines swing where intervals are unlike, and where a zero passes through infinity finer ones do not help.
     """
-    best = track(asked, breaks, near)
+    best = track(asked, breaks, near, within=NEAR_OPTIMUM)
     left = smooth(asked, best).unmet if best.converged else 0.0
     while left > tolerance and 2 * len(best.voltage.x) <= MOST_INTERVALS and asked.driven.goes_on():
-        finer = track(asked, halved(best.voltage.x), best)
+        finer = track(asked, halved(best.voltage.x), best, within=NEAR_OPTIMUM)
         left, last = smooth(asked, finer).unmet if finer.converged else np.inf, left
         if left > 0.5 * last:
             break
