@@ -459,7 +459,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     peers = [k for k, name in enumerate(model.output_names) if name.partition("/")[0] in kinds]
     if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max(initial=0.0) * np.linalg.norm(b):
         return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
-    N, N_B = _null_space(c), _null_space(b.T)
+    N, N_B = free_directions(c), free_directions(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
     values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
     margins = np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
@@ -479,11 +479,6 @@ def by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
     group = np.zeros(len(values))
     group[order[1:]] = np.cumsum(apart | (np.diff(side[order]) > 0))
     return np.lexsort((values.imag, group))
-
-
-def _null_space(rows: Array) -> Array:
-    """Orthonormal basis (f, f − rows) of what `rows` map to zero."""
-    return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
 
 
 def _eigenvalues(M: Array, D: Array, K: Array) -> tuple[ComplexArray, Array]:

@@ -52,14 +52,20 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     still, sizes = np.zeros(model.tree.n_v), natural_sizes(model)
     both = np.outer(sizes, sizes)
     M = np.linalg.inv(unconstrained.derivatives(t, q, still, still).a_f / both)
-    free = null_space(natural_gradients(model, q[None], np.array([t]), sizes)[0], DEPENDENT)
-    K, D = _springs(model, q)
-    L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
-    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ (K * both) @ free @ L_inverse.T)
-    stiff = slice(len(squares) - strained(K * both, free), None)
-    omega, shape = np.sqrt(squares[stiff]), sizes[:, None] * (free @ L_inverse.T @ vectors[:, stiff])
+    (C_v,), (K, D) = natural_gradients(model, q[None], np.array([t]), sizes), _springs(model, q)
+    squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
+    omega, shape = np.sqrt(squares), sizes[:, None] * shape
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
     return Vibrations(as_floats(omega), as_floats(ratio), shape, K)
+
+
+def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
+    """Return ω² (n,) and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; all in natural sizes."""
+    free = null_space(C_v, DEPENDENT)
+    L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
+    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
+    stiff = slice(len(squares) - _strained(K, free), None)
+    return squares[stiff], free @ L_inverse.T @ vectors[:, stiff]
 
 
 def _springs(model: Model, q: Array) -> tuple[Array, Array]:
@@ -74,7 +80,7 @@ def _springs(model: Model, q: Array) -> tuple[Array, Array]:
     return K, D
 
 
-def strained(K: Array, free: Array) -> int:
+def _strained(K: Array, free: Array) -> int:
     """Return the number of motions in the columns of `free` (n, m), in natural sizes, that strain springs K (n, n).
 
     Each spring counts by its own size: a soft link beside a stiff one vibrates, however slowly.

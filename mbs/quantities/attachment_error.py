@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats, null_space
+from ...common.arrays import Array, as_floats
 from ...common.rotations import exponential, left_jacobian, logarithm
 from ...fe_models.modal_body import ModalBody
+from ..linear.vibration import elastic_shapes
 from ..model.body import Body, bent_section
 from ..model.kinematics import Motion
 from ..model.known_motion import mass_matrices
@@ -27,7 +28,6 @@ from ..run.record import Run
 from .motion import constraint_rows
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
-DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of the largest ω²
 
 
 class ModesInMotion(NamedTuple):
@@ -124,11 +124,7 @@ def start_vibrations(start: Start) -> Vibrations:
     The vibrations φ_i, ω_i have of the first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand
     z̈_i/ω_i² from where they vibrate about: their amplitudes are z̈_i/ω_i in √(2 J).
     """
-    free = null_space(start.C_q, DEPENDENT)
-    inverse = np.linalg.inv(np.linalg.cholesky(free.T @ start.M @ free))
-    squares, shapes = np.linalg.eigh(inverse @ (free.T * start.stiffness) @ free @ inverse.T)
-    elastic = squares > RIGID * squares.max(initial=0.0)
-    squares, shapes = squares[elastic], free @ inverse.T @ shapes[:, elastic]
+    squares, shapes = elastic_shapes(start.M, np.diag(start.stiffness), start.C_q)
     accelerations = shapes.T @ (start.stiffness * start.a) / squares
     return Vibrations(squares, shapes, accelerations / np.sqrt(squares))
 
