@@ -64,5 +64,5 @@ def check_ended(solution: Solution, watcher: Watcher, again: str, scene_file: Pa
     except SolveError as error:
         raise StoppedError(str(error), watcher.signal) if watcher.signal else error from None
     if watcher.signal:
-        done = "before all analyses" if left_out(solution) else "when all was computed and written"
+        done = "before all analyses" if left_out(solution) else "at the end, where peaks may be left out"
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", watcher.signal)

@@ -164,7 +164,7 @@ def drive_robot(
 
     @cache
     def look_closer() -> Run:
-        between, more = _between(system, *reached, ends, found, control)
+        between, more = _between(system, *reached, ends, found, control, progress=progress)
         order = in_order(found.time, between.time)
         return _under(drives, found.with_rows_of(between, order), np.concatenate([numbers, more])[order])
 
@@ -193,11 +193,18 @@ def _under(drives: Drives, run: Run, numbers: Array) -> Run:
 
 
 def _between(
-    system: MultibodySystem, times: Array, states: Array, ends: Array, found: Run, control: Control | None
+    system: MultibodySystem,
+    times: Array,
+    states: Array,
+    ends: Array,
+    found: Run,
+    control: Control | None,
+    *,
+    progress: Progress,
 ) -> tuple[Run, Array]:
     """The run at `times` (k,) of it, with `states` (k, n), and what a replay does there (T, numbers).
 
-    `ends` of steps, s, are among what is looked at.
+    `ends` of steps, s, are among what is looked at. Of long loops the rest is left out once `progress` says so.
     """
     core, scene, _ = system.integrated
     if control is not None:
@@ -216,7 +223,7 @@ def _between(
     rates = states[:, -len(joints) :][:, joints]
     is_long = len(times) > ALL_LOOKED_AT and not found.analysis.is_repeated
     if control is not None and is_long:
-        motion = _telling_motion(system, at, times, found.analysis)
+        motion = _telling_motion(system, at, times, found.analysis, progress)
         return motion, np.zeros((len(motion.time), 0))
     some = some_of(times, rates, ends, LOOKED_AT if control is None else PARTS_OF_STEP * ALL_LOOKED_AT)
     if is_long:
@@ -231,7 +238,11 @@ def _between(
 
 
 def _telling_motion(
-    system: MultibodySystem, at: Callable[[Indices], _core.TreeRun], times: Array, analysis: Analysis
+    system: MultibodySystem,
+    at: Callable[[Indices], _core.TreeRun],
+    times: Array,
+    analysis: Analysis,
+    progress: Progress,
 ) -> Run:
     """The motion at those of `times` (k,), s, from which it follows at the others; `at` has it at rows."""
     sizes = np.zeros(1)  # of each column, so far
@@ -243,7 +254,11 @@ def _telling_motion(
         return motion.at(telling(motion.time, values, sizes))
 
     blocks = (np.arange(first, min(first + MANY, len(times))) for first in range(0, len(times), MANY))
-    parts = [thinned(_motion(system, at(rows), times[rows], analysis)) for rows in blocks]
+    parts = []
+    for rows in blocks:
+        parts.append(thinned(_motion(system, at(rows), times[rows], analysis)))
+        if not progress(float(times[-1])):
+            break
     names = ("time", "q", "v", "a", "multipliers")
     states = {name: np.concatenate([getattr(of, name) for of in parts]) for name in names}
     return thinned(replace(parts[0], **states))
