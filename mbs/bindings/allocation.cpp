@@ -5,12 +5,6 @@
 
 #include "bindings/bindings.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 namespace {

@@ -10,15 +10,10 @@
 #include "bindings/archived.h"
 #include "bindings/bindings.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using Eigen::VectorXd;
-
 namespace {
 
 VectorXd as_vector(const std::vector<double> &values) {
-  return Eigen::Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  return Eigen::Map<const VectorXd>(values.data(), values.size());
 }
 
 void make_controls(IntegrationControls *c, double tolerance, unsigned long max_steps,
@@ -61,11 +56,8 @@ void bind_integrate(nb::module_ &m) {
   auto samples = nb::class_<Samples>(m, "Samples",
                                      "States within a run, closer than its outputs: mbs/core/integrate/integrate.h.");
   samples
-      .def(
-          "__init__",
-          [](Samples *s, double longest, std::size_t most, int parts) { new (s) Samples{longest, most, parts}; },
-          "longest"_a, "most"_a, "parts"_a = 1,
-          "longest: s between two of them, where steps are longer; most: of them; parts: of each step, at least.")
+      .def(nb::init<double, std::size_t, int>(), "longest"_a, "most"_a, "parts"_a = 1,
+           "longest: s between two of them, where steps are longer; most: of them; parts: of each step, at least.")
       .def_ro("every", &Samples::every, "Of so many steps one is among them.")
       .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
       .def_prop_ro(

@@ -16,13 +16,6 @@
 
 #include "bindings/recursion/known_motion.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using namespace ffrobot::recursion;
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 template <class Space>
@@ -34,7 +27,7 @@ Forces<double> checked_forces(const Model<Space> &model, const std::optional<Vec
     forces.generalized = force->data();
   }
   if (wrench) {
-    check_size("wrench", wrench->size(), Space::dim * static_cast<Index>(model.mechanism.wrenches.size()));
+    check_size("wrench", wrench->size(), Space::dim * model.mechanism.wrenches.size());
     forces.wrench = wrench->data();
   }
   return forces;
@@ -77,7 +70,7 @@ Derivatives derivatives_at(Model<Space> &model, const Scene &scene, double t, co
   state << q, v;
   const std::vector<Jet> targets = targets_at(scene, t);
   for (Index r = 0; r < target.size(); ++r)
-    target[r] = targets[static_cast<std::size_t>(r)].acceleration;
+    target[r] = targets[r].acceleration;
   Derivatives found = derivatives_under(model.mechanism, scene, t, state, force, target, model.w);
   for (const JointForce &joint : scene.joint_forces)
     found.a_v.col(joint.v) -= joint.friction.slope(v[joint.v]) * found.a_f.col(joint.v);
@@ -103,7 +96,7 @@ template <class Space>
 void check_postures(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                     const RowMajor &q) {
   check_scene(model, scene);
-  check_size("times", static_cast<Index>(times.size()), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
+  check_size("times", times.size(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
 }
 
 template <class Space> void bind_body(nb::module_ &m, const char *name) {
@@ -242,13 +235,12 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
           [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
              const std::vector<bool> &is_path, double length, Index loop_rank) {
             check_postures(model, scene, times, q);
-            check_size("is_path", static_cast<Index>(is_path.size()), model.rows());
+            check_size("is_path", is_path.size(), model.rows());
             const PostureWatch watch{{is_path.begin(), is_path.end()}, length};
             std::vector<Mobility> found;
             for (std::size_t i = 0; i < times.size(); ++i) {
               turn_markers(scene, times[i], model.w);
-              found.push_back(
-                  mobility(model.mechanism, watch, q.row(static_cast<Index>(i)).data(), model.w, loop_rank));
+              found.push_back(mobility(model.mechanism, watch, q.row(i).data(), model.w, loop_rank));
             }
             return found;
           },
@@ -258,7 +250,7 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
           "without_work",
           [](Model<Space> &model, const RowMajor &q, const RowMajor &forces) {
             check_size("forces", forces.rows(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
-            check_size("forces", forces.cols(), Space::dim * static_cast<Index>(model.mechanism.nodes.size()));
+            check_size("forces", forces.cols(), Space::dim * model.mechanism.nodes.size());
             return without_work(model.mechanism, q, forces, model.w);
           },
           "q"_a, "forces"_a,

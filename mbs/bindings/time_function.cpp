@@ -13,10 +13,6 @@
 
 #include "bindings/bindings.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-
 namespace {
 
 using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;

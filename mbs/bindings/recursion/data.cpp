@@ -8,10 +8,6 @@
 
 #include "bindings/recursion/recursion.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot::recursion;
-
 namespace {
 
 void bind_data(nb::module_ &m) {
@@ -80,8 +76,7 @@ void bind_constraints(nb::module_ &m) {
       .value("turn", ConstraintKind::turn)
       .value("coordinate", ConstraintKind::coordinate);
   nb::class_<MarkerAt>(m, "MarkerAt", "A marker of a body, or of the ground: body -1.")
-      .def(
-          "__init__", [](MarkerAt *at, int body, int marker) { new (at) MarkerAt{body, marker}; }, "body"_a, "marker"_a)
+      .def(nb::init<int, int>(), "body"_a, "marker"_a)
       .def_ro("body", &MarkerAt::body)
       .def_ro("marker", &MarkerAt::marker)
       .def_rw("only_forces", &MarkerAt::only_forces, "Of a wrench in the plane: its moment is zero at all times.");

@@ -6,26 +6,11 @@
 
 #include "bindings/recursion/recursion.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using namespace ffrobot::recursion;
-using Eigen::VectorXd;
-
 void bind_forward_motion(nb::module_ &m) {
   nb::class_<LinearOutput>(m, "LinearOutput", "An output that is linear in the state (q, v).")
-      .def(
-          "__init__",
-          [](LinearOutput *o, const std::vector<int> &entries, const std::vector<double> &weights) {
-            new (o) LinearOutput{entries, weights};
-          },
-          "entries"_a, "weights"_a);
+      .def(nb::init<std::vector<int>, std::vector<double>>(), "entries"_a, "weights"_a);
   nb::class_<PlaceOutput>(m, "PlaceOutput", "Three outputs: where a section of a body is, m, global axes.")
-      .def(
-          "__init__",
-          [](PlaceOutput *o, int body, const Eigen::Vector3d &position, const Eigen::MatrixXd &Phi,
-             const std::vector<Eigen::MatrixXd> &K) { new (o) PlaceOutput{body, position, Phi, K}; },
-          "body"_a, "position"_a, "Phi"_a, "K"_a);
+      .def(nb::init<int, Eigen::Vector3d, MatrixXd, std::vector<MatrixXd>>(), "body"_a, "position"_a, "Phi"_a, "K"_a);
   nb::class_<ForwardModel>(m, "ForwardModel",
                            "All that a motion under held inputs needs; see mbs/core/forward/forward_motion.h.")
       .def(

@@ -11,28 +11,28 @@ namespace ffrobot::recursion {
 // q (T, n_q), v and a (T, n_v) at times (T)
 struct KnownStates {
   const std::vector<double> &times;
-  const RowMajorMatrix &q, &v, &a;
+  const RowMajor &q, &v, &a;
 };
 
 // each(i, what acts, forces, workspace) at state i, after accelerate(); nothing acts along coordinates of `forces`
 template <class Space, class Each>
 void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates &states, const Each &each) {
   const auto &[times, q, v, a] = states;
-  const auto count = static_cast<Eigen::Index>(times.size());
+  const Index count = times.size();
   check_scene(model, scene);
-  const Eigen::Index columns[] = {model.mechanism.n_q, model.mechanism.n_v, model.mechanism.n_v};
+  const Index columns[] = {model.mechanism.n_q, model.mechanism.n_v, model.mechanism.n_v};
   for (const int k : {0, 1, 2}) {
-    const RowMajorMatrix &of = k == 0 ? q : k == 1 ? v : a;
+    const RowMajor &of = k == 0 ? q : k == 1 ? v : a;
     check_size("states", of.rows(), count), check_size("coordinates", of.cols(), columns[k]);
   }
   if (count == 0)
     return;
-  const nanobind::gil_scoped_release unlocked;
+  const nb::gil_scoped_release unlocked;
   RecursiveMotion<Space> motion(model.mechanism, scene, times[0], q.row(0).data(), v.row(0).data());
   NewtonEuler<Space> forces(model.mechanism);
   Workspace<Space, double> w(model.mechanism);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const double t = times[static_cast<std::size_t>(i)];
+  for (Index i = 0; i < count; ++i) {
+    const double t = times[i];
     turn_markers(scene, t, w);
     const Forces<double> acting = motion.act(t, q.row(i).data(), v.row(i).data());
     forces.prepare(q.row(i).data(), v.row(i).data(), nullptr, w);
@@ -43,10 +43,10 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
 
 // (T, n_v) M a - Q, with Q of gravity, elasticity, damping and all forces of the scene
 template <class Space>
-RowMajorMatrix required_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                               const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
-  RowMajorMatrix found(a.rows(), a.cols());
-  at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &acting, auto &forces, auto &w) {
+RowMajor required_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
+                         const RowMajor &v, const RowMajor &a) {
+  RowMajor found(a.rows(), a.cols());
+  at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &acting, auto &forces, auto &w) {
     forces.load(nullptr, acting.wrench, w);
     forces.require(q.row(i).data(), a.row(i).data(), w, found.row(i).data());
     if (acting.generalized)
@@ -57,26 +57,24 @@ RowMajorMatrix required_forces(Model<Space> &model, const Scene &scene, const st
 
 // (T, rows) second derivatives of the rows' values, less those that their targets have
 template <class Space>
-RowMajorMatrix constraint_accelerations(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                                        const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
-  RowMajorMatrix found(a.rows(), model.rows());
-  at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &, auto &forces, auto &w) {
+RowMajor constraint_accelerations(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                                  const RowMajor &q, const RowMajor &v, const RowMajor &a) {
+  RowMajor found(a.rows(), model.rows());
+  at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &, auto &forces, auto &w) {
     for (std::size_t r = 0; r < scene.targets.size(); ++r)
-      found(i, static_cast<Eigen::Index>(r)) = forces.of_constraint(r, a.row(i).data(), w).value -
-                                               scene.targets[r](times[static_cast<std::size_t>(i)]).acceleration;
+      found(i, r) = forces.of_constraint(r, a.row(i).data(), w).value - scene.targets[r](times[i]).acceleration;
   });
   return found;
 }
 
 // What bodies and joints do to each other, under multipliers (T, rows) and the forces of the scene
 template <class Space>
-MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                           const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a,
-                           const RowMajorMatrix &multipliers) {
+MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
+                           const RowMajor &v, const RowMajor &a, const RowMajor &multipliers) {
   check_size("times of multipliers", multipliers.rows(), a.rows());
   check_size("multipliers", multipliers.cols(), model.rows());
   ForcesOfStates<Space> found(model.mechanism, a.rows());
-  at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &acting, auto &forces, auto &w) {
+  at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &acting, auto &forces, auto &w) {
     const double *lambda = multipliers.row(i).data();
     forces.load(lambda, acting.wrench, w);
     found.write(i, q.row(i).data(), v.row(i).data(), a.row(i).data(), lambda, acting.wrench, forces, w);
@@ -87,12 +85,12 @@ MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::v
 // Joints and constraints alone, under multipliers (T, rows) alone
 template <class Space>
 MotionForces multiplier_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                               const RowMajorMatrix &q, const RowMajorMatrix &multipliers) {
+                               const RowMajor &q, const RowMajor &multipliers) {
   check_size("times of multipliers", multipliers.rows(), q.rows());
   check_size("multipliers", multipliers.cols(), model.rows());
-  const RowMajorMatrix still = RowMajorMatrix::Zero(q.rows(), model.mechanism.n_v);
+  const RowMajor still = RowMajor::Zero(q.rows(), model.mechanism.n_v);
   ForcesOfStates<Space> found(model.mechanism, q.rows());
-  at_known_states(model, scene, {times, q, still, still}, [&](Eigen::Index i, const auto &, auto &forces, auto &w) {
+  at_known_states(model, scene, {times, q, still, still}, [&](Index i, const auto &, auto &forces, auto &w) {
     forces.load(multipliers.row(i).data(), nullptr, w);
     found.write_loads(i, multipliers.row(i).data(), forces, w);
   });

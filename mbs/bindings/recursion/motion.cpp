@@ -12,13 +12,6 @@
 
 #include "bindings/recursion/tree_run.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using namespace ffrobot::recursion;
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 template <class Space>
@@ -46,7 +39,7 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
 
 template <class Space>
 TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                   const RowMajorMatrix &states, Replay *replay) {
+                   const RowMajor &states, Replay *replay) {
   if (replay)
     check_replay(model, *replay);
   return outputs_at(model, scene, times, states, nullptr, replay, [](Index) {});
@@ -168,14 +161,14 @@ void bind_orientation_laws(nb::module_ &m) {
           "__init__",
           [](OrientationLaw *law, OrientationKind kind, const std::vector<TimeFunction> &functions,
              const Eigen::Matrix3d &reference) {
-            check_size("functions", static_cast<Index>(functions.size()), 3);
+            check_size("functions", functions.size(), 3);
             new (law) OrientationLaw{kind, {functions[0], functions[1], functions[2]}, reference};
           },
           "kind"_a, "functions"_a, "reference"_a)
       .def(
           "sample",
           [](const OrientationLaw &law, const VectorXd &times) {
-            RowMajorMatrix A(times.size(), 9), omega(times.size(), 3), alpha(times.size(), 3);
+            RowMajor A(times.size(), 9), omega(times.size(), 3), alpha(times.size(), 3);
             for (Index i = 0; i < times.size(); ++i) {
               const Turning at = law(times[i]);
               A.row(i) = at.A.reshaped<Eigen::RowMajor>().transpose();

@@ -13,28 +13,20 @@
 
 #include "bindings/recursion/known_motion.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using namespace ffrobot::recursion;
-using Eigen::Index;
-using Eigen::VectorXd;
-using ffrobot::recursion::RowMajorMatrix;
-
 namespace {
 
 // p, p_dot and p_ddot (T, n) at times (T)
 struct Modes {
   const std::vector<double> &times;
-  const RowMajorMatrix &p, &p_dot, &p_ddot;
+  const RowMajor &p, &p_dot, &p_ddot;
 
   ModalMotion operator[](std::size_t i) const {
-    const auto row = static_cast<Index>(i);
+    const Index row = i;
     return {p.row(row), p_dot.row(row), p_ddot.row(row)};
   }
   void check(Index n) const {
-    for (const RowMajorMatrix *of : {&p, &p_dot, &p_ddot}) {
-      check_size("times of modes", of->rows(), static_cast<Index>(times.size()));
+    for (const RowMajor *of : {&p, &p_dot, &p_ddot}) {
+      check_size("times of modes", of->rows(), times.size());
       check_size("modes", of->cols(), n);
     }
   }
@@ -42,13 +34,13 @@ struct Modes {
 
 // At states q, v, a: forces `required` M a - Q, multipliers, and what motors do in place of both
 struct Prescribed {
-  RowMajorMatrix q, v, a, required, multipliers, tau, left, loops;
+  RowMajor q, v, a, required, multipliers, tau, left, loops;
 };
 
 // each(i) after balance() at every time with a position: from postures near (T, n_q), or each from the last, the first
 // near (1, n_q), up to the first time without one.
 template <class Space, class Each>
-void at_positions(PrescribedMotion<Space> &motion, const Modes &modes, const RowMajorMatrix &near, const Each &each) {
+void at_positions(PrescribedMotion<Space> &motion, const Modes &modes, const RowMajor &near, const Each &each) {
   const Index n_q = motion.driven().mechanism.n_q;
   modes.check(motion.modes());
   check_size("near", near.cols(), n_q);
@@ -63,7 +55,7 @@ void at_positions(PrescribedMotion<Space> &motion, const Modes &modes, const Row
   for (std::size_t i = 0; i < modes.times.size(); ++i) {
     const double t = modes.times[i];
     if (!follows && t != found_at)
-      motion.start_at(near.row(static_cast<Index>(i)));
+      motion.start_at(near.row(i));
     else if (!follows)
       motion.start_at(last);
     bool is_found = motion.move(t, modes[i]);
@@ -75,22 +67,22 @@ void at_positions(PrescribedMotion<Space> &motion, const Modes &modes, const Row
       motion.balance();
       last = motion.state().head(n_q);
       found_at = t;
-      each(static_cast<Index>(i));
+      each(i);
     } else if (follows)
       return;
   }
 }
 
-RowMajorMatrix nothing(Index rows, Index columns) {
-  return RowMajorMatrix::Constant(rows, columns, std::numeric_limits<double>::quiet_NaN());
+RowMajor nothing(Index rows, Index columns) {
+  return RowMajor::Constant(rows, columns, std::numeric_limits<double>::quiet_NaN());
 }
 
 template <class Space>
-std::pair<RowMajorMatrix, RowMajorMatrix>
-left_on_modes(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajorMatrix &p,
-              const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
+std::pair<RowMajor, RowMajor> left_on_modes(PrescribedMotion<Space> &motion, const std::vector<double> &times,
+                                            const RowMajor &p, const RowMajor &p_dot, const RowMajor &p_ddot,
+                                            const RowMajor &near) {
   const Index T = p.rows(), n_q = motion.driven().mechanism.n_q;
-  RowMajorMatrix q = nothing(T, n_q), left = nothing(T, p.cols());
+  RowMajor q = nothing(T, n_q), left = nothing(T, p.cols());
   at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
     q.row(i) = motion.state().head(n_q).transpose();
     left.row(i) = motion.left().transpose();
@@ -100,28 +92,26 @@ left_on_modes(PrescribedMotion<Space> &motion, const std::vector<double> &times,
 
 // M, D, K (T, (n + motors) n) of what is left, and of torques, by p_ddot, p_dot and p
 template <class Space>
-std::tuple<RowMajorMatrix, RowMajorMatrix, RowMajorMatrix>
-derivatives_of(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajorMatrix &p,
-               const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
-  const Index n = p.cols(), rows = n + static_cast<Index>(motion.driven().motors.size());
-  RowMajorMatrix M = nothing(p.rows(), rows * n), D = M, K = M;
+std::tuple<RowMajor, RowMajor, RowMajor>
+derivatives_of(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajor &p,
+               const RowMajor &p_dot, const RowMajor &p_ddot, const RowMajor &near) {
+  const Index n = p.cols(), rows = n + motion.driven().motors.size();
+  RowMajor M = nothing(p.rows(), rows * n), D = M, K = M;
   at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
     const LeftSlopes found = motion.slopes();
-    const auto write = [&](const Eigen::MatrixXd &of, RowMajorMatrix &to) {
-      Eigen::Map<RowMajorMatrix>(to.row(i).data(), rows, n) = of;
-    };
+    const auto write = [&](const MatrixXd &of, RowMajor &to) { Eigen::Map<RowMajor>(to.row(i).data(), rows, n) = of; };
     write(found.M, M), write(found.D, D), write(found.K, K);
   });
   return {M, D, K};
 }
 
 template <class Space>
-Prescribed states_of(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajorMatrix &p,
-                     const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
+Prescribed states_of(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajor &p,
+                     const RowMajor &p_dot, const RowMajor &p_ddot, const RowMajor &near) {
   const auto &driven = motion.driven();
   const Index T = p.rows(), n_q = driven.mechanism.n_q, n_v = driven.mechanism.n_v;
-  const Index tau = static_cast<Index>(driven.motors.size()), equations = motion.lambda().size();
-  const auto loops = static_cast<Index>(std::ranges::count(driven.is_path, 0));
+  const Index tau = driven.motors.size(), equations = motion.lambda().size();
+  const Index loops = std::ranges::count(driven.is_path, 0);
   Prescribed to{nothing(T, n_q),       nothing(T, n_v), nothing(T, n_v), nothing(T, n_v),
                 nothing(T, equations), nothing(T, tau), nothing(T, n_v), nothing(T, loops)};
   at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
@@ -139,18 +129,18 @@ Prescribed states_of(PrescribedMotion<Space> &motion, const std::vector<double> 
 // each(i, motors, workspace) at postures q (T, n_q); markers that constraint equations follow are where they are at
 // `times` (T), if there are any. A posture that comes again, without times, is placed once.
 template <class Space, class Each>
-void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajorMatrix &q,
+void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajor &q,
                  const Each &each) {
   check_size("coordinates", q.cols(), driven.mechanism.n_q);
-  recursion::Workspace<Space, double> w(driven.mechanism);
+  Workspace<Space, double> w(driven.mechanism);
   Motors<Space> motors(driven);
   const VectorXd v = VectorXd::Zero(driven.mechanism.n_v);
-  const VectorXd target = VectorXd::Zero(static_cast<Index>(driven.mechanism.constraints.size()));
+  const VectorXd target = VectorXd::Zero(driven.mechanism.constraints.size());
   VectorXd a(driven.mechanism.n_v);
   w.keep({});
   for (Index i = 0; i < q.rows(); ++i) {
     if (!times.empty())
-      turn_markers(driven.scene, times[static_cast<std::size_t>(i)], w);
+      turn_markers(driven.scene, times[i], w);
     if (i == 0 || !times.empty() || q.row(i) != q.row(i - 1)) {
       const auto at = place_all(driven.mechanism, q.row(i).data(), v.data(), nullptr, w);
       // for the mass matrix of the modes of stiffened bodies, and their rows
@@ -161,12 +151,12 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
 }
 
 template <class Space>
-RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vector<double> &times,
-                           const RowMajorMatrix &q, const RowMajorMatrix &multipliers) {
-  check_size("times", static_cast<Index>(times.size()), q.rows());
+RowMajor path_forces(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajor &q,
+                     const RowMajor &multipliers) {
+  check_size("times", times.size(), q.rows());
   check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.constraints.size()));
-  RowMajorMatrix found(q.rows(), driven.mechanism.n_v);
+  check_size("multipliers", multipliers.cols(), driven.mechanism.constraints.size());
+  RowMajor found(q.rows(), driven.mechanism.n_v);
   at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
     found.row(i) = motors.path_forces(q.row(i).data(), multipliers.row(i).data(), w).transpose();
   });
@@ -174,13 +164,12 @@ RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vect
 }
 
 template <class Space>
-std::vector<RowMajorMatrix> path_forces_on_bodies(const DrivenMechanism<Space> &driven,
-                                                  const std::vector<double> &times, const RowMajorMatrix &q,
-                                                  const RowMajorMatrix &multipliers) {
-  check_size("times", static_cast<Index>(times.size()), q.rows());
+std::vector<RowMajor> path_forces_on_bodies(const DrivenMechanism<Space> &driven, const std::vector<double> &times,
+                                            const RowMajor &q, const RowMajor &multipliers) {
+  check_size("times", times.size(), q.rows());
   check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.constraints.size()));
-  std::vector<RowMajorMatrix> found;
+  check_size("multipliers", multipliers.cols(), driven.mechanism.constraints.size());
+  std::vector<RowMajor> found;
   for (const auto &node : driven.mechanism.nodes)
     found.emplace_back(q.rows(), Space::dim + node.n());
   at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
@@ -192,12 +181,12 @@ std::vector<RowMajorMatrix> path_forces_on_bodies(const DrivenMechanism<Space> &
 }
 
 template <class Space>
-std::tuple<RowMajorMatrix, RowMajorMatrix, RowMajorMatrix>
-split(const DrivenMechanism<Space> &driven, const RowMajorMatrix &q, const RowMajorMatrix &wanted) {
+std::tuple<RowMajor, RowMajor, RowMajor> split(const DrivenMechanism<Space> &driven, const RowMajor &q,
+                                               const RowMajor &wanted) {
   check_size("postures of forces", wanted.rows(), q.rows());
   check_size("forces", wanted.cols(), driven.mechanism.n_v);
-  RowMajorMatrix tau(q.rows(), static_cast<Index>(driven.motors.size())), left(q.rows(), wanted.cols());
-  RowMajorMatrix loops(q.rows(), static_cast<Index>(std::ranges::count(driven.is_path, 0)));
+  RowMajor tau(q.rows(), driven.motors.size()), left(q.rows(), wanted.cols());
+  RowMajor loops(q.rows(), std::ranges::count(driven.is_path, 0));
   at_postures(driven, {}, q, [&](Index i, Motors<Space> &motors, const auto &w) {
     motors.split(q.row(i).data(), wanted.row(i), w);
     tau.row(i) = motors.tau().transpose(), left.row(i) = motors.left().transpose();

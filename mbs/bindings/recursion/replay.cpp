@@ -10,14 +10,6 @@
 
 #include "bindings/recursion/tree_run.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using namespace ffrobot::recursion;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 template <class Space> using Reader = std::shared_ptr<ForceReader<Space>>;
@@ -26,7 +18,7 @@ using Source = std::shared_ptr<ForceSource>;
 template <class Space>
 Reader<Space> actuators_of(const DrivenMechanism<Space> &driven, const VectorXd &limit,
                            const std::vector<std::tuple<int, MatrixXd, Allocation>> &patches) {
-  check_size("limit", limit.size(), static_cast<Index>(driven.motors.size()));
+  check_size("limit", limit.size(), driven.motors.size());
   std::vector<LinkPatches> links;
   for (const auto &[first, reached, allocation] : patches) {
     check_index("first mode of patches", first, driven.mechanism.n_v);
@@ -43,8 +35,7 @@ Reader<Space> paths_of(const DrivenMechanism<Space> &driven, const Eigen::Matrix
   std::vector<typename PathReader<Space>::Part> found;
   for (const auto &[row, column, sign] : parts) {
     check_index("constraint equation", row, driven.mechanism.constraints.size());
-    const bool is_coordinate =
-        driven.mechanism.constraints[static_cast<std::size_t>(row)].model.kind == ConstraintKind::coordinate;
+    const bool is_coordinate = driven.mechanism.constraints[row].model.kind == ConstraintKind::coordinate;
     check_index("column of a path", column, is_coordinate ? count : count - 5);
     found.push_back({row, column, sign});
   }
@@ -58,7 +49,7 @@ Reader<Spatial> points_of(const DrivenMechanism<Spatial> &driven, const std::vec
   std::vector<PointComponents> found;
   for (const auto &[node, axes, origin, direction, position, Phi, scale] : bodies) {
     check_index("body with points", node, driven.mechanism.nodes.size());
-    const Index n = driven.mechanism.nodes[static_cast<std::size_t>(node)].n();
+    const Index n = driven.mechanism.nodes[node].n();
     check_size("position", position.cols(), direction.cols());
     check_size("rows of Phi", Phi.rows(), 3 * direction.cols());
     check_size("modes of Phi", Phi.cols(), n);
@@ -70,7 +61,7 @@ Reader<Spatial> points_of(const DrivenMechanism<Spatial> &driven, const std::vec
 
 template <class Space>
 Source recorded(const DrivenMechanism<Space> &driven, const Recording &recording, Reader<Space> reader) {
-  const auto size = static_cast<std::size_t>(driven.mechanism.n_q + driven.mechanism.n_v);
+  const std::size_t size = driven.mechanism.n_q + driven.mechanism.n_v;
   if (recording.times.size() < 2 || recording.states.size() != size * recording.times.size() ||
       recording.methods.empty())
     throw nb::value_error("recording: expected one of this mechanism, with a step");
@@ -82,7 +73,7 @@ Source prescribed(PrescribedMotion<Space> &motion, const std::vector<ModalShape>
                   Reader<Space> reader) {
   Index modes = 0;
   for (const ModalShape &of_body : shape)
-    modes += static_cast<Index>(of_body.size());
+    modes += of_body.size();
   check_size("shape", modes, motion.modes());
   check_size("q", q.size(), motion.driven().mechanism.n_q);
   return std::make_shared<PrescribedForces<Space>>(motion, shape, q, std::move(reader));
@@ -101,12 +92,12 @@ template <class Space> void bind_found_forces(nb::module_ &m, const std::string 
         nb::keep_alive<0, 4>(), "Read of a prescribed motion; shape: p(t) by body; q (n_q): near the first posture.");
 }
 
-RowMajorMatrix sampled(ForceSource &source, const std::vector<double> &times) {
+RowMajor sampled(ForceSource &source, const std::vector<double> &times) {
   const nb::gil_scoped_release unlocked;
-  RowMajorMatrix found(static_cast<Index>(times.size()), source.values().size());
+  RowMajor found(times.size(), source.values().size());
   for (std::size_t i = 0; i < times.size(); ++i) {
     source.evaluate(times[i]);
-    found.row(static_cast<Index>(i)) = source.values().transpose();
+    found.row(i) = source.values().transpose();
   }
   return found;
 }

@@ -6,13 +6,6 @@
 
 #include "bindings/recursion/tree_run.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-using namespace ffrobot::recursion;
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)>;
@@ -64,7 +57,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
 
 template <class Space>
 TreeRun outputs_under_hold(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                           const RowMajorMatrix &states, ZeroOrderHold held, const RowMajorMatrix &commands) {
+                           const RowMajor &states, ZeroOrderHold held, const RowMajor &commands) {
   check_hold(model, held);
   check_size("commands", commands.rows(), states.rows());
   check_size("inputs", commands.cols(), held.direction().cols());
@@ -87,11 +80,10 @@ template <class Space> void bind_sampled_motion(nb::module_ &m) {
 void bind_tree_sampled(nb::module_ &m) {
   nb::class_<ZeroOrderHold>(m, "ZeroOrderHold",
                             "What a unit of each command does: see mbs/core/recursion/motion/zero_order_hold.h.")
-      .def(nb::init<Eigen::MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
+      .def(nb::init<MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
       .def(
           "add_frame_motor",
-          [](ZeroOrderHold &held, Index input, int q, int v, const Eigen::MatrixXd &rotation,
-             const Eigen::Vector3d &axis) {
+          [](ZeroOrderHold &held, Index input, int q, int v, const MatrixXd &rotation, const Eigen::Vector3d &axis) {
             check_size("rotation", rotation.rows(), 3);
             held.add_frame_motor(input, {q, v, rotation, axis});
           },

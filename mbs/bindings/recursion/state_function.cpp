@@ -11,10 +11,6 @@
 
 #include "bindings/recursion/recursion.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using namespace ffrobot;
-
 namespace {
 
 using Numbers = std::vector<double>;
@@ -25,7 +21,7 @@ StateFunction python_force(const PythonForce &python, bool is_planar) {
   const int n = is_planar ? 2 : 3;
   return {[python, n](double t, const double *position, const double *rate, double *force) {
             const Numbers found = python(t, {position, position + n}, {rate, rate + n});
-            check_size("force and moment", static_cast<Eigen::Index>(found.size()), 3 * n - 3);
+            check_size("force and moment", found.size(), 3 * n - 3);
             std::copy(found.begin(), found.end(), force);
           },
           is_planar};
@@ -36,8 +32,8 @@ StateFunction compiled_force(std::uintptr_t address, bool is_planar) {
 }
 
 Numbers called(const StateFunction &function, double t, const Numbers &position, const Numbers &rate) {
-  check_size("position", static_cast<Eigen::Index>(position.size()), function.is_planar ? 3 : 12);
-  check_size("rates", static_cast<Eigen::Index>(rate.size()), function.is_planar ? 3 : 6);
+  check_size("position", position.size(), function.is_planar ? 3 : 12);
+  check_size("rates", rate.size(), function.is_planar ? 3 : 6);
   Numbers force(rate.size());
   function.call(t, position.data(), rate.data(), force.data());
   return force;

@@ -6,6 +6,7 @@
 #include "core/analysis/replay.h"
 #include "core/check_index.h"
 #include "core/integrate/integrate.h"
+#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/motion.h"
 
 #include <algorithm>
@@ -16,8 +17,6 @@
 
 namespace ffrobot::recursion {
 
-using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 inline void check_share(const FrameShare &share, int n_q, int n_v) {
   const auto last = static_cast<int>(share.Phi_r.cols()) - 1;
   for (const int k : {0, last}) {
@@ -27,7 +26,7 @@ inline void check_share(const FrameShare &share, int n_q, int n_v) {
 }
 
 template <class Space> void check_scene(const Model<Space> &model, const Scene &scene) {
-  check_size("targets", static_cast<Eigen::Index>(scene.targets.size()), model.rows());
+  check_size("targets", scene.targets.size(), model.rows());
   const int n_q = model.mechanism.n_q, n_v = model.mechanism.n_v;
   for (const Load &load : scene.loads)
     for (const auto &[i, share] : load.along)
@@ -53,15 +52,14 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("joint of a load", load.joint, scene.cut_joints.size());
   for (const LimitedCoordinate &limited : scene.limits) {
     check_index("coordinate of a limit", limited.v, n_v);
-    for (const Eigen::Index first : model.mechanism.rotations)
+    for (const Index first : model.mechanism.rotations)
       if (first <= limited.v && limited.v < first + 3)
         throw std::invalid_argument("coordinate of a limit: expected a number, found a part of an orientation");
   }
   if (!scene.modal_amplitude_limits.empty())
-    check_size("modal_amplitude_limits", static_cast<Eigen::Index>(scene.modal_amplitude_limits.size()),
-               static_cast<Eigen::Index>(model.mechanism.nodes.size()));
+    check_size("modal_amplitude_limits", scene.modal_amplitude_limits.size(), model.mechanism.nodes.size());
   if (scene.watch)
-    check_size("is_path", static_cast<Eigen::Index>(scene.watch->is_path.size()), model.rows());
+    check_size("is_path", scene.watch->is_path.size(), model.rows());
   for (const DrivenMarker &driven : scene.driven)
     check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
 }
@@ -93,15 +91,15 @@ template <class Archive> void fields(Archive &a, TreeCheckpoint &x) {
 // As far as it got.
 struct TreeRun {
   IntegrationReport report;
-  Eigen::VectorXd last;                         // (q, v) of the last accepted step
-  RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
-  RowMajorMatrix replayed;                      // (T, numbers of its source) what a replay does
-  PostureHistory postures;                      // of the scene's watch
-  std::vector<RangeSeen> ranges;                // of the scene's limits
+  VectorXd last;                          // (q, v) of the last accepted step
+  RowMajor states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
+  RowMajor replayed;                      // (T, numbers of its source) what a replay does
+  PostureHistory postures;                // of the scene's watch
+  std::vector<RangeSeen> ranges;          // of the scene's limits
 
   template <class Space> TreeRun(const Model<Space> &model, std::size_t count) {
-    const auto T = static_cast<Eigen::Index>(count);
-    const Eigen::Index n = model.mechanism.n_q + model.mechanism.n_v;
+    const Index T = count;
+    const Index n = model.mechanism.n_q + model.mechanism.n_v;
     last.resize(n), states.resize(T, n), accelerations.resize(T, model.mechanism.n_v), lambda.resize(T, model.rows());
     replayed.resize(T, 0);
   }
@@ -112,7 +110,7 @@ struct TreeRun {
   template <class Space>
   void evaluate(std::size_t output, double t, const double *state, RecursiveMotion<Space> &reader, int n_q,
                 bool is_interpolated, const Replay *replay) {
-    const auto i = static_cast<Eigen::Index>(output);
+    const Index i = output;
     double *q = states.row(i).data(), *v = q + n_q, *a = accelerations.row(i).data();
     std::copy_n(state, states.cols(), q);
     reader.evaluate(t, q, v, a);
@@ -123,7 +121,7 @@ struct TreeRun {
     }
     lambda.row(i) = Eigen::Map<const Eigen::RowVectorXd>(reader.workspace().lambda.data(), lambda.cols());
     if (replay) {
-      const Eigen::VectorXd &values = replay->source().values();
+      const VectorXd &values = replay->source().values();
       if (replayed.cols() != values.size())
         replayed.resize(replayed.rows(), values.size());
       replayed.row(i) = values.transpose();
@@ -135,17 +133,17 @@ struct TreeRun {
     motion.watch_posture(report.time, last.data());
     postures = motion.postures();
     for (auto *x : {&states, &accelerations, &lambda, &replayed})
-      x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
+      x->conservativeResize(report.outputs, Eigen::NoChange);
   }
 };
 
 // What a run reports of states (T, n_q + n_v) that are known; act(i) before each, has `held` act as it does there.
 template <class Space, class Act>
 TreeRun outputs_at(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                   const RowMajorMatrix &states, const ZeroOrderHold *held, Replay *replay, const Act &act) {
+                   const RowMajor &states, const ZeroOrderHold *held, Replay *replay, const Act &act) {
   check_scene(model, scene);
   check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
-  check_size("times", static_cast<Eigen::Index>(times.size()), states.rows());
+  check_size("times", times.size(), states.rows());
   TreeRun run(model, times.size());
   if (times.empty())
     return run;
@@ -153,9 +151,9 @@ TreeRun outputs_at(const Model<Space> &model, const Scene &scene, const std::vec
   act(0);
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, held,
                                 replay);
-  for (Eigen::Index i = 0; i < states.rows(); ++i) {
+  for (Index i = 0; i < states.rows(); ++i) {
     act(i);
-    const auto output = static_cast<std::size_t>(i);
+    const std::size_t output = i;
     run.evaluate(output, times[output], states.row(i).data(), reader, model.mechanism.n_q, false, replay);
   }
   return run;
@@ -165,10 +163,10 @@ TreeRun outputs_at(const Model<Space> &model, const Scene &scene, const std::vec
 // evaluates. Pointers may be null.
 template <class Space>
 TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotion<Space> &motion,
-                   RecursiveMotion<Space> &reader, const std::vector<double> &times, const Eigen::VectorXd &q,
-                   const Eigen::VectorXd &v, const IntegrationControls &controls,
-                   const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-                   TreeCheckpoint *checkpoint, Samples *samples, const Replay *replay = nullptr) {
+                   RecursiveMotion<Space> &reader, const std::vector<double> &times, const VectorXd &q,
+                   const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
+                   Recording *recording, const Breaks *breaks, TreeCheckpoint *checkpoint, Samples *samples,
+                   const Replay *replay = nullptr) {
   TreeRun run(model, times.size());
   run.last << q, v;
   motion.plan(times.front(), times.back());
@@ -176,8 +174,7 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
   if (!scene.limits.empty())
     limits.emplace(scene.limits, motion, reader);
   if (checkpoint && checkpoint->integration.has_begun()) {
-    check_size("ranges of coordinates", static_cast<Eigen::Index>(checkpoint->ranges.size()),
-               static_cast<Eigen::Index>(scene.limits.size()));
+    check_size("ranges of coordinates", checkpoint->ranges.size(), scene.limits.size());
     if (limits)
       limits->go_on(checkpoint->ranges);
   }
