@@ -62,7 +62,7 @@ template <class Archive, class T, std::size_t N> void archived_range(Archive &ar
 template <class Archive, class Range> void archived_range(Archive &archive, Range &x) {
   const std::int64_t count = archived_count(archive, static_cast<std::int64_t>(x.size()));
   if constexpr (Archive::reads)
-    x.resize(static_cast<std::size_t>(count));
+    x.resize(count);
   for (auto &each : x)
     archived(archive, each);
 }
@@ -74,7 +74,7 @@ template <class Archive, class Matrix> void archived_matrix(Archive &archive, Ma
       throw std::runtime_error("expected a matrix, found the end of the file");
     x.resize(rows, columns);
   }
-  archive.raw(x.data(), static_cast<std::size_t>(x.size()) * sizeof(double));
+  archive.raw(x.data(), x.size() * sizeof(double));
 }
 
 template <class Archive, class T> void fields(Archive &archive, std::optional<T> &x) {

@@ -46,7 +46,7 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
   W_sqrt_ = W_sqrt;
   d_ = left_ = VectorXd::Zero(A_.rows());
   V_ = u_ = gradient_ = VectorXd::Zero(k);
-  held_.assign(static_cast<std::size_t>(k), 0);
+  held_.assign(k, 0);
 }
 
 const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
@@ -80,7 +80,7 @@ bool Allocation::move() {
   int side = 0;
   for (std::size_t f = 0; f < free_.size(); ++f) {
     const Index j = free_[f];
-    const double target = target_[static_cast<Index>(f)], way = target - u_[j];
+    const double target = target_[f], way = target - u_[j];
     if (std::abs(target) <= std::abs(bound(j, target)))
       continue;
     const double until = std::max(0.0, (bound(j, target) - u_[j]) / way);
@@ -92,11 +92,11 @@ bool Allocation::move() {
   }
   for (std::size_t f = 0; f < free_.size(); ++f) {
     double &u = u_[free_[f]];
-    u = length == 1 ? target_[static_cast<Index>(f)] : u + length * (target_[static_cast<Index>(f)] - u);
+    u = length == 1 ? target_[f] : u + length * (target_[f] - u);
   }
   if (first < 0)
     return true;
-  held_[static_cast<std::size_t>(first)] = side;
+  held_[first] = side;
   u_[first] = bound(first, side);
   return false;
 }
@@ -106,11 +106,11 @@ void Allocation::minimise() {
   free_.clear();
   VectorXd held = VectorXd::Zero(u_.size());
   for (Index j = 0; j < u_.size(); ++j)
-    if (held_[static_cast<std::size_t>(j)])
+    if (held_[j])
       held[j] = u_[j];
     else
       free_.push_back(j);
-  const auto count = static_cast<Index>(free_.size());
+  const Index count = free_.size();
   if (free_ != factorised_) {
     qr_.compute(A_(Eigen::all, free_));
     factorised_ = free_;
@@ -128,7 +128,7 @@ bool Allocation::release() {
   double largest = rounding * A_.norm() * (d_.norm() + A_.norm() * u_.norm());
   Index most = -1;
   for (Index j = 0; j < u_.size(); ++j) {
-    const double inward = held_[static_cast<std::size_t>(j)] * gradient_[j];
+    const double inward = held_[j] * gradient_[j];
     if (inward > largest) {
       largest = inward;
       most = j;
@@ -136,7 +136,7 @@ bool Allocation::release() {
   }
   if (most < 0)
     return false;
-  held_[static_cast<std::size_t>(most)] = 0;
+  held_[most] = 0;
   return true;
 }
 

@@ -53,12 +53,12 @@ protected:
 class ForcesOfTime final : public ForceSource {
 public:
   explicit ForcesOfTime(std::vector<TimeFunction> functions)
-      : ForceSource(static_cast<Eigen::Index>(functions.size())), functions_(std::move(functions)) {}
+      : ForceSource(functions.size()), functions_(std::move(functions)) {}
 
 private:
   bool find(double t) override {
     for (std::size_t i = 0; i < functions_.size(); ++i)
-      values_[static_cast<Eigen::Index>(i)] = functions_[i](t).value;
+      values_[i] = functions_[i](t).value;
     return true;
   }
 

@@ -75,8 +75,8 @@ template <class Space>
 void PathReader<Space>::read(const double *, const Workspace<Space, double> &w, const VectorXd *, double *to) {
   std::fill_n(to, count_, 0.0);
   for (const auto &[row, column, sign] : parts_) {
-    const Constraint &of = mechanism_.constraints[static_cast<std::size_t>(row)];
-    const double size = -sign * w.lambda[static_cast<std::size_t>(row)];
+    const Constraint &of = mechanism_.constraints[row];
+    const double size = -sign * w.lambda[row];
     if (of.model.kind == ConstraintKind::coordinate) {
       to[column] += size;
       continue;
@@ -114,7 +114,7 @@ Eigen::MatrixXd L_a(const PointComponents &of, const Eigen::Ref<const VectorXd> 
 void PointReader::read(const double *q, const Workspace<Spatial, double> &w, const VectorXd *shape, double *to) {
   const std::vector<VectorXd> on_bodies = path_.path_forces_on_bodies(w.lambda.data(), w);
   for (const PointComponents &of : bodies_) {
-    const auto i = static_cast<std::size_t>(of.node);
+    const std::size_t i = of.node;
     const auto &node = mechanism_.nodes[i];
     const Eigen::Map<const VectorXd> p(q + node.p_q(), node.n());
     LeastNorm solver;

@@ -164,16 +164,16 @@ const std::vector<double> &ForwardMotion::outputs() {
 }
 
 Eigen::Vector3d ForwardMotion::place(const PlaceOutput &at, const std::vector<FrameMotion> &frames) const {
-  const auto number = static_cast<std::size_t>(at.body);
+  const std::size_t number = at.body;
   const auto &node = mechanism_.nodes[number];
   const auto &body = model_.bodies[number].data;
-  const auto inboard = static_cast<std::size_t>(model_.bodies[number].inboard_marker);
+  const std::size_t inboard = model_.bodies[number].inboard_marker;
   Eigen::Vector3d x = at.position;
   if (node.n()) {
     const auto p = y_.segment(node.p_q(), node.n());
     x += at.Phi * p;
     for (std::size_t l = 0; l < at.K.size(); ++l)
-      x[static_cast<Index>(l)] -= 0.5 * p.dot(at.K[l] * p);
+      x[l] -= 0.5 * p.dot(at.K[l] * p);
   }
   if (node.inboard < 0) // the frame sits at the joint, with the axes of its triad
     x = node.origin + body.markers[inboard].triad.transpose() * x;

@@ -47,7 +47,7 @@ void Delivery::sample(double t, const double *z) {
   if (!samples_)
     return;
   auto &[longest, most, parts, times, states, steps, every] = *samples_;
-  const std::size_t n = static_cast<std::size_t>(system_.local().state_size());
+  const std::size_t n = system_.local().state_size();
   if (times.size() >= most) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < times.size(); i += 2, ++kept) {

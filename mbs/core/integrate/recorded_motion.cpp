@@ -14,7 +14,7 @@ RecordedMotion::RecordedMotion(ImplicitSystem &motion, const Recording &recordin
 }
 
 const double *RecordedMotion::recorded(std::size_t i) const {
-  return recording_.states.data() + static_cast<std::size_t>(motion_.local().state_size()) * i;
+  return recording_.states.data() + motion_.local().state_size() * i;
 }
 
 void RecordedMotion::find_interval(double t) {

@@ -16,7 +16,7 @@ public:
   // rotations: index in v of the first of the three components of each, ascending
   explicit ConfigurationSpace(Eigen::Index n_v, const std::vector<Eigen::Index> &rotations = {});
 
-  Eigen::Index n_q() const { return n_v_ + static_cast<Eigen::Index>(rotations_.size()); }
+  Eigen::Index n_q() const { return n_v_ + rotations_.size(); }
   Eigen::Index n_v() const { return n_v_; }
   bool is_flat() const { return rotations_.empty(); } // numbers alone: n_q = n_v, increments are differences
 

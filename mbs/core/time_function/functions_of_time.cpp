@@ -112,7 +112,7 @@ void FunctionsOfTime::evaluate(const Part &part) {
 }
 
 void FunctionsOfTime::find(const double *times, int count) {
-  const auto size = static_cast<std::size_t>(count);
+  const std::size_t size = count;
   fours_ = (size + together - 1) / together;
   if (found_.size() < fours_ * size_)
     found_.resize(fours_ * size_);

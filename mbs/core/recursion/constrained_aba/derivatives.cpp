@@ -31,14 +31,14 @@ void seed(Dual &x, Index k, double rate = 1) { x.rate.add(static_cast<int>(k), r
 void seed_increment(const ConfigurationSpace &space, const double *q, Index i, Index k, Duals &to) {
   for (const auto &numbers : space.numbers())
     if (i >= numbers.v && i < numbers.v + numbers.count)
-      seed(to[static_cast<std::size_t>(numbers.q + i - numbers.v)], k);
+      seed(to[numbers.q + i - numbers.v], k);
   for (const auto &rotation : space.rotations()) {
     if (i < rotation.v || i >= rotation.v + 3)
       continue;
     const double *e = q + rotation.q;
     const double change[3][4] = {{-e[1], e[0], e[3], -e[2]}, {-e[2], -e[3], e[0], e[1]}, {-e[3], e[2], -e[1], e[0]}};
     for (Index j = 0; j < 4; ++j)
-      seed(to[static_cast<std::size_t>(rotation.q + j)], k, 0.5 * change[i - rotation.v][j]);
+      seed(to[rotation.q + j], k, 0.5 * change[i - rotation.v][j]);
   }
 }
 
@@ -50,7 +50,7 @@ Dual resistance(const Friction &friction, const Dual &rate) {
 template <class Values> void take(const Values &x, Index first, Index count, MatrixXd &to) {
   for (Index j = 0; j < to.rows(); ++j)
     for (Index k = 0; k < count; ++k)
-      to(j, first + k) = x[static_cast<std::size_t>(j)].rate[static_cast<int>(k)];
+      to(j, first + k) = x[j].rate[static_cast<int>(k)];
 }
 
 } // namespace
@@ -59,11 +59,11 @@ template <class Space>
 Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
                         const double *v, const Forces<double> &forces, const AtSections &at, const double *target) {
   const ConfigurationSpace space(m.n_v, m.rotations);
-  const Index n = m.n_v, rows = static_cast<Index>(m.constraints.size());
-  const auto n_v = static_cast<std::size_t>(n), n_rows = m.constraints.size();
+  const Index n = m.n_v, rows = m.constraints.size();
+  const std::size_t n_v = n, n_rows = m.constraints.size();
   Workspace<Space, Dual> w(m);
   w.keep(kept.active), w.turning = kept.turning;
-  const Duals q0 = constants(q, static_cast<std::size_t>(m.n_q)), v0 = constants(v, n_v);
+  const Duals q0 = constants(q, m.n_q), v0 = constants(v, n_v);
   const Duals force0 = constants(forces.generalized, n_v), held = constants(target, n_rows);
   const Duals wrench = constants(forces.wrench, Space::dim * m.wrenches.size());
   Duals a(n_v), value(n_rows), rate(n_rows), along(at.joints.size()), acting_wrench;
@@ -83,7 +83,7 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
     const Index count = std::min(directions, n - first);
     Duals q1 = q0, v1 = v0, force1 = force0;
     for (Index k = 0; k < count; ++k) {
-      const auto i = static_cast<std::size_t>(first + k);
+      const std::size_t i = first + k;
       seed_increment(space, q, first + k, k, q1), seed(v1[i], k), seed(force1[i], k);
     }
     answer(q1, v0, force0), take(a, first, count, found.a_q), take(w.lambda, first, count, found.lambda_q);

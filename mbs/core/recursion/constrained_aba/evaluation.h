@@ -182,7 +182,7 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   if constexpr (std::is_same_v<T, double>)
     columns = *std::find_if(std::begin(column_counts<Space>), std::end(column_counts<Space>) - 1,
                             [&](int c) { return c >= needed; });
-  const auto stride = static_cast<std::size_t>(stride_of(columns));
+  const std::size_t stride = stride_of(columns);
   std::size_t widest = 8, softs = 0;
   for (const Node<Space> &node : m.nodes) {
     bodies.emplace_back(node.body);
@@ -190,11 +190,11 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
     first_soft.push_back(static_cast<int>(softs));
     softs += node.inboard >= 0 ? 2 * d : 0;
   }
-  ports.resize(static_cast<std::size_t>(m.ports));
+  ports.resize(m.ports);
   turning.resize(m.ground.size());
-  cross.resize(static_cast<std::size_t>(m.crosses) * d), soft.resize(softs);
-  force.assign(static_cast<std::size_t>(m.ports) * d * stride + 8, T(0.)), bias = force;
-  stored.assign(static_cast<std::size_t>(m.slots) * stride + 8, T(0.));
+  cross.resize(m.crosses * d), soft.resize(softs);
+  force.assign(m.ports * d * stride + 8, T(0.)), bias = force;
+  stored.assign(m.slots * stride + 8, T(0.));
   sine.assign(m.nodes.size() + 4, T(0.)), cosine = sine;
   z.assign(widest, T(0.));
   const std::size_t rows = m.constraints.size(), factored = std::max(rows, static_cast<std::size_t>(columns - 1));
@@ -229,14 +229,14 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
 }
 
 template <class Space, class T> void Workspace<Space, T>::put_in_columns() {
-  const auto stride = static_cast<std::size_t>(stride_of(columns));
+  const std::size_t stride = stride_of(columns);
   std::fill(point_force.begin(), point_force.end(), T(0.));
   for (const PointForce &at : point_forces)
     if (const int c = column[at.constraint]; c > 0 && c < columns)
       for (std::size_t k = 0; k < Space::linear; ++k)
-        point_force[at.place + k * stride + static_cast<std::size_t>(c)] += T(at.force[k]);
+        point_force[at.place + k * stride + c] += T(at.force[k]);
   for (std::size_t k = 0; k < active.size(); ++k)
-    lift[k] = T(lifts[static_cast<std::size_t>(active[k])]);
+    lift[k] = T(lifts[active[k]]);
 }
 
 template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> equations) {
@@ -246,10 +246,10 @@ template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> 
   for (auto &hinge : hinges)
     std::fill(std::begin(hinge.row), std::end(hinge.row), -1);
   for (std::size_t k = 0; k < active.size(); ++k) {
-    const auto r = static_cast<std::size_t>(active[k]);
+    const std::size_t r = active[k];
     column[r] = static_cast<int>(k) + 1;
     if (const auto [node, freedom] = coordinates[r]; node >= 0)
-      hinges[static_cast<std::size_t>(node)].row[freedom] = active[k];
+      hinges[node].row[freedom] = active[k];
   }
   put_in_columns();
   blocks.clear();

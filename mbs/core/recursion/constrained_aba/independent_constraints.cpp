@@ -27,7 +27,7 @@ constexpr double slight = 1e-6;
 std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
   const Eigen::VectorXd own = S.diagonal();
   const double largest = own.maxCoeff(), smallest = immobile * squares.maxCoeff();
-  std::vector<int> left(static_cast<std::size_t>(S.rows())), kept;
+  std::vector<int> left(S.rows()), kept;
   std::iota(left.begin(), left.end(), 0);
   const auto depends = [&](int i) {
     return !(S(i, i) > std::max(dependent * own[i], immobile * largest) && squares[i] > smallest);
@@ -50,7 +50,7 @@ std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
 template <class Space>
 std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const double *q, const double *v,
                                               Workspace<Space, double> &w) {
-  const auto count = static_cast<Eigen::Index>(m.constraints.size());
+  const Eigen::Index count = m.constraints.size();
   std::vector<int> all(m.constraints.size());
   std::iota(all.begin(), all.end(), 0);
   w.keep(all);
@@ -59,7 +59,7 @@ std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const d
   const NaturalSizes sizes(m);
   const Eigen::VectorXd squares = sizes.of_gradients(gradients(m, q, w)).rowwise().squaredNorm();
   const std::vector<double> target(m.constraints.size(), 0.0);
-  std::vector<double> a(static_cast<std::size_t>(m.n_v));
+  std::vector<double> a(m.n_v);
   w.keeps_delassus = true;
   accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_delassus = false;

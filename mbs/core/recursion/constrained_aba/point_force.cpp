@@ -102,7 +102,7 @@ void add_rates(const PointForce &force, double t, double length, const Pose<Dual
     const Wrench less = wrench_of(force.function, t, changed(value, k, -h));
     const Eight rate = rate_of(at, k);
     for (int i = 0; i < Space::dim; ++i) {
-      const auto c = static_cast<std::size_t>(component<Space>(i));
+      const std::size_t c = component<Space>(i);
       wrench[i].rate = wrench[i].rate + (more[c] - less[c]) / (2 * h) * rate;
     }
   }
@@ -120,7 +120,7 @@ void add_at_points(const Placed<Space, T> &placed, const std::vector<PointForce>
     const Wrench found = wrench_of(force.function, t, value);
     T *to = wrench + Space::dim * force.wrench;
     for (int i = 0; i < Space::dim; ++i)
-      to[i] += T(found[static_cast<std::size_t>(component<Space>(i))]);
+      to[i] += T(found[component<Space>(i)]);
     add_rates<Space>(force, t, length, at, value, to);
   }
 }

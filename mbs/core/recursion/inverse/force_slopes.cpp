@@ -16,8 +16,8 @@ using Eigen::VectorXd;
 template <class Space>
 Derivatives derivatives_under(const Mechanism<Space> &m, const Scene &scene, double t, const VectorXd &state,
                               const VectorXd &forces, const VectorXd &target, const Workspace<Space, double> &w) {
-  VectorXd wrench = VectorXd::Zero(Space::dim * static_cast<Index>(m.wrenches.size()));
-  VectorXd along_cuts = VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()));
+  VectorXd wrench = VectorXd::Zero(Space::dim * m.wrenches.size());
+  VectorXd along_cuts = VectorXd::Zero(scene.cut_joints.size());
   for (const PointLoad &load : scene.point_loads)
     wrench[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
   for (const CutLoad &load : scene.cut_loads)
@@ -28,7 +28,7 @@ Derivatives derivatives_under(const Mechanism<Space> &m, const Scene &scene, dou
 }
 
 template <class Space> MatrixXd mass_matrix(const double *q, NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
-  const auto n = static_cast<Index>(forces.mechanism().n_v);
+  const Index n = forces.mechanism().n_v;
   MatrixXd M(n, n);
   VectorXd unit = VectorXd::Zero(n), f(n);
   forces.load(nullptr, nullptr, w);
@@ -63,7 +63,7 @@ namespace {
 template <class Space> struct AtRest {
   AtRest(const Mechanism<Space> &m, const Scene &scene, double t, const VectorXd &q, Workspace<Space, double> &w)
       : t(t), q(q), still(VectorXd::Zero(m.n_v)), w(w), forces(m), acting(m, scene, nullptr, nullptr),
-        wrench(VectorXd::Zero(Space::dim * static_cast<Index>(m.wrenches.size()))) {
+        wrench(VectorXd::Zero(Space::dim * m.wrenches.size())) {
     turn_markers(scene, t, w);
     for (Turning &marker : w.turning)
       marker.omega.setZero(), marker.alpha.setZero();
@@ -94,7 +94,7 @@ template <class Space> struct AtRest {
 template <class Space>
 ForcesAtRest forces_at_rest(const Mechanism<Space> &m, const Scene &scene, double t, const VectorXd &q,
                             Workspace<Space, double> &w) {
-  const auto rows = static_cast<Index>(m.constraints.size());
+  const Index rows = m.constraints.size();
   AtRest<Space> at(m, scene, t, q, w);
   ForcesAtRest found{{}, VectorXd(rows), MatrixXd(rows, m.n_v), 0, 0};
   if (rows) {
@@ -103,7 +103,7 @@ ForcesAtRest forces_at_rest(const Mechanism<Space> &m, const Scene &scene, doubl
     measure(m, q.data(), at.still.data(), w, found.value.data(), rate.data());
     const std::vector<Jet> targets = targets_at(scene, t);
     for (std::size_t r = 0; r < targets.size(); ++r) {
-      double &value = found.value[static_cast<Index>(r)];
+      double &value = found.value[r];
       value = m.constraints[r].apart(value, targets[r].value);
     }
   }

@@ -15,7 +15,7 @@ namespace {
 using Motion = Eigen::Map<Eigen::Matrix<double, 9, 1>>;
 
 double *block(MotionForces::Table &table, Index row, Index size, std::size_t number) {
-  return table.row(row).data() + size * static_cast<Index>(number);
+  return table.row(row).data() + size * number;
 }
 
 // A force (3) and its moment (3), of which a space has some
@@ -47,14 +47,14 @@ template <class Space> std::vector<std::array<int, 2>> ForcesOfStates<Space>::se
 template <class Space>
 ForcesOfStates<Space>::ForcesOfStates(const Mechanism<Space> &mechanism, Index states) : mechanism_(mechanism) {
   const auto resize = [states](MotionForces::Table &table, std::size_t size, std::size_t count) {
-    table.setZero(states, static_cast<Index>(size * count));
+    table.setZero(states, size * count);
   };
   const std::size_t bodies = mechanism.nodes.size(), wrenches = mechanism.wrenches.size();
   resize(found_.bodies, 9, bodies), resize(found_.points, 9, wrenches);
   resize(found_.sections, Space::dim, sections(mechanism).size()), resize(found_.joints, Space::dim, bodies);
   resize(found_.constraints, 2 * Space::dim, mechanism.constraints.size()),
       resize(found_.wrenches, Space::dim, wrenches);
-  resize(found_.modal, 1, static_cast<std::size_t>(mechanism.n_v)), resize(found_.rotors, 3, bodies);
+  resize(found_.modal, 1, mechanism.n_v), resize(found_.rotors, 3, bodies);
 }
 
 template <class Space>
@@ -102,8 +102,7 @@ void ForcesOfStates<Space>::write_sections(Index i, const NewtonEuler<Space> &fo
   for (std::size_t k = 0; k < mechanism_.nodes.size(); ++k) {
     const Node<Space> &node = mechanism_.nodes[k];
     for (int port = 0; port < node.outboard; ++port, to += Space::dim)
-      port_to_global(node.body, port, w.bodies[k],
-                     forces.on_port(static_cast<std::size_t>(node.first_port + port)).data(), to);
+      port_to_global(node.body, port, w.bodies[k], forces.on_port(node.first_port + port).data(), to);
     std::copy_n(forces.in_global_axes(k, w).data(), Space::dim, to), to += Space::dim;
     const Vector3d rotor = in_three_axes<Space>(forces.of_rotor(k))[1];
     std::copy_n(rotor.data(), 3, block(found_.rotors, i, 3, k));
@@ -115,10 +114,10 @@ void ForcesOfStates<Space>::write_point(const Attachment &at, const NewtonEuler<
                                         const Workspace<Space, double> &w, double *to) const {
   if (at.node < 0)
     return;
-  const auto number = static_cast<std::size_t>(at.node);
+  const std::size_t number = at.node;
   typename NewtonEuler<Space>::Vector global;
-  port_to_global(mechanism_.nodes[number].body, at.port, w.bodies[number],
-                 forces.of_port(static_cast<std::size_t>(at.global_port)).data(), global.data());
+  port_to_global(mechanism_.nodes[number].body, at.port, w.bodies[number], forces.of_port(at.global_port).data(),
+                 global.data());
   const auto [a, alpha] = in_three_axes<Space>(global);
   Pose<double> pose;
   attachment_motion(mechanism_, at, w, pose);

@@ -33,13 +33,12 @@ template <class Space> void DrivenMechanism<Space>::check() const {
 template <class Space>
 Motors<Space>::Motors(DrivenMechanism<Space> driven)
     : driven_(std::move(driven)), forces_(driven_.mechanism),
-      lambda_(VectorXd::Zero(static_cast<Index>(driven_.mechanism.constraints.size()))),
-      tau_(VectorXd::Zero(static_cast<Index>(driven_.motors.size()))), Q_(VectorXd::Zero(driven_.mechanism.n_v)),
-      beside_(Q_) {
+      lambda_(VectorXd::Zero(driven_.mechanism.constraints.size())), tau_(VectorXd::Zero(driven_.motors.size())),
+      Q_(VectorXd::Zero(driven_.mechanism.n_v)), beside_(Q_) {
   for (std::size_t r = 0; r < driven_.is_path.size(); ++r)
     if (!driven_.is_path[r])
       cuts_.push_back(static_cast<int>(r));
-  lambda_c_ = VectorXd::Zero(static_cast<Index>(cuts_.size()));
+  lambda_c_ = VectorXd::Zero(cuts_.size());
   columns_.resize(driven_.mechanism.n_v, lambda_c_.size() + tau_.size());
 }
 
@@ -101,7 +100,7 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
   beside_.setZero();
   for (std::size_t k = 0; k < driven_.motors.size(); ++k) {
     const Motor &motor = driven_.motors[k];
-    double &tau = tau_[static_cast<Index>(k)];
+    double &tau = tau_[k];
     if (cuts_.empty())
       tau = motor.sign * Q_[motor.coordinate], Q_[motor.coordinate] = 0;
     if (motor.turns_frames)
@@ -111,7 +110,7 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
 }
 
 template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::MatrixXd &dQ) const {
-  const auto modes = static_cast<Index>(driven_.of_modes.size());
+  const Index modes = driven_.of_modes.size();
   Eigen::MatrixXd found(modes + tau_.size(), dQ.cols());
   found.topRows(modes) = dQ(driven_.of_modes, Eigen::all);
   if (!cuts_.empty()) {
@@ -120,7 +119,7 @@ template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::Mat
     found.bottomRows(tau_.size()) = solved.bottomRows(tau_.size());
   } else
     for (Index k = 0; k < tau_.size(); ++k) {
-      const Motor &motor = driven_.motors[static_cast<std::size_t>(k)];
+      const Motor &motor = driven_.motors[k];
       found.row(modes + k) = motor.sign * dQ.row(motor.coordinate);
     }
   return found;
@@ -138,12 +137,12 @@ template <class Space> void Motors<Space>::close_loops(const double *q, const Tr
   const Index cuts = lambda_c_.size();
   for (Index k = 0; k < cuts; ++k) {
     lambda_.setZero();
-    lambda_[cuts_[static_cast<std::size_t>(k)]] = 1;
+    lambda_[cuts_[k]] = 1;
     project(q, w, columns_.col(k));
   }
   columns_.rightCols(tau_.size()).setZero();
   for (Index k = 0; k < tau_.size(); ++k) {
-    const Motor &motor = driven_.motors[static_cast<std::size_t>(k)];
+    const Motor &motor = driven_.motors[k];
     columns_(motor.coordinate, cuts + k) = motor.sign;
   }
   factors_.compute(columns_(driven_.of_joints, Eigen::all));

@@ -31,7 +31,7 @@ std::array<double, Space::dim> acceleration_of_joint(const Node<Space> &node, co
                                                      const double *q, const double *a) {
   std::array<double, Space::dim> along{};
   for (int k = 0; k < node.shape.freedoms.count; ++k)
-    along[static_cast<std::size_t>(node.shape.freedoms.component[k])] = a[k];
+    along[node.shape.freedoms.component[k]] = a[k];
   if (node.shape.in_inner_axes) {
     const auto inner = along;
     to_outer_axes(node, q, inner.data(), along.data());
@@ -54,8 +54,8 @@ template <class Space>
 std::array<double, Space::dim> in_port_axes_of(const Mechanism<Space> &m, const typename Mechanism<Space>::Actions &at,
                                                const Action &action, const double *wrench,
                                                const Workspace<Space, double> &w) {
-  const auto &body = m.nodes[static_cast<std::size_t>(at.node)].body;
-  const auto &s = w.bodies[static_cast<std::size_t>(at.node)];
+  const auto &body = m.nodes[at.node].body;
+  const auto &s = w.bodies[at.node];
   std::array<double, Space::dim> x{};
   if (action.constraint < 0) {
     const double *from = wrench + Space::dim * action.wrench;
@@ -70,7 +70,7 @@ std::array<double, Space::dim> in_port_axes_of(const Mechanism<Space> &m, const 
     in_port_axes(body, at.port, s, action.force, moment, x.data());
     return x;
   }
-  const Constraint &row = m.constraints[static_cast<std::size_t>(action.constraint)];
+  const Constraint &row = m.constraints[action.constraint];
   ConstraintMotion<double> motion;
   constraint_motion(m, row, w, row.moves, motion);
   in_port_axes(body, at.port, s, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x.data());
@@ -83,8 +83,8 @@ std::array<double, Space::dim> in_port_axes_of(const Mechanism<Space> &m, const 
 
 template <class Space>
 NewtonEuler<Space>::NewtonEuler(const Mechanism<Space> &mechanism)
-    : mechanism_(mechanism), ports_(static_cast<std::size_t>(mechanism.ports)), on_ports_(ports_), with_joints_(ports_),
-      terms_(ports_.size()), frames_(mechanism.nodes.size()), inertia_(frames_), rotor_(inertia_.size()),
+    : mechanism_(mechanism), ports_(mechanism.ports), on_ports_(ports_), with_joints_(ports_), terms_(ports_.size()),
+      frames_(mechanism.nodes.size()), inertia_(frames_), rotor_(inertia_.size()),
       on_coordinates_(VectorXd::Zero(mechanism.n_v)), of_joint_(inertia_), at_section_(inertia_), of_rotor_(inertia_) {
   for (const auto &node : mechanism.nodes)
     bodies_.emplace_back(node.body);
@@ -111,7 +111,7 @@ void NewtonEuler<Space>::accelerate(const double *q, const double *a, const Work
     Vector ground{}, A;
     if (node.parent < 0)
       ground_acceleration(mechanism_, node.parent_port, ground.data());
-    hinge.turn.back((node.parent < 0 ? ground : ports_[static_cast<std::size_t>(node.parent_port)]).data(), A.data());
+    hinge.turn.back((node.parent < 0 ? ground : ports_[node.parent_port]).data(), A.data());
     if (node.rotor_inertia > 0)
       rotor_[i] = node.rotor_inertia * (node.rotor_turns * A[Space::axis] + node.gear_ratio * a[node.v]);
     std::remove_cvref_t<decltype(hinge.turn)>::shift(hinge.r, A.data());
@@ -126,7 +126,7 @@ void NewtonEuler<Space>::accelerate(const double *q, const double *a, const Work
     } else
       tilt_back(body, u_ddot, A);
     for (int k = 0; k < node.outboard; ++k) {
-      const auto at = static_cast<std::size_t>(node.first_port + k);
+      const std::size_t at = node.first_port + k;
       ports_[at] = port_acceleration(body, k, s, A, u_ddot);
       terms_[at] = modal_terms(body, k, s);
     }
@@ -147,13 +147,12 @@ void NewtonEuler<Space>::load(const double *lambda, const double *wrench, const 
     for (const Action &action : actions.list) {
       const double size = action.constraint < 0 ? wrench != nullptr : lambda ? -lambda[action.constraint] : 0;
       if (size != 0)
-        add(in_port_axes_of<Space>(mechanism_, actions, action, wrench, w),
-            on_ports_[static_cast<std::size_t>(actions.global_port)], size);
+        add(in_port_axes_of<Space>(mechanism_, actions, action, wrench, w), on_ports_[actions.global_port], size);
     }
   on_coordinates_.setZero();
   for (std::size_t r = 0; lambda && r < mechanism_.constraints.size(); ++r)
     if (const Constraint &row = mechanism_.constraints[r]; row.node >= 0)
-      on_coordinates_[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= row.share * lambda[r];
+      on_coordinates_[mechanism_.nodes[row.node].v + row.freedom] -= row.share * lambda[r];
 }
 
 template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, double> &w, bool with_inertia) {
@@ -164,7 +163,7 @@ template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, 
     const auto &hinge = w.hinges[i];
     Vector f = with_inertia ? inertia_[i] : Vector{};
     for (int k = 0; k < node.outboard; ++k) {
-      Vector at_port = with_joints_[static_cast<std::size_t>(node.first_port + k)];
+      Vector at_port = with_joints_[node.first_port + k];
       to_frame(node.body, k, s, at_port);
       add(at_port, f, -1);
     }
@@ -189,7 +188,7 @@ template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, 
     if (node.parent < 0)
       continue;
     hinge.turn.apply(on_inner.data(), turned.data());
-    add(turned, with_joints_[static_cast<std::size_t>(node.parent_port)], -1);
+    add(turned, with_joints_[node.parent_port], -1);
   }
 }
 
@@ -211,7 +210,7 @@ typename NewtonEuler<Space>::Vector NewtonEuler<Space>::along_joint(std::size_t 
     to_inner_axes(node, q + node.q, of_joint_[i].data(), along.data());
   forces_to_freedoms(node, w.hinges[i], along.data());
   for (std::size_t k = 0; k < static_cast<std::size_t>(node.shape.freedoms.count); ++k)
-    found[k] = along[static_cast<std::size_t>(node.shape.freedoms.component[k])];
+    found[k] = along[node.shape.freedoms.component[k]];
   return found;
 }
 
@@ -222,7 +221,7 @@ template <class Act>
 void NewtonEuler<Space>::on_constraints(std::size_t i, const Workspace<Space, double> &w, const Act &act) const {
   const Node<Space> &node = mechanism_.nodes[i];
   for (int k = 0; k < node.outboard; ++k)
-    put_on_rows(node.body, k, w.bodies[i], with_joints_[static_cast<std::size_t>(node.first_port + k)], act);
+    put_on_rows(node.body, k, w.bodies[i], with_joints_[node.first_port + k], act);
   if (node.inboard >= 0)
     put_on_rows(node.body, node.inboard, w.bodies[i], at_section_[i], act);
   else
@@ -235,7 +234,7 @@ template <class Space> void NewtonEuler<Space>::project(const double *q, const W
     const Node<Space> &node = mechanism_.nodes[i];
     const Vector along = along_joint(i, q, w);
     for (int k = 0; k < node.shape.freedoms.count; ++k)
-      Q[node.v + k] = on_coordinates_[node.v + k] - along[static_cast<std::size_t>(k)];
+      Q[node.v + k] = on_coordinates_[node.v + k] - along[k];
     if (node.n() > 0)
       put_on_modes(node.body, w.bodies[i], [&](const auto &act) { on_constraints(i, w, act); }, Q + node.p_v());
   }
@@ -248,7 +247,7 @@ void NewtonEuler<Space>::require(const double *q, const double *a, Workspace<Spa
     const Node<Space> &node = mechanism_.nodes[i];
     const Vector along = along_joint(i, q, w);
     for (int k = 0; k < node.shape.freedoms.count; ++k)
-      f[node.v + k] = along[static_cast<std::size_t>(k)] - on_coordinates_[node.v + k];
+      f[node.v + k] = along[k] - on_coordinates_[node.v + k];
     if (node.rotor_inertia > 0)
       f[node.v] += node.gear_ratio * rotor_[i];
     if (node.n() == 0)
@@ -275,7 +274,7 @@ void NewtonEuler<Space>::residual_of_modes(std::size_t i, const double *q, const
                                            Workspace<Space, double> &w, double *f) {
   const Node<Space> &node = mechanism_.nodes[i];
   for (std::size_t k = 0; k < frames_[i].size(); ++k)
-    z[static_cast<Index>(k)] -= frames_[i][k];
+    z[k] -= frames_[i][k];
   modal_residual(node, q + node.p_q(), a + node.p_v(), z.data(), w.bodies[i], f + node.p_v());
 }
 
@@ -301,7 +300,7 @@ void NewtonEuler<Space>::add_joint_moment_on_modes(std::size_t i, double moment,
   });
   if (node.parent < 0)
     return;
-  const auto inner = static_cast<std::size_t>(node.parent);
+  const std::size_t inner = node.parent;
   about_z[Space::axis] = -moment;
   w.hinges[i].turn.apply(about_z.data(), at_port.data());
   const int port = node.parent_port - mechanism_.nodes[inner].first_port;
@@ -313,7 +312,7 @@ template <class Space> typename NewtonEuler<Space>::Vector NewtonEuler<Space>::l
   const Node<Space> &node = mechanism_.nodes[i];
   Vector found{};
   for (int k = 0; k < node.shape.freedoms.count; ++k)
-    found[static_cast<std::size_t>(node.shape.freedoms.component[k])] += on_coordinates_[node.v + k];
+    found[node.shape.freedoms.component[k]] += on_coordinates_[node.v + k];
   return found;
 }
 
@@ -327,7 +326,7 @@ template <class Space> VectorXd NewtonEuler<Space>::on_body(std::size_t i, const
       Vector on_inner = loads_along_joint(k), turned;
       std::remove_cvref_t<decltype(w.hinges[k].turn)>::add_moment(w.hinges[k].r, on_inner.data());
       w.hinges[k].turn.apply(on_inner.data(), turned.data());
-      add(turned, at_ports[static_cast<std::size_t>(outer.parent_port - node.first_port)], -1);
+      add(turned, at_ports[outer.parent_port - node.first_port], -1);
     }
   const Vector by_joint = loads_along_joint(i);
   Vector on_frame = by_joint, at_inboard{};
@@ -337,7 +336,7 @@ template <class Space> VectorXd NewtonEuler<Space>::on_body(std::size_t i, const
     to_frame(node.body, node.inboard, s, on_frame);
   }
   for (int k = 0; k < node.outboard; ++k) {
-    Vector at_port = at_ports[static_cast<std::size_t>(k)];
+    Vector at_port = at_ports[k];
     to_frame(node.body, k, s, at_port);
     add(at_port, on_frame);
   }
@@ -345,7 +344,7 @@ template <class Space> VectorXd NewtonEuler<Space>::on_body(std::size_t i, const
   std::copy(on_frame.begin(), on_frame.end(), Q.data());
   const auto on_rows_of_body = [&](const auto &act) {
     for (int k = 0; k < node.outboard; ++k)
-      put_on_rows(node.body, k, s, at_ports[static_cast<std::size_t>(k)], act);
+      put_on_rows(node.body, k, s, at_ports[k], act);
     if (node.inboard >= 0)
       put_on_rows(node.body, node.inboard, s, at_inboard, act);
     else
@@ -360,8 +359,7 @@ template <class Space>
 typename NewtonEuler<Space>::ConstraintAcceleration
 NewtonEuler<Space>::of_constraint(std::size_t r, const double *a, const Workspace<Space, double> &w) const {
   const Constraint &row = mechanism_.constraints[r];
-  const double along_joint =
-      row.node < 0 ? 0 : row.share * a[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom];
+  const double along_joint = row.node < 0 ? 0 : row.share * a[mechanism_.nodes[row.node].v + row.freedom];
   ConstraintMotion<double> motion;
   constraint_motion(mechanism_, row, w, row.moves, motion);
   double along = 0;
@@ -373,7 +371,7 @@ NewtonEuler<Space>::of_constraint(std::size_t r, const double *a, const Workspac
   for (const auto &actions : mechanism_.actions)
     for (const Action &action : actions.list)
       if (action.constraint == static_cast<int>(r)) {
-        const auto port = static_cast<std::size_t>(actions.global_port);
+        const std::size_t port = actions.global_port;
         const Vector x = in_port_axes_of<Space>(mechanism_, actions, action, nullptr, w);
         found.value += product(x, ports_[port]);
         for (std::size_t k = 0; k < x.size(); ++k)

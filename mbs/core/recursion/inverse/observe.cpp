@@ -142,7 +142,7 @@ template <class Space> Totals totals(const Placed<Space, double> &at) {
     sum.kinetic +=
         0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot)) + body.modal;
     for (int k = 0; k < node.n(); ++k)
-      sum.strain += 0.5 * node.body.K[static_cast<std::size_t>(k)] * p[k] * p[k];
+      sum.strain += 0.5 * node.body.K[k] * p[k] * p[k];
     sum.dissipated += damping_power(node.body, p_dot);
     sum.gravitational -= g.dot(body.mass * r + R * body.s);
     sum.momentum += R * linear;
@@ -199,7 +199,7 @@ template <class Space>
 RowMajor without_work(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &forces,
                       Workspace<Space, double> &w) {
   constexpr int d = Space::dim, linear = Space::linear;
-  const std::vector<double> still(static_cast<std::size_t>(m.n_v));
+  const std::vector<double> still(m.n_v);
   RowMajor found(forces.rows(), forces.cols());
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     place_all(m, q.row(i).data(), still.data(), nullptr, w);
@@ -210,7 +210,7 @@ RowMajor without_work(const Mechanism<Space> &m, const RowMajor &q, const RowMaj
       axes.template topLeftCorner<linear, linear>() = R.topLeftCorner<linear, linear>();
       if constexpr (d == 6)
         axes.template bottomRightCorner<3, 3>() = R;
-      const auto place = static_cast<Eigen::Index>(k) * d;
+      const Eigen::Index place = k * d;
       Eigen::Matrix<double, d, 1> f = axes.transpose() * forces.row(i).segment<d>(place).transpose();
       forces_to_freedoms(node, w.hinges[k], f.data());
       for (int c = 0; c < node.shape.freedoms.count; ++c)

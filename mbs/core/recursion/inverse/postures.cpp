@@ -16,7 +16,7 @@ namespace {
 template <class Space>
 MatrixXd gradients_there(const Mechanism<Space> &m, const double *q, NewtonEuler<Space> &forces,
                          Workspace<Space, double> &w) {
-  const auto count = static_cast<Index>(m.constraints.size());
+  const Index count = m.constraints.size();
   VectorXd unit = VectorXd::Zero(count), along(m.n_v);
   MatrixXd found(count, m.n_v);
   for (Index r = 0; r < count; ++r) {
@@ -39,7 +39,7 @@ template <class Space> MatrixXd gradients(const Mechanism<Space> &m, const doubl
 
 template <class Space>
 Postures<Space>::Postures(const Mechanism<Space> &m, const Scene &scene, Workspace<Space, double> &w)
-    : m_(m), scene_(scene), w_(w), forces_(m), value_(static_cast<Index>(m.constraints.size())), rate_(value_),
+    : m_(m), scene_(scene), w_(w), forces_(m), value_(m.constraints.size()), rate_(value_),
       still_(VectorXd::Zero(m.n_v)) {}
 
 template <class Space> void Postures<Space>::go_to(double t) {
@@ -50,9 +50,9 @@ template <class Space> void Postures<Space>::go_to(double t) {
 template <class Space> void Postures<Space>::measure(const double *q, const double *v) {
   recursion::measure(m_, q, v, w_, value_.data(), rate_.data());
   for (std::size_t r = 0; r < targets_.size(); ++r) {
-    double &value = value_[static_cast<Index>(r)];
+    double &value = value_[r];
     value = m_.constraints[r].apart(value, targets_[r].value);
-    rate_[static_cast<Index>(r)] -= targets_[r].rate;
+    rate_[r] -= targets_[r].rate;
   }
 }
 
@@ -61,7 +61,7 @@ std::pair<RowMajor, RowMajor> Postures<Space>::constraints(const Times &times, c
   RowMajor values(q.rows(), value_.size()), slopes(q.rows(), value_.size() * m_.n_v);
   for (Index i = 0; i < q.rows(); ++i) {
     const double *at = q.row(i).data();
-    go_to(times[static_cast<std::size_t>(i)]);
+    go_to(times[i]);
     measure(at, still_.data());
     values.row(i) = value_.transpose();
     Eigen::Map<RowMajor>(slopes.row(i).data(), value_.size(), m_.n_v) = gradients_there(m_, at, forces_, w_);
@@ -72,7 +72,7 @@ std::pair<RowMajor, RowMajor> Postures<Space>::constraints(const Times &times, c
 template <class Space> RowMajor Postures<Space>::rates(const Times &times, const RowMajor &q, const RowMajor &v) {
   RowMajor found(q.rows(), rate_.size());
   for (Index i = 0; i < q.rows(); ++i) {
-    go_to(times[static_cast<std::size_t>(i)]);
+    go_to(times[i]);
     measure(q.row(i).data(), v.row(i).data());
     found.row(i) = rate_.transpose();
   }
@@ -92,9 +92,9 @@ std::pair<RowMajor, VectorXd> Postures<Space>::solve(const Times &times, RowMajo
   const VectorXd scales = search.scales(moving);
   VectorXd step = still_, left = VectorXd::Zero(q.rows());
   for (Index i = 0; value_.size() && i < q.rows(); ++i) {
-    go_to(times[static_cast<std::size_t>(i)]);
+    go_to(times[i]);
     for (Index r = 0; beside.size() && r < value_.size(); ++r)
-      targets_[static_cast<std::size_t>(r)].value += beside(i, r);
+      targets_[r].value += beside(i, r);
     double *at = q.row(i).data();
     MatrixXd J;
     const auto off = [&] {

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 ModalMotion modes_at(const std::vector<ModalShape> &shape, double t) {
   Index n = 0, k = 0;
   for (const ModalShape &of_body : shape)
-    n += static_cast<Index>(of_body.size());
+    n += of_body.size();
   ModalMotion modes{VectorXd(n), VectorXd(n), VectorXd(n)};
   for (const ModalShape &of_body : shape)
     for (const TimeFunction &function : of_body) {
@@ -49,7 +49,7 @@ PrescribedMotion<Space>::PrescribedMotion(DrivenMechanism<Space> driven, const V
       w_(driven_.mechanism), forces_(driven_.mechanism), sizes_(driven_.mechanism),
       state_(VectorXd::Zero(driven_.mechanism.n_q + driven_.mechanism.n_v)), a_(VectorXd::Zero(driven_.mechanism.n_v)),
       required_(a_), f_(a_), Q_(a_), step_(a_), first_(-std::numeric_limits<double>::infinity()), last_(-first_) {
-  const auto equations = static_cast<Index>(driven_.mechanism.constraints.size());
+  const Index equations = driven_.mechanism.constraints.size();
   int joint = 0;
   for (const auto &node : driven_.mechanism.nodes)
     for (int k = 0; k < node.shape.v_count; ++k, ++joint)
@@ -80,9 +80,9 @@ template <class Space> void PrescribedMotion<Space>::set_modes(const ModalMotion
 template <class Space> void PrescribedMotion<Space>::measure() {
   recursion::measure(driven_.mechanism, q(), v(), w_, value_.data(), rate_.data());
   for (std::size_t r = 0; r < targets_.size(); ++r) {
-    double &value = value_[static_cast<Index>(r)];
+    double &value = value_[r];
     value = driven_.mechanism.constraints[r].apart(value, targets_[r].value);
-    rate_[static_cast<Index>(r)] -= targets_[r].rate;
+    rate_[r] -= targets_[r].rate;
   }
 }
 
@@ -134,7 +134,7 @@ bool PrescribedMotion<Space>::follow(double t, const ModalMotion &modes, std::ve
   forces_.accelerate(q(), a_.data(), w_);
   VectorXd bias(lambda_.size());
   for (std::size_t r = 0; r < targets_.size(); ++r)
-    bias[static_cast<Index>(r)] = forces_.of_constraint(r, a_.data(), w_).value - targets_[r].acceleration;
+    bias[r] = forces_.of_constraint(r, a_.data(), w_).value - targets_[r].acceleration;
   a_(driven_.of_joints) -= factors_.solve(bias);
   return a_.allFinite();
 }
@@ -162,7 +162,7 @@ template <class Space> std::vector<Jet> PrescribedMotion<Space>::measured_in(con
   forces_.accelerate(other.q(), other.a_.data(), w_);
   std::vector<Jet> found;
   for (std::size_t r = 0; r < targets_.size(); ++r) {
-    const auto i = static_cast<Index>(r);
+    const Index i = r;
     found.push_back({value_[i], rate_[i], forces_.of_constraint(r, other.a_.data(), w_).value});
   }
   return found;
@@ -201,7 +201,7 @@ RedefinedMotion<Space>::RedefinedMotion(DrivenMechanism<Space> driven, DrivenMec
                                         double factor, std::vector<TimeFunction> offset)
     : PrescribedMotion<Space>(std::move(driven), q), path_(std::move(path), q), factor_(factor),
       offset_(std::move(offset)) {
-  const auto count = static_cast<Index>(offset_.size());
+  const Index count = offset_.size();
   if (count != 0 && count != this->modes())
     throw std::invalid_argument("offset: expected " + std::to_string(this->modes()) +
                                 " functions, one for each mode, or none, got " + std::to_string(count));

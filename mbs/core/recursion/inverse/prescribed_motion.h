@@ -72,7 +72,7 @@ public:
   const Eigen::VectorXd &rates() const { return rate_; }
   const std::vector<Jet> &targets() const { return targets_; }
   const DrivenMechanism<Space> &driven() const { return driven_; }
-  Eigen::Index modes() const { return static_cast<Eigen::Index>(driven_.of_modes.size()); }
+  Eigen::Index modes() const { return driven_.of_modes.size(); }
 
   TreeWorkspace &workspace() { return w_; } // with kinematics, accelerations of frames, multipliers
   const double *wrenches() const { return acting_.wrench; }

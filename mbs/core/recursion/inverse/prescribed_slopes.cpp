@@ -17,7 +17,7 @@ template <class Space>
 Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, const std::vector<int> &active) {
   VectorXd target(lambda_.size());
   for (Index r = 0; r < target.size(); ++r)
-    target[r] = forces_.of_constraint(static_cast<std::size_t>(r), a_.data(), w_).value;
+    target[r] = forces_.of_constraint(r, a_.data(), w_).value;
   w_.keep(active);
   const double t = std::clamp(time_, first_, last_);
   return recursion::derivatives_under(driven_.mechanism, driven_.scene, t, state_, forces, target, w_);
@@ -38,7 +38,7 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes(const J
   to.q(driven_.of_modes, Eigen::all).setIdentity();
   const auto put = [&](MatrixXd rows, MatrixXd JointSlopes::*which) {
     for (Index r = 0; followed && r < rows.rows(); ++r)
-      if (driven_.is_path[static_cast<std::size_t>(r)])
+      if (driven_.is_path[r])
         rows.row(r) += C.row(r) * followed->*which;
     (to.*which)(joints, Eigen::all) = factors_.solve(rows);
   };
@@ -60,8 +60,8 @@ template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const Joi
   if (const Motors<Space> *found = motors()) {
     forces(driven_.of_modes) += (found->left() - found->beside())(driven_.of_modes);
     for (std::size_t k = 0; k < driven_.motors.size(); ++k)
-      forces[driven_.motors[k].coordinate] += driven_.motors[k].sign * found->tau()[static_cast<Index>(k)];
-    std::erase_if(active, [&](int r) { return driven_.is_path[static_cast<std::size_t>(r)]; });
+      forces[driven_.motors[k].coordinate] += driven_.motors[k].sign * found->tau()[k];
+    std::erase_if(active, [&](int r) { return driven_.is_path[r]; });
   } else
     forces(driven_.of_modes) += shape_force();
   const auto shares_of = [&](const MatrixXd &of_forces) {

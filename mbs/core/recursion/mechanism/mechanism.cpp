@@ -34,7 +34,7 @@ bool is_curved(const PlanarData &data, const PlanarMarker &marker, int row) {
 }
 bool is_curved(const SpatialData &data, const SpatialMarker &marker, int row) {
   const std::vector<Eigen::MatrixXd> K = spatial::section_K(marker);
-  return !K.empty() && K[static_cast<std::size_t>(row)].cwiseAbs().maxCoeff() > spatial::negligible_K(data);
+  return !K.empty() && K[row].cwiseAbs().maxCoeff() > spatial::negligible_K(data);
 }
 
 PlanarData at_marker(const PlanarData &data, const PlanarMarker &m) { return planar::moved(data, m.position, m.angle); }
@@ -59,7 +59,7 @@ template <class Space>
 bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const JointShape &shape, bool asked) {
   if (body.data.modes() == 0)
     return true;
-  const auto &marker = body.data.markers[static_cast<std::size_t>(body.inboard_marker)];
+  const auto &marker = body.data.markers[body.inboard_marker];
   const Eigen::MatrixXd rows = section_rows(marker);
   for (int c = 0; c < Space::dim; ++c) {
     const int *first = shape.freedoms.component;
@@ -106,8 +106,7 @@ void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_ma
   const auto count = body.data.markers.size();
   if (body.parent < -1 || body.parent >= static_cast<int>(index))
     refuse(name + ": parent: expected -1 (ground) or a body before it, got " + std::to_string(body.parent));
-  const std::size_t there =
-      body.parent < 0 ? ground_markers : bodies[static_cast<std::size_t>(body.parent)].data.markers.size();
+  const std::size_t there = body.parent < 0 ? ground_markers : bodies[body.parent].data.markers.size();
   if (body.parent_marker < 0 || body.parent_marker >= static_cast<int>(there))
     refuse(name + ": parent_marker: expected 0 to " + std::to_string(there) + " - 1, got " +
            std::to_string(body.parent_marker));
@@ -175,11 +174,11 @@ template <class Space> void Mechanism<Space>::take_tree(Plan &plan) {
     Node<Space> &node = nodes[i];
     node.index = static_cast<int>(i), node.parent = body.parent, node.parent_port = body.parent_marker;
     if (body.parent < 0) {
-      if (turns(ground[static_cast<std::size_t>(body.parent_marker)]))
+      if (turns(ground[body.parent_marker]))
         refuse("body " + body.name + ": parent_marker: expected one that stands still, got one that turns");
       continue;
     }
-    const auto parent = static_cast<std::size_t>(body.parent);
+    const std::size_t parent = body.parent;
     plan.carries[parent] = 1;
     node.parent_port = static_cast<int>(plan.markers[parent].size());
     plan.markers[parent].push_back(body.parent_marker);
@@ -196,7 +195,7 @@ template <class Space> Attachment Mechanism<Space>::attach(const MarkerAt &at, P
   }
   if (at.body >= static_cast<int>(plan.markers.size()))
     refuse("marker: expected a body below " + std::to_string(plan.markers.size()) + ", got " + std::to_string(at.body));
-  auto &ports = plan.markers[static_cast<std::size_t>(at.body)];
+  auto &ports = plan.markers[at.body];
   const auto found = std::find(ports.begin(), ports.end(), at.marker);
   const int port = static_cast<int>(found - ports.begin());
   if (found == ports.end())
@@ -206,9 +205,7 @@ template <class Space> Attachment Mechanism<Space>::attach(const MarkerAt &at, P
 
 template <class Space>
 void Mechanism<Space>::attach_constraints(const std::vector<ConstraintModel> &models, Plan &plan) {
-  const auto follows = [&](const Attachment &at) {
-    return at.node < 0 && turns(ground[static_cast<std::size_t>(at.port)]);
-  };
+  const auto follows = [&](const Attachment &at) { return at.node < 0 && turns(ground[at.port]); };
   for (const ConstraintModel &model : models) {
     if (model.coordinate >= 0 && (model.kind == ConstraintKind::point || model.kind == ConstraintKind::dot))
       refuse("row " + model.name + ": coordinate: expected one of an angle or slide, got one of another kind of row");
@@ -231,11 +228,11 @@ template <class Space> void Mechanism<Space>::find_passed_moments(const std::vec
     body.driven = body.driven || is_constrained;
     first = end + static_cast<int>(body.data.modes());
     if (body.parent >= 0 && (body.joint != JointKind::revolute || is_constrained || body.rotor_inertia > 0))
-      plan.passes_moment[static_cast<std::size_t>(body.parent)] = 1;
+      plan.passes_moment[body.parent] = 1;
   }
   const auto pass_at = [&](const Attachment &at) {
     if (at.node >= 0)
-      plan.passes_moment[static_cast<std::size_t>(at.node)] = 1;
+      plan.passes_moment[at.node] = 1;
   };
   for (const Constraint &constraint : constraints)
     if (constraint.model.kind != ConstraintKind::point)
@@ -247,7 +244,7 @@ template <class Space> void Mechanism<Space>::find_passed_moments(const std::vec
 
 // A joint and its body: where its frame sits, its coordinates, ports and places for columns
 template <class Space> void Mechanism<Space>::take_body(Node<Space> &node, Plan &plan) {
-  const auto i = static_cast<std::size_t>(node.index);
+  const std::size_t i = node.index;
   BodyModel<Data> &model = plan.bodies[i];
   node.name = model.name, node.joint = model.joint, node.is_driven = model.driven;
   node.shape = Space::shape(model.joint);
@@ -279,12 +276,12 @@ template <class Space> void Mechanism<Space>::take_body(Node<Space> &node, Plan 
 
 // At the joint, where modes do not move the section there (a pin's may turn it), else where the body's data have it
 template <class Space> void Mechanism<Space>::place_frame(Node<Space> &node, Plan &plan) {
-  const auto i = static_cast<std::size_t>(node.index);
+  const std::size_t i = node.index;
   BodyModel<Data> &model = plan.bodies[i];
   std::vector<int> &markers = plan.markers[i];
   const bool asked = model.driven || model.of_section || model.rotor_inertia > 0;
   const bool sits = frame_sits_at_joint<Space>(model, node.shape, asked);
-  const Marker inboard = model.data.markers[static_cast<std::size_t>(model.inboard_marker)];
+  const Marker inboard = model.data.markers[model.inboard_marker];
   node.outboard = static_cast<int>(markers.size());
   node.markers = markers, node.markers.push_back(model.inboard_marker);
   bool tilts = false; // modes turn the section, and nothing but that
@@ -306,7 +303,7 @@ template <class Space> void Mechanism<Space>::place_frame(Node<Space> &node, Pla
 
 template <class Space> void Mechanism<Space>::check_coordinates() const {
   for (const Constraint &of : constraints) {
-    if (of.node >= 0 && nodes[static_cast<std::size_t>(of.node)].shape.in_inner_axes)
+    if (of.node >= 0 && nodes[of.node].shape.in_inner_axes)
       refuse("row " + of.model.name + ": expected a coordinate of a joint with rotations or one slide, got one of a " +
              "planar or free joint: use rows between markers");
     if ((of.model.kind == ConstraintKind::coordinate || of.model.coordinate >= 0) && of.node < 0)
@@ -317,18 +314,18 @@ template <class Space> void Mechanism<Space>::check_coordinates() const {
 
 // Numbers of ports among all of the mechanism: inboard ports of joints, what a constraint equation or wrench acts on
 template <class Space> void Mechanism<Space>::connect_ports() {
-  children.assign(static_cast<std::size_t>(ports), -1);
-  cleared.assign(static_cast<std::size_t>(ports), 0);
+  children.assign(ports, -1);
+  cleared.assign(ports, 0);
   for (Node<Space> &node : nodes)
     if (node.parent >= 0) {
-      node.parent_port += nodes[static_cast<std::size_t>(node.parent)].first_port;
-      children[static_cast<std::size_t>(node.parent_port)] = node.index;
+      node.parent_port += nodes[node.parent].first_port;
+      children[node.parent_port] = node.index;
     }
   const auto connect = [&](Attachment &at) {
     if (at.node < 0)
       return;
-    at.global_port = nodes[static_cast<std::size_t>(at.node)].first_port + at.port;
-    cleared[static_cast<std::size_t>(at.global_port)] = 1;
+    at.global_port = nodes[at.node].first_port + at.port;
+    cleared[at.global_port] = 1;
   };
   for (Constraint &of : constraints)
     if (of.model.kind != ConstraintKind::coordinate)
@@ -357,7 +354,7 @@ template <class Space> void Mechanism<Space>::collect_actions() {
   for (const Node<Space> &node : nodes)
     for (int k = 0; k < node.outboard; ++k) {
       const int port = node.first_port + k;
-      if (!cleared[static_cast<std::size_t>(port)])
+      if (!cleared[port])
         continue;
       Actions found{node.index, k, port, {}, false, false};
       for (std::size_t r = 0; r < constraints.size(); ++r)
@@ -381,22 +378,22 @@ template <class Space> void Mechanism<Space>::connect_pins() {
   for (Node<Space> &node : nodes) {
     if (node.joint == JointKind::revolute || node.joint == JointKind::free)
       node.angle = node.joint == JointKind::free ? node.q + 2 : node.q;
-    const int child = node.outboard ? children[static_cast<std::size_t>(node.first_port)] : -1;
+    const int child = node.outboard ? children[node.first_port] : -1;
     node.is_loaded = child >= 0;
-    node.carries_pin = child >= 0 && nodes[static_cast<std::size_t>(child)].is_pin;
-    if (node.is_pin && child >= 0 && nodes[static_cast<std::size_t>(child)].is_driven)
-      node.moment_on_port = nodes[static_cast<std::size_t>(child)].v;
+    node.carries_pin = child >= 0 && nodes[child].is_pin;
+    if (node.is_pin && child >= 0 && nodes[child].is_driven)
+      node.moment_on_port = nodes[child].v;
     node.parent_is_pin = node.is_pin;
     if (node.parent < 0) {
       if constexpr (std::is_same_v<Space, Planar>)
-        node.inner_angle = ground[static_cast<std::size_t>(node.parent_port)].angle;
+        node.inner_angle = ground[node.parent_port].angle;
       continue;
     }
-    const Node<Space> &parent = nodes[static_cast<std::size_t>(node.parent)];
+    const Node<Space> &parent = nodes[node.parent];
     node.parent_is_pin = node.is_pin && parent.is_pin;
-    node.adds_up = cleared[static_cast<std::size_t>(node.parent_port)];
+    node.adds_up = cleared[node.parent_port];
     if constexpr (std::is_same_v<Space, Planar>) {
-      const planar::Port &port = parent.body.ports[static_cast<std::size_t>(node.parent_port - parent.first_port)];
+      const planar::Port &port = parent.body.ports[node.parent_port - parent.first_port];
       node.inner_angle = port.angle, node.inner_rotation = port.row + 2;
     }
   }

@@ -24,13 +24,13 @@ std::vector<Jet> targets_at(const Scene &scene, double t) {
 }
 
 ConstraintLaws::ConstraintLaws(const Scene &scene, std::size_t equations)
-    : laws_(laws_of(scene, equations)), sign_(Eigen::VectorXd::Ones(static_cast<Eigen::Index>(equations))) {
+    : laws_(laws_of(scene, equations)), sign_(Eigen::VectorXd::Ones(equations)) {
   for (std::size_t r = 0; r < scene.targets.size(); ++r)
-    sign_[static_cast<Eigen::Index>(r)] = scene.targets[r].sign;
+    sign_[r] = scene.targets[r].sign;
 }
 
 void ConstraintLaws::look_up(double t) {
-  now_ = static_cast<std::size_t>(std::ranges::find(times_, t) - times_.begin());
+  now_ = std::ranges::find(times_, t) - times_.begin();
   if (now_ == times_.size())
     find(&t, 1), now_ = 0;
 }

@@ -28,13 +28,13 @@ public:
       look_up(t);
     next_ = now_ + 1;
     time_ = t;
-    now_accelerations_ = accelerations_.data() + now_ * static_cast<std::size_t>(sign_.size());
+    now_accelerations_ = accelerations_.data() + now_ * sign_.size();
     return true;
   }
   const double *accelerations() const { return now_accelerations_; } // (equations)
   Jet of(std::size_t equation) const {
     const Jet law = laws_.jet(now_, equation);
-    const double sign = sign_[static_cast<Eigen::Index>(equation)];
+    const double sign = sign_[equation];
     return {sign * law.value, sign * law.rate, sign * law.acceleration};
   }
 

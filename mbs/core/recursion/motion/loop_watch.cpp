@@ -20,7 +20,7 @@ constexpr double singular = 1e-5;
 
 // sqrt(det C M^-1 C^T) of the active constraints, from its factors
 template <class Space> double volume(const Workspace<Space, double> &w) {
-  const auto next = static_cast<std::size_t>(w.factored() + 1); // on the diagonal
+  const std::size_t next = w.factored() + 1; // on the diagonal
   double inverse = 1;
   for (std::size_t r = 0; r < w.active.size(); ++r)
     inverse *= w.factor[r * next];
@@ -31,8 +31,8 @@ template <class Space> double volume(const Workspace<Space, double> &w) {
 
 template <class Space>
 LoopWatch<Space>::LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w)
-    : mechanism_(mechanism), multiplier_(VectorXd::Zero(static_cast<Index>(mechanism.constraints.size()))),
-      answer_(mechanism.n_v), least_volume_(singular * volume(w)) {}
+    : mechanism_(mechanism), multiplier_(VectorXd::Zero(mechanism.constraints.size())), answer_(mechanism.n_v),
+      least_volume_(singular * volume(w)) {}
 
 template <class Space>
 void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
@@ -49,7 +49,7 @@ template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspac
     multiplier_[w.active[k]] = 1;
     respond(mechanism_, q, multiplier_.data(), w, answer_.data()); // -M^-1 C^T of one constraint
     multiplier_[w.active[k]] = 0;
-    product_.col(static_cast<Index>(k)).noalias() = C_0_ * -answer_;
+    product_.col(k).noalias() = C_0_ * -answer_;
   }
   return cosine_ = product_.determinant() / (volume_ * now);
 }

@@ -31,7 +31,7 @@ MatrixXd gradients_by_joints(const Mechanism<Space> &m, double length, const dou
   J(Eigen::all, ways) *= length;
   for (std::size_t r = 0; r < m.constraints.size(); ++r)
     if (!is_moment(m, m.constraints[r]))
-      J.row(static_cast<Index>(r)) /= length;
+      J.row(r) /= length;
   return J;
 }
 
@@ -39,7 +39,7 @@ MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path, bool path)
   std::vector<Index> chosen;
   for (std::size_t r = 0; r < is_path.size(); ++r)
     if ((is_path[r] != 0) == path)
-      chosen.push_back(static_cast<Index>(r));
+      chosen.push_back(r);
   return J(chosen, Eigen::all);
 }
 

@@ -30,9 +30,9 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
     : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
       workspace_(mechanism), measured_(mechanism), forces_(mechanism, scene, held, external),
       laws_(scene, mechanism.constraints.size()), norm_(mechanism), newton_(mechanism, scene),
-      value_(VectorXd::Zero(static_cast<Index>(mechanism.constraints.size()))), rate_(value_),
-      correction_(VectorXd::Zero(mechanism.n_v)), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)),
-      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(correction_) {
+      value_(VectorXd::Zero(mechanism.constraints.size())), rate_(value_), correction_(VectorXd::Zero(mechanism.n_v)),
+      state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), shifted_(VectorXd::Zero(2 * mechanism.n_v)),
+      unused_(correction_) {
   go_to(t);
   if (!scene.keeps_all_constraints)
     keep_independent_constraints(mechanism, q, v, workspace_);
@@ -51,15 +51,14 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
                          node.rotor_inertia * node.gear_ratio * node.gear_ratio);
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
-      fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
+      fastest_ = std::max(fastest_, std::sqrt(node.body.K[k])), steps_between_postures_ = 10;
 }
 
 template <class Space> void RecursiveMotion<Space>::bear_loads() {
   if (forces_.acts())
     for (const int r : workspace_.active)
-      if (const Constraint &of = mechanism_.constraints[static_cast<std::size_t>(r)];
-          of.model.kind == ConstraintKind::coordinate)
-        borne_.push_back({mechanism_.nodes[static_cast<std::size_t>(of.node)].v + of.freedom, r, 0});
+      if (const Constraint &of = mechanism_.constraints[r]; of.model.kind == ConstraintKind::coordinate)
+        borne_.push_back({mechanism_.nodes[of.node].v + of.freedom, r, 0});
 }
 
 template <class Space> void RecursiveMotion<Space>::plan(double begin, double end) {
@@ -77,7 +76,7 @@ template <class Space> void RecursiveMotion<Space>::plan(double begin, double en
 
 template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
   for (const DrivenMarker &driven : scene_.driven) {
-    const auto i = static_cast<std::size_t>(driven.marker);
+    const std::size_t i = driven.marker;
     workspace_.turning[i] = measured_.turning[i] = newton_.workspace().turning[i] = driven.law(t);
   }
 }
@@ -134,8 +133,8 @@ Placed<Space, double> RecursiveMotion<Space>::residuals(double t, const double *
   go_to(t);
   const auto at = measure(mechanism_, q, v, w, value_.data(), rate_.data());
   for (Index r = 0; r < value_.size(); ++r) {
-    const Jet law = laws_.of(static_cast<std::size_t>(r));
-    value_[r] = mechanism_.constraints[static_cast<std::size_t>(r)].apart(value_[r], law.value);
+    const Jet law = laws_.of(r);
+    value_[r] = mechanism_.constraints[r].apart(value_[r], law.value);
     rate_[r] -= law.rate;
   }
   return at;
@@ -249,7 +248,7 @@ template <class Space> void RecursiveMotion<Space>::watch_posture(double t, cons
 template <class Space> Index RecursiveMotion<Space>::prescribed() const {
   const std::size_t count =
       scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size() + scene_.cut_loads.size();
-  return static_cast<Index>(count);
+  return count;
 }
 
 template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {

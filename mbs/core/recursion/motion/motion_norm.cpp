@@ -58,16 +58,16 @@ double larger(double x, double y) { return x >= y || std::isnan(x) ? x : y; }
 template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism)
     : mechanism_(mechanism), sizes_(mechanism), pace_{0, 0} {
-  const auto n = static_cast<std::size_t>(mechanism.n_v);
+  const std::size_t n = mechanism.n_v;
   group_.assign(2 * n, 0), radian_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
     for (int k = 0; k < node.shape.freedoms.count; ++k)
-      group_[static_cast<std::size_t>(node.v + k)] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
+      group_[node.v + k] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
     double lowest = std::numeric_limits<double>::infinity();
     for (int k = 0; k < node.n(); ++k) {
-      const auto i = static_cast<std::size_t>(node.p_v() + k);
+      const std::size_t i = node.p_v() + k;
       group_[i] = static_cast<int>(pace_.size());
-      const double frequency = std::sqrt(node.body.K[static_cast<std::size_t>(k)]);
+      const double frequency = std::sqrt(node.body.K[k]);
       radian_[i] = frequency > 0 ? 1 / frequency : 0;
       lowest = std::min(lowest, frequency);
     }
@@ -79,7 +79,7 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism)
   size_ = by_forces_ = by_given_ = std::vector<double>(2 * pace_.size(), 0.0);
   of_rates_.assign(pace_.size(), 0.0), peak_.assign(3 * pace_.size(), 0.0);
   for (std::size_t i = 0; i < n; ++i) {
-    const auto group = static_cast<std::size_t>(group_[i]);
+    const std::size_t group = group_[i];
     if (runs_.empty() || runs_.back().group != group)
       runs_.push_back({static_cast<Index>(i), 0, group});
     ++runs_.back().count;
@@ -117,7 +117,7 @@ template <class Space> void MotionNorm<Space>::add_motors(const std::vector<bool
   }
   motors_ += are_moments.size();
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
-  observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
+  observed_ = change_ = VectorXd::Zero(force_group_.size());
 }
 
 template <class Space> void MotionNorm<Space>::plan(double duration, double acceleration) {
@@ -181,14 +181,14 @@ void MotionNorm<Space>::forces(const Workspace<Space, double> &w, const VectorXd
   for (const std::size_t node : alone_)
     add(w.hinges[node].f);
   for (std::size_t i = 0; i < motors_; ++i)
-    *to++ = motors ? (*motors)[static_cast<Index>(i)] : 0;
+    *to++ = motors ? (*motors)[i] : 0;
 }
 
 template <class Space>
 void MotionNorm<Space>::sizes_of_forces(const VectorXd &values, std::vector<double> &size) const {
   std::fill(size.begin(), size.end(), 0.0);
   for (std::size_t r = 0; r < force_group_.size(); ++r)
-    size[static_cast<std::size_t>(force_group_[r])] += square(values[static_cast<Index>(r)]);
+    size[force_group_[r]] += square(values[r]);
   for (double &x : size)
     x = std::sqrt(x);
 }
@@ -283,7 +283,7 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
     of_ways = std::max(of_ways, acceleration);
     if (node.n() > 0) {
       // where nothing has happened yet, or what acts holds the link straight
-      const auto g = static_cast<std::size_t>(group_[static_cast<std::size_t>(node.p_v())]);
+      const std::size_t g = group_[node.p_v()];
       const double force = std::sqrt(mass) * std::max(acceleration, least);
       peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
       peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);

@@ -35,7 +35,7 @@ template <class Numbers> double largest(const Numbers &x, const VectorXd &invers
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Constraint &row) {
   if (row.model.kind != ConstraintKind::coordinate)
     return row.model.kind != ConstraintKind::point && row.model.kind != ConstraintKind::slide;
-  return m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] >= Space::linear;
+  return m.nodes[row.node].shape.freedoms.component[row.freedom] >= Space::linear;
 }
 
 template <class Space> NaturalSizes<Space>::NaturalSizes(const Mechanism<Space> &mechanism) {
@@ -46,10 +46,10 @@ template <class Space> NaturalSizes<Space>::NaturalSizes(const Mechanism<Space> 
   length_ = length_ > 0 ? length_ : 1;
   by_gravity_ = std::sqrt(mechanism.gravity.norm() / length_);
   pace_ = by_gravity_ > 0 ? by_gravity_ : 1;
-  of_row_ = VectorXd::Ones(static_cast<Index>(mechanism.constraints.size()));
+  of_row_ = VectorXd::Ones(mechanism.constraints.size());
   for (std::size_t r = 0; r < mechanism.constraints.size(); ++r)
     if (!is_moment(mechanism, mechanism.constraints[r]))
-      of_row_[static_cast<Index>(r)] = length_;
+      of_row_[r] = length_;
   of_q_ = VectorXd::Ones(mechanism.n_q), of_v_ = VectorXd::Ones(mechanism.n_v);
   for (const Node<Space> &node : mechanism.nodes) {
     const JointShape &shape = node.shape;

@@ -34,11 +34,11 @@ NewtonSystem<Space>::NewtonSystem(const Mechanism<Space> &mechanism, const Scene
 
 // Of elastic and damping forces of modes, of springs in joints and gears
 template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
-  auto coupled = static_cast<Index>(scene_.cut_joints.size());
-  const Index all = coupled + static_cast<Index>(scene_.gears.size());
+  auto coupled = scene_.cut_joints.size();
+  const Index all = coupled + scene_.gears.size();
   stiffness_ = damping_ = VectorXd::Zero(rest_.size() + all);
   coupling_.setZero(rest_.size(), all);
-  std::vector<char> is_stiff(static_cast<std::size_t>(rest_.size() + all));
+  std::vector<char> is_stiff(rest_.size() + all);
   std::fill(is_stiff.end() - all, is_stiff.end(), 1);
   for (const GearSpring &gear : scene_.gears) {
     damping_[rest_.size() + coupled] = gear.damping;
@@ -48,12 +48,12 @@ template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
     for (int i = 0; i < node.n(); ++i) {
       stiffness_[node.p_v() + i] = node.body.K[i];
       damping_[node.p_v() + i] = node.body.D_full.size() ? node.body.D_full(i, i) : node.body.D[i];
-      is_stiff[static_cast<std::size_t>(node.p_v() + i)] = 1;
+      is_stiff[node.p_v() + i] = 1;
     }
   for (const JointForce &joint : scene_.joint_forces)
-    stiffness_[joint.v] += joint.stiffness, is_stiff[static_cast<std::size_t>(joint.v)] = 1;
+    stiffness_[joint.v] += joint.stiffness, is_stiff[joint.v] = 1;
   for (std::size_t i = 0; i < is_stiff.size(); ++i)
-    (is_stiff[i] ? stiff_ : free_).push_back(static_cast<Index>(i));
+    (is_stiff[i] ? stiff_ : free_).push_back(i);
 }
 
 // Of gears, and of friction in joints, at rates as the diagonals. Near rest dry friction is a stiff damper: a light
@@ -71,7 +71,7 @@ template <class Space> void NewtonSystem<Space>::take_slopes(const VectorXd &rat
 }
 
 template <class Space> void NewtonSystem<Space>::find_coupling() {
-  VectorXd unit = rest_, rates(static_cast<Index>(scene_.cut_joints.size()));
+  VectorXd unit = rest_, rates(scene_.cut_joints.size());
   for (Index i = 0; i < unit.size(); ++i) {
     unit[i] = 1;
     cut_rates(place_all(mechanism_, q_.data(), unit.data(), nullptr, w_), scene_.cut_joints, rates.data());
@@ -81,9 +81,9 @@ template <class Space> void NewtonSystem<Space>::find_coupling() {
 }
 
 template <class Space> template <class Matrix> Matrix NewtonSystem<Space>::along_stiff(const Matrix &x) const {
-  Matrix found(static_cast<Index>(stiff_.size()), x.cols());
+  Matrix found(stiff_.size(), x.cols());
   for (Index s = 0; s < found.rows(); ++s)
-    if (const Index i = stiff_[static_cast<std::size_t>(s)]; i < rest_.size())
+    if (const Index i = stiff_[s]; i < rest_.size())
       found.row(s) = x.row(i);
     else
       found.row(s) = coupling_.col(i - rest_.size()).transpose() * x;
@@ -91,7 +91,7 @@ template <class Space> template <class Matrix> Matrix NewtonSystem<Space>::along
 }
 
 template <class Space> void NewtonSystem<Space>::find_responses() {
-  const auto equations = static_cast<Index>(mechanism_.constraints.size());
+  const Index equations = mechanism_.constraints.size();
   const VectorXd none = VectorXd::Zero(equations);
   const auto evaluate = [&](const VectorXd &force) {
     VectorXd a(rest_.size());
@@ -100,10 +100,10 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
     return a;
   };
   const VectorXd start = evaluate(rest_);
-  MatrixXd P(rest_.size(), static_cast<Index>(stiff_.size()));
+  MatrixXd P(rest_.size(), stiff_.size());
   for (Index s = 0; s < P.cols(); ++s) {
     VectorXd force = rest_;
-    if (const Index i = stiff_[static_cast<std::size_t>(s)]; i < rest_.size())
+    if (const Index i = stiff_[s]; i < rest_.size())
       force[i] = large_force;
     else
       force = large_force * coupling_.col(i - rest_.size());
@@ -154,7 +154,7 @@ void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r,
   f -= factors.S.cwiseProduct(y);
   x(free_) += product(P_, f);
   for (std::size_t s = 0; s < stiff_.size() && stiff_[s] < x.size(); ++s)
-    x[stiff_[s]] = y[static_cast<Index>(s)] / factors.S[static_cast<Index>(s)];
+    x[stiff_[s]] = y[s] / factors.S[s];
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const double *r, const double *c, double *x) {

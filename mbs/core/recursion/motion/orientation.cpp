@@ -64,7 +64,7 @@ Turning by_direction(const Components &d) {
 Turning OrientationLaw::operator()(double t) const {
   Components of;
   for (int i = 0; i < 3; ++i) {
-    const Jet jet = functions[static_cast<std::size_t>(i)](t);
+    const Jet jet = functions[i](t);
     of.x[i] = jet.value, of.rate[i] = jet.rate, of.acceleration[i] = jet.acceleration;
   }
   if (kind == OrientationKind::direction)

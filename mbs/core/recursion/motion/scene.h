@@ -130,7 +130,7 @@ struct Scene {
 // Puts the markers of the ground that turn where they are at time t.
 template <class Workspace> void turn_markers(const Scene &scene, double t, Workspace &w) {
   for (const DrivenMarker &driven : scene.driven)
-    w.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
+    w.turning[driven.marker] = driven.law(t);
 }
 
 std::vector<Jet> targets_at(const Scene &scene, double t); // of all constraint equations

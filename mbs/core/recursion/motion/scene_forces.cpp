@@ -20,9 +20,8 @@ SceneForces<Space>::SceneForces(const Mechanism<Space> &mechanism, const Scene &
       length_(NaturalSizes<Space>(mechanism).length()),
       has_generalized_(held || external || !scene.loads.empty() || !scene.joint_forces.empty() || !scene.gears.empty()),
       has_wrenches_(external || !scene.point_loads.empty() || !scene.point_forces.empty() || !scene.cut_joints.empty()),
-      generalized_(VectorXd::Zero(mechanism.n_v)),
-      wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
-      along_cuts_(VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()))) {}
+      generalized_(VectorXd::Zero(mechanism.n_v)), wrench_(VectorXd::Zero(Space::dim * mechanism.wrenches.size())),
+      along_cuts_(VectorXd::Zero(scene.cut_joints.size())) {}
 
 template <class Space>
 typename SceneForces<Space>::Acting SceneForces<Space>::at(double t, const double *q, const double *v,
@@ -69,7 +68,7 @@ template <class Space> void SceneForces<Space>::add_at_sections(double t, const 
   const std::vector<CutJoint> &cuts = scene_.cut_joints;
   cut_rates(at, cuts, along_cuts_.data());
   for (std::size_t k = 0; k < cuts.size(); ++k) {
-    double &along = along_cuts_[static_cast<Index>(k)];
+    double &along = along_cuts_[k];
     along = -cuts[k].friction.resistance(along);
   }
   for (const CutLoad &load : scene_.cut_loads)

@@ -26,21 +26,10 @@ constexpr int native_lanes = 2;
 
 // V: in a register; U: in memory, among other numbers. (A copy by memcpy could be of anything: after each one compilers
 // read all pointers again.)
-template <int n> struct Vectors;
-template <> struct Vectors<2> {
-  using V = double __attribute__((vector_size(16)));
-  using U = double __attribute__((vector_size(16), aligned(8)));
-  using I = std::int64_t __attribute__((vector_size(16)));
-};
-template <> struct Vectors<4> {
-  using V = double __attribute__((vector_size(32)));
-  using U = double __attribute__((vector_size(32), aligned(8)));
-  using I = std::int64_t __attribute__((vector_size(32)));
-};
-template <> struct Vectors<8> {
-  using V = double __attribute__((vector_size(64)));
-  using U = double __attribute__((vector_size(64), aligned(8)));
-  using I = std::int64_t __attribute__((vector_size(64)));
+template <int n> struct Vectors {
+  typedef double V __attribute__((vector_size(8 * n)));
+  typedef double U __attribute__((vector_size(8 * n), aligned(8)));
+  typedef std::int64_t I __attribute__((vector_size(8 * n)));
 };
 
 template <int n> struct Register;

@@ -73,7 +73,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
   }
   std::vector<int> first_rows;
   for (std::size_t k = 0; k < used.size(); ++k) {
-    const PlanarMarker &marker = data.markers[static_cast<std::size_t>(used[k])];
+    const PlanarMarker &marker = data.markers[used[k]];
     Port port;
     port.x = marker.position.x(), port.y = marker.position.y(), port.angle = marker.angle;
     const int i = static_cast<int>(k);
@@ -95,16 +95,16 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
   }
   is_tilted = n && tilted >= 0;
   if (is_tilted)
-    W.row(TILT) = data.markers[static_cast<std::size_t>(tilted)].Phi.row(2);
-  columns.assign(static_cast<std::size_t>(std::max(n, 1) * width()), 0.0);
-  rows.assign(static_cast<std::size_t>(padded * width()), 0.0);
+    W.row(TILT) = data.markers[tilted].Phi.row(2);
+  columns.assign(std::max(n, 1) * width(), 0.0);
+  rows.assign(padded * width(), 0.0);
   for (int r = 0; r < width(); ++r)
     for (int i = 0; i < n; ++i)
-      columns[static_cast<std::size_t>(i * width() + r)] = rows[static_cast<std::size_t>(r * padded + i)] = W(r, i);
+      columns[i * width() + r] = rows[r * padded + i] = W(r, i);
   for (int i = 0; blocks == 1 && i < padded; i += native_lanes)
     for (int r = 0; r < width(); ++r)
       for (int k = i; k < i + native_lanes; ++k)
-        tiles.push_back(rows[static_cast<std::size_t>(r * padded + k)]);
+        tiles.push_back(rows[r * padded + k]);
   fill_products(W);
 }
 

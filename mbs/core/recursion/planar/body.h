@@ -101,11 +101,11 @@ template <class T> struct State {
   Aligned<T> products;    // as of the body: constant without geometric stiffening
   Bent<T> bent;           // empty without
 
-  const T &gram(const Body &b, int r, int c) const { return products[static_cast<std::size_t>(r * b.width() + c)]; }
+  const T &gram(const Body &b, int r, int c) const { return products[r * b.width() + c]; }
   const T *X(const Body &b, int port) const { return products.data() + b.width() * b.width() + 9 * port; }
   // The same of a body that has one block, as those between pins have
-  const T &gram_of_block(int r, int c) const { return products[static_cast<std::size_t>(8 * r + c)]; }
-  const T &X_of_block(int r, int c) const { return products[static_cast<std::size_t>(64 + 3 * r + c)]; }
+  const T &gram_of_block(int r, int c) const { return products[8 * r + c]; }
+  const T &X_of_block(int r, int c) const { return products[64 + 3 * r + c]; }
 };
 
 // --- W p, W p_dot, W (K p + D p_dot - force), p.p, p.p_dot; force (n) may be null

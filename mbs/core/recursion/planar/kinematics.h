@@ -139,9 +139,7 @@ FFROBOT_NOINLINE void modes(const Node<Planar> &node, const T *p, T *z, planar::
   modal_accelerations<by_multipliers>(node.body, p, z, s, a);
 }
 
-template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Planar> &m, int marker, T *A) {
-  const double angle = m.ground[marker].angle; // ports have axes of the body: here global ones
-  (void)angle;
+template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Planar> &m, int, T *A) {
   A[0] = T(-m.gravity[0]), A[1] = T(-m.gravity[1]), A[2] = T(0.);
 }
 

@@ -18,7 +18,7 @@ struct KnownBody {
 };
 
 inline std::array<double, 2> place(const Port &port, const State<double> &s) {
-  const auto row = static_cast<std::size_t>(port.row);
+  const std::size_t row = port.row;
   return {port.x + s.u[row], port.y + s.u[row + 1]};
 }
 
@@ -35,14 +35,14 @@ inline Vector relative_acceleration(const Port &port, const State<double> &s, do
 // Of port i by that of the frame, and back, in axes of the body and of the undeformed port
 inline Vector port_acceleration(const Body &b, int i, const State<double> &s, const Vector &A,
                                 const Eigen::VectorXd &u_ddot) {
-  Vector found = relative_acceleration(b.ports[static_cast<std::size_t>(i)], s, A[2], u_ddot);
+  Vector found = relative_acceleration(b.ports[i], s, A[2], u_ddot);
   for (std::size_t k = 0; k < 3; ++k)
     found[k] += A[k];
   return found;
 }
 inline Vector frame_acceleration(const Body &b, int i, const State<double> &s, const Vector &at_port,
                                  const Eigen::VectorXd &u_ddot) {
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
+  const Port &port = b.ports[i];
   const double alpha = at_port[2] - u_ddot[port.row + 2];
   const Vector relative = relative_acceleration(port, s, alpha, u_ddot);
   return {at_port[0] - relative[0], at_port[1] - relative[1], alpha};
@@ -60,7 +60,7 @@ inline Vector inertia_force(const Body &b, const KnownBody &, const State<double
   const double sx = b.sx + s.u[Body::Sx], sy = b.sy + s.u[Body::Sy];
   double h_p_ddot = u_ddot[Body::H];
   for (int k = 0; b.has_more && k < b.n; ++k)
-    h_p_ddot += s.h[static_cast<std::size_t>(k)] * p_ddot[k];
+    h_p_ddot += s.h[k] * p_ddot[k];
   return {b.mass * A[0] - A[2] * sy - ww * sx - w2 * s.u_dot[Body::Sy] + u_ddot[Body::Sx],
           b.mass * A[1] + A[2] * sx - ww * sy + w2 * s.u_dot[Body::Sx] + u_ddot[Body::Sy],
           sx * A[1] - sy * A[0] + (b.J + s.p_p) * A[2] + w2 * s.p_v + h_p_ddot};
@@ -68,11 +68,11 @@ inline Vector inertia_force(const Body &b, const KnownBody &, const State<double
 
 // A force on port i with its moment about the port, in the port's axes, as one at the frame, and back
 inline void to_frame(const Body &b, int i, const State<double> &s, Vector &f) {
-  const auto from = place(b.ports[static_cast<std::size_t>(i)], s);
+  const auto from = place(b.ports[i], s);
   PlanarTurn<double>::add_moment(from.data(), f.data());
 }
 inline void to_port(const Body &b, int i, const State<double> &s, Vector &f) {
-  const auto [x, y] = place(b.ports[static_cast<std::size_t>(i)], s);
+  const auto [x, y] = place(b.ports[i], s);
   const double back[2] = {-x, -y};
   PlanarTurn<double>::add_moment(back, f.data());
 }
@@ -80,7 +80,7 @@ inline void to_port(const Body &b, int i, const State<double> &s, Vector &f) {
 // act(row of W, force) of a force on port i; of a moment on a frame that modes turn
 template <class Act> void put_on_rows(const Body &b, int i, const State<double> &, const Vector &f, const Act &act) {
   for (Eigen::Index k = 0; k < 3; ++k)
-    act(b.ports[static_cast<std::size_t>(i)].row + k, f[static_cast<std::size_t>(k)]);
+    act(b.ports[i].row + k, f[k]);
 }
 template <class Act> void on_tilt(const Body &b, const Vector &f, const Act &act) {
   if (b.is_tilted)
@@ -92,7 +92,7 @@ inline void body_to_global(const State<double> &s, const double *x, double *y) {
 }
 
 inline double modal_terms(const Body &b, int i, const State<double> &s) { // sizes of W Q_f of port i
-  const double *modal = s.Q.data() + b.ports[static_cast<std::size_t>(i)].row;
+  const double *modal = s.Q.data() + b.ports[i].row;
   return std::abs(modal[0]) + std::abs(modal[1]) + std::abs(modal[2]);
 }
 

@@ -47,8 +47,7 @@ bool is_stiffened(const PlanarData &data) { return !data.K.empty(); }
 std::vector<MatrixXd> turned(const Matrix2d &R, const std::vector<MatrixXd> &y) {
   std::vector<MatrixXd> x = y;
   for (std::size_t k = 0; k < 2 && !y.empty(); ++k) {
-    const auto row = static_cast<Index>(k);
-    x[k] = R(row, 0) * y[0] + R(row, 1) * y[1];
+    x[k] = R(k, 0) * y[0] + R(k, 1) * y[1];
   }
   return x;
 }
@@ -56,7 +55,7 @@ std::vector<MatrixXd> turned(const Matrix2d &R, const std::vector<MatrixXd> &y) 
 bool is_curved(const PlanarData &data, const PlanarMarker &marker, int component) {
   const Matrix2d R = Eigen::Rotation2D<double>(-marker.angle).toRotationMatrix();
   const std::vector<MatrixXd> K = turned(R, marker.K);
-  return !K.empty() && K[static_cast<std::size_t>(component)].cwiseAbs().maxCoeff() > negligible_K(data);
+  return !K.empty() && K[component].cwiseAbs().maxCoeff() > negligible_K(data);
 }
 
 std::vector<MatrixXd> moved_K(const PlanarData &data, const Vector2d &position, const Matrix2d &R) {
@@ -87,7 +86,7 @@ Stiffening::Stiffening(const PlanarData &data, const std::vector<int> &used, con
   move(center, with_modes), move(center, with_G);
   MatrixXd F_all(fields, n);
   for (std::size_t f = 0; f < fields; ++f) {
-    F_all.row(static_cast<Index>(f)) = factor[f] * with_modes[f];
+    F_all.row(f) = factor[f] * with_modes[f];
     with_G[f] *= factor[f];
   }
   const double limit = negligible * largest_of({with_G.begin(), with_G.end()});
@@ -98,7 +97,7 @@ Stiffening::Stiffening(const PlanarData &data, const std::vector<int> &used, con
   m_ff_rest.assign(rest.data(), rest.data() + rest.size());
 
   for (std::size_t k = 0; k < used.size(); ++k) {
-    const PlanarMarker &marker = data.markers[static_cast<std::size_t>(used[k])];
+    const PlanarMarker &marker = data.markers[used[k]];
     for (std::size_t c = 0; c < marker.K.size(); ++c)
       if (const MatrixXd K_row = without_rounding(marker.K[c], negligible_K(data)); !K_row.isZero(0))
         at_ports.push_back({first_rows[k] + static_cast<int>(c), ModeMatrix(K_row)});

@@ -48,14 +48,14 @@ MatrixXd symmetric_I_bar(const SpatialData &data) {
 
 // f with A = diag(f) G, f 2 or -2 or, where both are zero, 0; padded, empty where there is none
 Aligned<double> row_factors(const MatrixXd &A, const MatrixXd &G) {
-  Aligned<double> f(static_cast<std::size_t>(padded(static_cast<int>(A.rows()))), 0.0);
+  Aligned<double> f(padded(static_cast<int>(A.rows())), 0.0);
   for (Index i = 0; i < A.rows(); ++i) {
     if (A.row(i).isZero(0) && G.row(i).isZero(0))
       continue;
     const double factor = A.row(i).dot(G.row(i)) > 0 ? 2 : -2;
     if ((A.row(i) - factor * G.row(i)).cwiseAbs().maxCoeff() > negligible)
       return {};
-    f[static_cast<std::size_t>(i)] = factor;
+    f[i] = factor;
   }
   return f;
 }
@@ -91,7 +91,7 @@ void move_stiffening(const SpatialData &data, const Vector3d &position, const Ma
     for (std::size_t l = 0; l < 3; ++l) {
       MatrixXd sum = MatrixXd::Zero(data.modes(), data.modes());
       for (std::size_t i = 0; i < 3; ++i)
-        sum += R(k, static_cast<Index>(i)) * (data.K_x[3 * i + l] - position[static_cast<Index>(i)] * data.K_s[l]);
+        sum += R(k, i) * (data.K_x[3 * i + l] - position[i] * data.K_s[l]);
       about_axes.push_back(sum);
     }
   to.K_x.clear();
@@ -128,9 +128,9 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
         MatrixXd sum = MatrixXd::Zero(n, n);
         for (int i = 0; i < 3; ++i)
           for (int j = 0; j < 3; ++j)
-            if (data.S_bar_kl[static_cast<std::size_t>(3 * i + j)].size())
-              sum += R(k, i) * R(l, j) * data.S_bar_kl[static_cast<std::size_t>(3 * i + j)];
-        to.S_bar_kl[static_cast<std::size_t>(3 * k + l)] = sum;
+            if (data.S_bar_kl[3 * i + j].size())
+              sum += R(k, i) * R(l, j) * data.S_bar_kl[3 * i + j];
+        to.S_bar_kl[3 * k + l] = sum;
       }
   }
   if (is_stiffened(data))
@@ -166,7 +166,7 @@ Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cas
 // Whether rows from this one on, of a port, have terms of second order
 bool Body::is_curved(int row) const {
   for (int r = row; stiffening && r < row + 6; ++r)
-    if (stiffening->at_ports[static_cast<std::size_t>(r - lanes)].kind != ModeMatrix::Kind::zero)
+    if (stiffening->at_ports[r - lanes].kind != ModeMatrix::Kind::zero)
       return true;
   return false;
 }
@@ -180,7 +180,7 @@ void Body::fill_rows(const SpatialData &data, const std::vector<int> &used, cons
       all.row(h + c) = I.row(before[c]) - I.row(after[c]);
   }
   for (const int marker_index : used) {
-    const SpatialMarker &marker = data.markers[static_cast<std::size_t>(marker_index)];
+    const SpatialMarker &marker = data.markers[marker_index];
     Port port;
     port.row = lanes * (1 + static_cast<int>(ports.size()));
     for (int k = 0; k < 3; ++k) {
@@ -195,11 +195,11 @@ void Body::fill_rows(const SpatialData &data, const std::vector<int> &used, cons
     }
     ports.push_back(port);
   }
-  W.assign(static_cast<std::size_t>(even(n) * width), 0.0);
-  rows.assign(static_cast<std::size_t>(width * padded(n)), 0.0);
+  W.assign(even(n) * width, 0.0);
+  rows.assign(width * padded(n), 0.0);
   for (int r = 0; r < width; ++r)
     for (int k = 0; k < n; ++k)
-      W[static_cast<std::size_t>(k * width + r)] = rows[static_cast<std::size_t>(r * padded(n) + k)] = all(r, k);
+      W[k * width + r] = rows[r * padded(n) + k] = all(r, k);
 }
 
 // What elimination leaves, differences taken in extended precision
@@ -207,13 +207,13 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
   ExtendedMatrix extended(width, n);
   for (int r = 0; r < width; ++r)
     for (int k = 0; k < n; ++k)
-      extended(r, k) = W[static_cast<std::size_t>(k * width + r)];
+      extended(r, k) = W[k * width + r];
   const ExtendedMatrix gram_ =
       n ? ExtendedMatrix(extended.lazyProduct(extended.transpose())) : ExtendedMatrix::Zero(width, width);
-  G.resize(static_cast<std::size_t>(width * width));
+  G.resize(width * width);
   for (int r = 0; r < width; ++r)
     for (int c = 0; c < width; ++c)
-      G[static_cast<std::size_t>(r * width + c)] = static_cast<double>(gram_(r, c));
+      G[r * width + c] = static_cast<double>(gram_(r, c));
   const auto tilde = [](const Vector3d &x) {
     return (Matrix3d() << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0).finished();
   };
@@ -228,7 +228,7 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
     for (int j = 0; j <= i; ++j)
       J0[symmetric_index(i, j)] = inertia(i, j);
   for (std::size_t i = 0; i < ports.size(); ++i) {
-    const SpatialMarker &marker = data.markers[static_cast<std::size_t>(used[i])];
+    const SpatialMarker &marker = data.markers[used[i]];
     const Matrix3d R = marker.triad.transpose();
     Eigen::Matrix<double, 6, 6> X;
     X << R, -R * tilde(marker.position), Matrix3d::Zero(), R;
@@ -243,14 +243,14 @@ int Body::add_to_W(const Eigen::VectorXd &g) {
   const auto count = std::count_if(stretches.begin(), stretches.end(), [](const Stretch &s) { return s.g_row >= 0; });
   const int row = lanes * static_cast<int>(count / 2) + 6 + static_cast<int>(count % 2);
   for (int k = 0; k < n; ++k)
-    W[static_cast<std::size_t>(k * width + row)] = g[k];
+    W[k * width + row] = g[k];
   return row;
 }
 
 // T_s, g_s, G_s and z_c, A_c, from data along the axes z, which are the columns of `axes`
 void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const MatrixXd &g) {
   const auto without_spin = [&](int slot) { // transposed: column i multiplies p_i
-    const auto &given = data.S_bar_kl[static_cast<std::size_t>(slot)];
+    const auto &given = data.S_bar_kl[slot];
     MatrixXd block = given.size() ? MatrixXd(given.transpose()) : MatrixXd::Zero(n, n);
     if (data.S_spin.size())
       block -= data.spin_booked[slot / 3] * data.spin_booked[slot % 3] * data.S_spin;
@@ -269,7 +269,7 @@ void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const Mat
       of.G = ModeMatrix(G[a][b]);
       if (!has_g && of.G.kind == ModeMatrix::Kind::zero)
         continue;
-      of.g.assign(static_cast<std::size_t>(padded(n)), 0.0);
+      of.g.assign(padded(n), 0.0);
       if (has_g) {
         of.g_row = add_to_W(g_ab);
         std::copy_n(g_ab.data(), n, of.g.data());
@@ -296,7 +296,7 @@ void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const Mat
     const int a = std::min((c + 1) % 3, (c + 2) % 3), b = std::max((c + 1) % 3, (c + 2) % 3), like = stretch_of[a][b];
     if (like >= 0 && of.A.kind == ModeMatrix::Kind::full)
       if (of.by_stretch = row_factors(A, G[a][b]); !of.by_stretch.empty())
-        stretches[static_cast<std::size_t>(like)].twist = static_cast<int>(twists.size());
+        stretches[like].twist = static_cast<int>(twists.size());
     for (int i = 0; i < 3; ++i)
       of.axis[3 + i] = axes(i, c);
     twists.push_back(std::move(of));

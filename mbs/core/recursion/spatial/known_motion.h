@@ -34,8 +34,8 @@ struct KnownBody {
 
 // What a port's acceleration has beside R^T (a + alpha x r; alpha): in axes of the undeformed port
 inline Vector relative_acceleration(const Body &b, int i, const State<double> &s, const Eigen::VectorXd &u_ddot) {
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
-  const PortMotion<double> &motion = s.ports[static_cast<std::size_t>(i)];
+  const Port &port = b.ports[i];
+  const PortMotion<double> &motion = s.ports[i];
   const double *w = s.omega;
   double wr[3], swept[3], du[3], wdu[3], wp[3], turned[3];
   Vector found{};
@@ -63,8 +63,8 @@ inline Vector port_acceleration(const Body &b, int i, const State<double> &s, co
                                 const Eigen::VectorXd &u_ddot) {
   Vector found = relative_acceleration(b, i, s, u_ddot), moved = A;
   double along[3], about[3];
-  SpatialTurn<double>::shift(s.ports[static_cast<std::size_t>(i)].r, moved.data());
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
+  SpatialTurn<double>::shift(s.ports[i].r, moved.data());
+  const Port &port = b.ports[i];
   turn_back(port.R, moved.data(), along), turn_back(port.R, moved.data() + 3, about);
   for (std::size_t k = 0; k < 3; ++k)
     found[k] += along[k], found[3 + k] += about[k];
@@ -73,13 +73,13 @@ inline Vector port_acceleration(const Body &b, int i, const State<double> &s, co
 inline Vector frame_acceleration(const Body &b, int i, const State<double> &s, const Vector &at_port,
                                  const Eigen::VectorXd &u_ddot) {
   const Vector relative = relative_acceleration(b, i, s, u_ddot);
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
+  const Port &port = b.ports[i];
   double rest[6];
   for (std::size_t k = 0; k < 6; ++k)
     rest[k] = at_port[k] - relative[k];
   Vector found;
   turn(port.R, rest, found.data()), turn(port.R, rest + 3, found.data() + 3);
-  const double *r = s.ports[static_cast<std::size_t>(i)].r, back[3] = {-r[0], -r[1], -r[2]};
+  const double *r = s.ports[i].r, back[3] = {-r[0], -r[1], -r[2]};
   SpatialTurn<double>::shift(back, found.data());
   return found;
 }
@@ -105,14 +105,14 @@ inline Vector inertia_force(const Body &b, const KnownBody &known, const State<d
 
 // A force on port i with its moment about the port, in the port's axes, as one at the frame, and back
 inline void to_frame(const Body &b, int i, const State<double> &s, Vector &f) {
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
+  const Port &port = b.ports[i];
   const Vector at_port = f;
   turn(port.R, at_port.data(), f.data()), turn(port.R, at_port.data() + 3, f.data() + 3);
-  SpatialTurn<double>::add_moment(s.ports[static_cast<std::size_t>(i)].r, f.data());
+  SpatialTurn<double>::add_moment(s.ports[i].r, f.data());
 }
 inline void to_port(const Body &b, int i, const State<double> &s, Vector &f) {
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
-  const double *r = s.ports[static_cast<std::size_t>(i)].r, back[3] = {-r[0], -r[1], -r[2]};
+  const Port &port = b.ports[i];
+  const double *r = s.ports[i].r, back[3] = {-r[0], -r[1], -r[2]};
   SpatialTurn<double>::add_moment(back, f.data());
   const Vector at_frame = f;
   turn_back(port.R, at_frame.data(), f.data()), turn_back(port.R, at_frame.data() + 3, f.data() + 3);
@@ -120,11 +120,11 @@ inline void to_port(const Body &b, int i, const State<double> &s, Vector &f) {
 
 // act(row of W, force) of a force on port i: Phi^T (f, J_l^T moment)
 template <class Act> void put_on_rows(const Body &b, int i, const State<double> &s, const Vector &f, const Act &act) {
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
+  const Port &port = b.ports[i];
   if (!port.is_flexible)
     return;
   double moment[3];
-  turn_back(s.ports[static_cast<std::size_t>(i)].excess, f.data() + 3, moment);
+  turn_back(s.ports[i].excess, f.data() + 3, moment);
   for (std::size_t k = 0; k < 3; ++k) {
     act(port.row + static_cast<int>(k), f[k]);
     act(port.row + 3 + static_cast<int>(k), f[3 + k] + moment[k]);
@@ -137,12 +137,12 @@ inline void body_to_global(const State<double> &s, const double *x, double *y) {
 }
 
 inline double modal_terms(const Body &b, int i, const State<double> &s) { // sizes of W Q_f of port i
-  const Port &port = b.ports[static_cast<std::size_t>(i)];
+  const Port &port = b.ports[i];
   if (!port.is_flexible)
     return 0;
   double sum = 0;
   for (int k = 0; k < 6; ++k)
-    sum += std::abs(s.Q[static_cast<std::size_t>(port.row + k)]);
+    sum += std::abs(s.Q[port.row + k]);
   return sum;
 }
 

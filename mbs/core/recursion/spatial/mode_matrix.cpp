@@ -10,17 +10,17 @@ ModeMatrix::ModeMatrix(const Eigen::MatrixXd &M) : n(static_cast<int>(M.rows()))
     return;
   if (M.isDiagonal(0)) {
     kind = Kind::diagonal;
-    values.assign(static_cast<std::size_t>(padded(n)), 0.0);
+    values.assign(padded(n), 0.0);
     for (int i = 0; i < n; ++i)
-      values[static_cast<std::size_t>(i)] = M(i, i);
+      values[i] = M(i, i);
     return;
   }
   kind = 5 * (filled + n) < 3 * n * padded(n) / modes_at_once ? Kind::sparse : Kind::full;
   if (kind == Kind::full) {
-    values.assign(static_cast<std::size_t>(even(n) * padded(n)), 0.0);
+    values.assign(even(n) * padded(n), 0.0);
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i)
-        values[static_cast<std::size_t>(j * padded(n) + i)] = M(i, j);
+        values[j * padded(n) + i] = M(i, j);
     return;
   }
   for (int i = 0; i < n; ++i) {

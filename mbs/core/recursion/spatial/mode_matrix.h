@@ -92,7 +92,7 @@ struct ModeMatrix {
 // Stiffness and damping of the modes of a body, which has K, D, is_damped and, for what is no diagonal, D_full
 template <class Data, class Body> void take_damping(const Data &data, Body &body) {
   const Eigen::MatrixXd &D = data.damping;
-  body.K.assign(static_cast<std::size_t>(padded(body.n)), 0.0), body.D = body.K;
+  body.K.assign(padded(body.n), 0.0), body.D = body.K;
   std::copy_n(data.stiffness.data(), body.n, body.K.begin());
   if (body.n == 0 || D.size() == 0 || D.isZero(0))
     return;
@@ -101,7 +101,7 @@ template <class Data, class Body> void take_damping(const Data &data, Body &body
     body.D_full = D;
   else
     for (int k = 0; k < body.n; ++k)
-      body.D[static_cast<std::size_t>(k)] = D.cols() == 1 ? D(k, 0) : D(k, k);
+      body.D[k] = D.cols() == 1 ? D(k, 0) : D(k, k);
 }
 
 // `blocks` registers of rows of y_c = M x_c, M full by columns `stride` apart, `even(n)` of them, for `count` vectors

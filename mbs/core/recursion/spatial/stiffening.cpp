@@ -41,10 +41,10 @@ template <class X> std::vector<X> by_fields(const Orthonormal &fields, const std
   std::vector<X> found;
   for (std::size_t f = 0; f < fields.pivot.size(); ++f) {
     const int k = fields.pivot[f];
-    X left = products[static_cast<std::size_t>(k)];
+    X left = products[k];
     for (std::size_t e = 0; e < f; ++e)
-      left -= fields.L(k, static_cast<Eigen::Index>(e)) * found[e];
-    found.push_back(left / fields.L(k, static_cast<Eigen::Index>(f)));
+      left -= fields.L(k, e) * found[e];
+    found.push_back(left / fields.L(k, f));
   }
   return found;
 }
@@ -81,13 +81,13 @@ void Stiffening::project(const SpatialData &data) {
   fields = static_cast<int>(orthonormal_fields.pivot.size());
   root_mass = std::sqrt(data.mass);
   std::vector<MatrixXd> all_K;
-  F.assign(static_cast<std::size_t>(3 * fields * stride), 0.0);
+  F.assign(3 * fields * stride, 0.0);
   for (int c = 0; c < 3; ++c) {
     std::array<Eigen::RowVectorXd, 4> with_modes;
     std::array<MatrixXd, 4> with_G;
-    with_modes[0] = data.S_bar.row(c), with_G[0] = data.K_s[static_cast<std::size_t>(c)];
+    with_modes[0] = data.S_bar.row(c), with_G[0] = data.K_s[c];
     for (int k = 0; k < 3; ++k) {
-      const auto slot = static_cast<std::size_t>(3 * k + c);
+      const std::size_t slot = 3 * k + c;
       with_modes[slot / 3 + 1] = data.I_bar.size() ? Eigen::RowVectorXd(data.I_bar.row(3 * k + c))
                                                    : Eigen::RowVectorXd(Eigen::RowVectorXd::Zero(n));
       with_G[slot / 3 + 1] = data.K_x[slot];
@@ -97,8 +97,8 @@ void Stiffening::project(const SpatialData &data) {
     for (int f = 0; f < fields; ++f) {
       g[c][f] = orthonormal_fields.L(1 + c, f);
       for (Eigen::Index j = 0; j < n; ++j)
-        F[static_cast<std::size_t>((c * fields + f) * stride + j)] = F_c[static_cast<std::size_t>(f)][j];
-      all_K.push_back(K_c[static_cast<std::size_t>(f)]);
+        F[(c * fields + f) * stride + j] = F_c[f][j];
+      all_K.push_back(K_c[f]);
     }
   }
   MatrixXd rest = MatrixXd::Identity(n, n);
@@ -109,17 +109,17 @@ void Stiffening::project(const SpatialData &data) {
     if (K.back().kind != ModeMatrix::Kind::zero)
       rest -= F_i * F_i.transpose();
   }
-  m_ff_rest.assign(static_cast<std::size_t>(n * stride), 0.0);
+  m_ff_rest.assign(n * stride, 0.0);
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j)
-      m_ff_rest[static_cast<std::size_t>(i * stride + j)] = rest(i, j);
+      m_ff_rest[i * stride + j] = rest(i, j);
 }
 
 void Stiffening::fill_ports(const SpatialData &data, const std::vector<int> &used) {
   const auto n = data.modes();
   const double limit = negligible_K(data);
   for (const int index : used) {
-    const std::vector<MatrixXd> K_section = section_K(data.markers[static_cast<std::size_t>(index)]);
+    const std::vector<MatrixXd> K_section = section_K(data.markers[index]);
     for (std::size_t r = 0; r < lanes; ++r)
       at_ports.emplace_back(r < K_section.size() ? without_rounding(K_section[r], limit)
                                                  : MatrixXd(MatrixXd::Zero(n, n)));
