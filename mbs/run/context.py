@@ -46,7 +46,7 @@ class PatchedLink(Protocol):
         """Return the map from modal forces to voltages, with limits of the patches or without."""
 
 
-class ActuationPoints(Protocol):
+class PointsOfBody(Protocol):
     """Points of one body for components of force."""
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
@@ -55,11 +55,6 @@ class ActuationPoints(Protocol):
 
 ForcesAtPoints = Callable[[Run], Mapping[str, Array]]
 """By "BODY.POINT" what a run's driving forces are there: (T, 3) N, global axes."""
-
-
-def no_points(run: Run) -> Mapping[str, Array]:
-    """Return None: a run without actuation points."""
-    return {}
 
 
 @struct
@@ -84,8 +79,8 @@ class Context:
     is_replayed: bool = False  # whether a later analysis takes its actuation
     earlier: Run | None = None  # an earlier run of the same analysis, to go on with; None from the start
     patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # of links by body
-    points: Mapping[str, ActuationPoints] = field(default_factory=dict)  # actuation points by body
-    at_points: ForcesAtPoints = no_points  # what driving forces are there
+    points: Mapping[str, PointsOfBody] = field(default_factory=dict)  # actuation points by body
+    at_points: ForcesAtPoints = lambda _: {}  # what driving forces are there
     start: State | None = None  # of a replay, in place of where the run that it replays starts
     whole: WholeLinks | None = None  # the links, where `model` has pieces of some
 

@@ -40,7 +40,7 @@ MOST_TOLD = 3  # changes
 CHANGED, IN_ALL = " from t = ", "; changed "  # in reasons
 
 
-class Candidate(NamedTuple):
+class Contender(NamedTuple):
     """Integrator considered for a run: cost of a step, and expected progress, s per cost."""
 
     name: str
@@ -57,7 +57,7 @@ class Choice(NamedTuple):
 
     name: str
     reason: str
-    candidates: tuple[Candidate, ...] = ()
+    candidates: tuple[Contender, ...] = ()
 
     @property
     def at_end(self) -> str:
@@ -114,20 +114,20 @@ def faster_of(
     rings = excited > analysis.tolerance
     felt = f"{frequency[rings].max():.3g} rad/s" if rings.any() else "none"
     reason = f"highest natural frequency {top:.3g} rad/s, highest excited frequency {felt}"
-    dop853 = Candidate("dop853", 1.0, analysis.end / explicit)
-    radau = Candidate("radau", cost, analysis.end / (cost * implicit))
+    dop853 = Contender("dop853", 1.0, analysis.end / explicit)
+    radau = Contender("radau", cost, analysis.end / (cost * implicit))
     first, second = (radau, dop853) if radau.pace > dop853.pace else (dop853, radau)
     return Choice(first.name, reason, (first, second))
 
 
 def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.IntegrationControls:
     """Return the core's integration settings of an analysis."""
-    candidates = choice.candidates or (Candidate(choice.name),)
+    candidates = choice.candidates or (Contender(choice.name),)
     methods = [(METHODS[one.name], one.cost, one.pace) for one in candidates]
+    tolerance, radius = analysis.tolerance, analysis.spectral_radius
     controls = _core.IntegrationControls(
-        tolerance=analysis.tolerance, max_steps=analysis.max_steps, methods=methods,
-        spectral_radius=analysis.spectral_radius,
-    )  # fmt: skip
+        tolerance=tolerance, max_steps=analysis.max_steps, methods=methods, spectral_radius=radius
+    )
     controls.keep_steps = analysis.keep_steps
     if analysis.repeat_steps is not None:
         controls.repeated_steps = as_list(analysis.repeat_steps.ends)

@@ -30,7 +30,7 @@ from ..model.system import MultibodySystem
 from ..posture.posture import row_sizes
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
-from .context import ActuationPoints, PatchedLink
+from .context import PatchedLink, PointsOfBody
 from .record import Run
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def _sides(model: Model, row: ConstraintRow) -> Iterator[tuple[str, float]]:
             yield ".".join(filter(None, (model.tree.nodes[section.body].body.name, section.point))), sign
 
 
-def point_numbers(run: Run, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:
+def point_numbers(run: Run, chosen: Mapping[str, PointsOfBody]) -> _core.ForceSource:
     """Driving forces at the actuation points, global axes: three numbers of each component."""
     tree, in_core = run.model.tree, frames_in_core(run.model, driven_system(run.model).core, run.q[0])
     bodies = [(tree.index[name], *in_core[tree.index[name]], *of_body.of_core()) for name, of_body in chosen.items()]

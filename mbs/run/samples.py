@@ -130,27 +130,30 @@ def stops(
     """
     ends, paths, loads = times[[0, -1]], list(paths), list(loads)
     targets = [target for path in paths for _, target in path.targets]
-    duration, found = ends[1] - ends[0], [np.zeros(0)]
-    for function in (*targets, *loads):
-        found += [ends, _brief_parts(function, ends)]
-    found += [_humps(function, ends) for function in (*_formulas(paths), *loads)]
+    duration = ends[1] - ends[0]
+    at = [ends, *(_brief_parts(function, ends) for function in (*targets, *loads))]
+    at += [_humps(function, ends) for function in (*_formulas(paths), *loads)]
     for path in paths:
         if path.path is not None and duration > 0.0:
             breaks = path.path.breaks
             way = np.abs(np.diff(path.path.sample(breaks), axis=0)).max(axis=1, initial=0.0)
             last = np.diff(breaks)
-            found.append(
-                _parts(breaks, (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0)))
-            )
-    for load in loads:  # just before it jumps, too: a mean over time is by the values on both sides
-        found.append(np.array(load.switches()) - SHORTEST * duration)
+            is_far = way * duration > FAR * last * way.max(initial=0.0)
+            at.append(_parts(breaks, (last < BRIEF * duration) & is_far))
+    # just before loads jump, too: a mean over time is by the values on both sides
+    at += [np.array(load.switches()) - SHORTEST * duration for load in loads]
     if is_driven and duration > 0.0:
-        grid = np.union1d(_even(ends), np.concatenate(found))
-        found += [np.setdiff1d(_resolved(function, grid, SEEN), grid) for function in (*targets, *loads)]
+        grid = np.union1d(_even(ends), np.concatenate(at))
+        at += [np.setdiff1d(_resolved(function, grid, SEEN), grid) for function in (*targets, *loads)]
     if is_replay and duration > 0.0:
-        found += [_bends(target, _even(ends)) for target in targets]
-    every = np.unique(np.concatenate(found))
-    return every[(every > times[0]) & (every < times[-1])]
+        at += [_bends(target, _even(ends)) for target in targets]
+    return _inside(np.concatenate(at), ends)
+
+
+def _inside(times: Array, ends: Array) -> Array:
+    """(n,) s: the times between the ends, ascending."""
+    every = np.unique(times)
+    return every[(every > ends[0]) & (every < ends[1])]
 
 
 def _even(ends: Array) -> Array:
@@ -192,12 +195,12 @@ def _bends(target: TimeFunction, grid: Array) -> Array:
     times = _resolved(target, grid, SEEN)
     f = np.nan_to_num(target.sample(times)[2])
     bend = np.concatenate([[0.0], np.abs(np.diff(np.diff(f) / np.diff(times))), [0.0]]).cumsum()
-    most, found, last = MOST_BEND * float(np.ptp(f)), [], 0
+    most, at, last = MOST_BEND * float(np.ptp(f)), [], 0
     for k in range(1, len(times)):
         if (bend[k] - bend[last]) * (times[k] - times[last]) > most:
             last = max(last + 1, k - 1)
-            found.append(times[last])
-    return np.array(found)
+            at.append(times[last])
+    return np.array(at)
 
 
 def _parts(breaks: Array, chosen: Booleans) -> Array:
@@ -212,18 +215,17 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
     """
     paths, others, ends = list(paths), list(others), times[[0, -1]]
     functions = [*(target for path in paths for _, target in path.targets), *others]
-    found = _with_others(times, _even(ends))
+    times = _with_others(times, _even(ends))
     of_paths = (path.path.breaks for path in paths if path.path is not None)
     of_pieces = (_brief_parts(function, ends) for function in functions)
     of_humps = (_humps(function, ends) for function in (*_formulas(paths), *others))
-    breaks = np.unique(np.concatenate([np.zeros(0), *of_paths, *of_pieces, *of_humps]))
-    found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
-    moving = (found >= 0.0) & (found <= end)
-    inside = found[moving]
+    times = _with_others(times, _inside(np.concatenate([ends, *of_paths, *of_pieces, *of_humps]), ends))
+    moving = (times >= 0.0) & (times <= end)
+    inside = times[moving]
     if len(inside) > 1:  # a run may end before the path begins
         for function in functions:
             inside = _resolved(function, inside)
-    return np.union1d(found[~moving], inside)
+    return np.union1d(times[~moving], inside)
 
 
 def _with_others(times: Array, others: Array) -> Array:
