@@ -49,13 +49,9 @@ def open_checked(path: Path) -> h5py.File:
 
 def check_links(file: h5py.File, path: Path) -> None:
     """Raise `InputError` where a member of the file is not in the file itself."""
-
-    def leads_away(name: bytes, info: h5py.h5l.LinkInfo) -> bytes | None:
-        return None if info.type == h5py.h5l.TYPE_HARD else name
-
-    found = file.id.links.visit(leads_away, info=True)
-    if found is not None:
-        where = found.decode(errors="replace")
+    outside = file.id.links.visit(lambda name, info: None if info.type == h5py.h5l.TYPE_HARD else name, info=True)
+    if outside is not None:
+        where = outside.decode(errors="replace")
         raise InputError(f"{path}: expected members in the file itself, found a link at {where}")
 
 
@@ -98,13 +94,13 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
     return np.asarray(read(item), dtype=np.float64)
 
 
-def fields_in(found: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
+def fields_in(values: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
     """Return the fields of a `record` from a group or attributes. Raises `KeyError` for missing ones.
 
     Those with a default may be missing, as they are in files of earlier versions; what is no field is left out.
     """
     needed = {one.name: one.default is one.default_factory is MISSING for one in fields(record)}
-    return {name: found[name] for name, is_needed in needed.items() if is_needed or name in found}
+    return {name: values[name] for name, is_needed in needed.items() if is_needed or name in values}
 
 
 @contextmanager

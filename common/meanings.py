@@ -39,14 +39,14 @@ def _table(text: str) -> Mapping[str, Meaning]:
 
     "[RECORD BEGIN]" says what record the lines up to the next have, if any, and how their patterns begin.
     """
-    found, record, begin = {}, "", ""
+    table, record, begin = {}, "", ""
     for line in text.strip().splitlines():
         pattern, *about = (part.strip() for part in line.split("|"))
         if about:
-            found[begin + pattern] = Meaning(*about)._replace(record=record)
+            table[begin + pattern] = Meaning(*about)._replace(record=record)
         else:
             record, _, begin = pattern[1:-1].partition(" ")
-    return MappingProxyType(found)
+    return MappingProxyType(table)
 
 
 RESULTS = _table("""
@@ -345,7 +345,7 @@ def meaning(name: str, table: Mapping[str, Meaning] = RESULTS) -> Meaning | None
     """Return unit and meaning of a dataset by its name below its analysis, or in its file; None if unknown."""
     if name in table:
         return table[name]
-    return next((found for pattern, found in table.items() if matches(name, pattern)), None)
+    return next((one for pattern, one in table.items() if matches(name, pattern)), None)
 
 
 def matches(name: str, pattern: str) -> bool:

@@ -20,10 +20,10 @@ _SERIES = {m: np.array([(-1) ** k / factorial(2 * k + m) for k in reversed(range
 def skew(vectors: Array) -> Array:
     """The matrices (…, 3, 3) of the cross product with `vectors` (…, 3)."""
     vectors = np.asarray(vectors, dtype=float)
-    found = np.zeros((*vectors.shape, 3))
-    found[..., (2, 0, 1), (1, 2, 0)] = vectors
-    found[..., (1, 2, 0), (2, 0, 1)] = -vectors
-    return found
+    S = np.zeros((*vectors.shape, 3))
+    S[..., (2, 0, 1), (1, 2, 0)] = vectors
+    S[..., (1, 2, 0), (2, 0, 1)] = -vectors
+    return S
 
 
 def exponential(vectors: Array) -> Array:
@@ -116,12 +116,12 @@ def logarithm(C: Array) -> Array:
 def about(axis: int, angles: Array | float) -> Array:
     """Rotation matrices (…, 3, 3) about coordinate axis 0, 1 or 2 by `angles` (…), rad."""
     cosine, sine = np.cos(angles), np.sin(angles)
-    found = np.zeros((*np.shape(angles), 3, 3))
+    R = np.zeros((*np.shape(angles), 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
-    found[..., axis, axis] = 1.0
-    found[..., j, j] = found[..., k, k] = cosine
-    found[..., j, k], found[..., k, j] = -sine, sine
-    return found
+    R[..., axis, axis] = 1.0
+    R[..., j, j] = R[..., k, k] = cosine
+    R[..., j, k], R[..., k, j] = -sine, sine
+    return R
 
 
 def of_rpy(roll: float, pitch: float, yaw: float) -> Array:

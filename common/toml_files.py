@@ -71,8 +71,8 @@ def parse_toml(text: str, path: Path, kind: str) -> dict[str, Any]:
 
 def check_limits(data: dict[str, Any], path: Path) -> None:
     """Raise `InputError`, a line each, for values that no file may hold: see `tables.beyond_limits`."""
-    if found := list(beyond_limits(data)):
-        raise InputError("\n".join(f"{path}: {line}" for line in found[:10]))
+    if beyond := list(beyond_limits(data)):
+        raise InputError("\n".join(f"{path}: {line}" for line in beyond[:10]))
 
 
 def toml_text(data: Mapping[str, Any]) -> str:

@@ -174,8 +174,8 @@ def _merge(problems: Sequence[_Problem]) -> list[str]:
         if problem.expected not in alternatives:
             alternatives.append(problem.expected)
     return [
-        f"{key}: {' or '.join(texts).replace(' or expected ', ' or ')}{found}"
-        for (key, found), texts in expected.items()
+        f"{key}: {' or '.join(texts).replace(' or expected ', ' or ')}{value}"
+        for (key, value), texts in expected.items()
     ]
 
 
@@ -224,7 +224,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
         if demand := _demand(record, loc):
             return _Problem(key_path(loc[:-1], data, kind=""), demand, "")
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
-    found = item["input"]
+    value = item["input"]
     if kind == "union_tag_not_found":
         tag_key = context["discriminator"].replace("'", "")
         from difflib import get_close_matches
@@ -242,9 +242,9 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
     expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
     expected = expected.replace("'", '"')  # as TOML writes it
     hint = ""
-    if kind == "literal_error" and isinstance(found, str):
-        hint = did_you_mean(found, context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
-    return _Problem(key, f"expected {expected}", f", found {_show(found)}{hint}")
+    if kind == "literal_error" and isinstance(value, str):
+        hint = did_you_mean(value, context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
+    return _Problem(key, f"expected {expected}", f", found {_show(value)}{hint}")
 
 
 def _show(value: object) -> str:

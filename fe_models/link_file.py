@@ -266,5 +266,5 @@ def _both_or_neither(value: object) -> str:
     return "neither" if value is None else "both"
 
 
-def _reject(path: Path, key: str, expected: str, found: object) -> NoReturn:
-    raise InputError(f"{path}: {key}: expected {expected}, found {found}")
+def _reject(path: Path, key: str, expected: str, given: object) -> NoReturn:
+    raise InputError(f"{path}: {key}: expected {expected}, found {given}")

@@ -35,16 +35,13 @@ _SIDE = re.compile(r"S([1-6])")
 _COINCIDENT = 1e-5
 
 
-def read_abaqus(path: Path, where: str) -> RawMesh:
-    """The mesh of an Abaqus or CalculiX deck; `where` (file and key) begins the message of an error.
+def read_abaqus(path: Path) -> RawMesh:
+    """The mesh of an Abaqus or CalculiX deck.
 
     Sets of elements name regions and, where they are shells, faces; so do surfaces and sets of nodes. Sets of a part
     mean all its instances. Raises `InputError`, with keyword and line, for what is wrong or cannot be read.
     """
-    try:
-        return _Assembled(Deck(path)).mesh()
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+    return _Assembled(Deck(path)).mesh()
 
 
 class _Assembled:

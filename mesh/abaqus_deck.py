@@ -148,8 +148,8 @@ class Sets:
                 yield instance, entry, place
                 continue
             owner = self.of_instances.get(instance, self)
-            for found, number, _ in owner.meant(entry, place, (name, *within) if owner is self else ()):
-                yield instance or found, number, place
+            for of, number, _ in owner.meant(entry, place, (name, *within) if owner is self else ()):
+                yield instance or of, number, place
 
     def meant(self, entry: str, place: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
         """Yield the members that `entry` names: NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -56,20 +56,25 @@ class Scope:
     def copy(self) -> Scope:
         """One of the same content, which can be added to."""
         return replace(
-            self, nodes=dict(self.nodes), solids=dict(self.solids), surfaces=dict(self.surfaces),
-            others=dict(self.others), masses=dict(self.masses), nsets=self.nsets.copy(), elsets=self.elsets.copy(),
-            faces=dict(self.faces),
-        )  # fmt: skip
+            self, **{one.name: getattr(self, one.name).copy() for one in fields(self) if one.name != "frame"}
+        )
 
     def read(self, keyword: Keyword) -> bool:
         """Read the mesh data of a `keyword`; returns whether it has any."""
-        readers: dict[str, Callable[[Keyword], None]] = {
-            "NODE": self._nodes, "ELEMENT": self._elements, "SYSTEM": self._system, "NSET": self._nset,
-            "ELSET": self._elset, "SURFACE": self._surface,
-        }  # fmt: skip
-        if keyword.name not in readers:
+        if keyword.name == "NODE":
+            self._nodes(keyword)
+        elif keyword.name == "ELEMENT":
+            self._elements(keyword)
+        elif keyword.name == "SYSTEM":
+            self._system(keyword)
+        elif keyword.name == "NSET":
+            self._nset(keyword)
+        elif keyword.name == "ELSET":
+            self.elsets.read(keyword, keyword.option("ELSET"))
+        elif keyword.name == "SURFACE":
+            self.faces[keyword.option("NAME").upper()] = keyword
+        else:
             return False
-        readers[keyword.name](keyword)
         return True
 
     def _system(self, keyword: Keyword) -> None:
@@ -144,12 +149,6 @@ class Scope:
         for _, number, place in self.elsets.meant(keyword.option("ELSET"), str(keyword)):
             nodes = self.solids[number][1] if number in self.solids else self.surfaces.get(number, ())
             self.nsets.add(keyword.option("NSET"), (("", node, place) for node in nodes))
-
-    def _elset(self, keyword: Keyword) -> None:
-        self.elsets.read(keyword, keyword.option("ELSET"))
-
-    def _surface(self, keyword: Keyword) -> None:
-        self.faces[keyword.option("NAME").upper()] = keyword
 
 
 def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]:

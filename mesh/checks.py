@@ -45,11 +45,11 @@ def check_size(size: float, volume: float, where: str) -> float:
     return count
 
 
-def check_count(count: float, found: str, where: str, hint: str = "") -> None:
-    """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `found` explains the number."""
+def check_count(count: float, given: str, where: str, hint: str = "") -> None:
+    """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `given` explains the number."""
     if count > MOST_CELLS:
         raise InputError(
-            f"{where}: expected a mesh.size that fits the part, found {found}: about {count:.2g} cells,"
+            f"{where}: expected a mesh.size that fits the part, found {given}: about {count:.2g} cells,"
             f" {MOST_CELLS:.0e} at most.{hint}"
         )
 

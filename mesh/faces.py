@@ -35,7 +35,7 @@ _LISTED = 12
 
 
 @struct
-class Boundary:
+class PartBoundary:
     """The boundary of a part."""
 
     points: Array  # (p, 3) of the part
@@ -46,7 +46,7 @@ class Boundary:
     area: Array  # (b,) in m², of the straight facets
 
     @classmethod
-    def of(cls, part: PartMesh) -> Boundary:
+    def of(cls, part: PartMesh) -> PartBoundary:
         """The boundary of `part`, whose cells are right-handed."""
         facets, _ = boundary_facets(part)
         return cls(part.points, facets, *facet_geometry(part.points, facets))
@@ -74,7 +74,7 @@ class SmoothFace:
     axis: Array | None
 
     @classmethod
-    def of(cls, boundary: Boundary, facets: Choice) -> SmoothFace:
+    def of(cls, boundary: PartBoundary, facets: Choice) -> SmoothFace:
         """Make a face from its facets."""
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]
@@ -93,7 +93,7 @@ class SmoothFace:
         size = float(np.linalg.norm(self.normal))
         return size > 0.5 and bool(self.normal @ direction > _ALONG * size)
 
-    def distance(self, boundary: Boundary, position: Array) -> float:
+    def distance(self, boundary: PartBoundary, position: Array) -> float:
         """Return the approximate distance, m, from `position` (3,) to the nearest facet; of a bore, to its center."""
         if self.axis is not None:
             return float(np.linalg.norm(self.center - position))
@@ -116,7 +116,7 @@ def named_faces(source: Source, tables: PartTables) -> PartMesh:
     Raises `InputError`, with the faces that the part has, where a face is not there, or two overlap.
     """
     part, geometry, path = source.part, tables.geometry, tables.path
-    boundary = Boundary.of(part)
+    boundary = PartBoundary.of(part)
     chosen: dict[str, Choice] = {}
     by_name = {item.name: item for item in tables.places}
     for name, x, outward in (("root", 0.0, -1.0), ("tip", geometry.length, 1.0)):
@@ -133,7 +133,7 @@ def named_faces(source: Source, tables: PartTables) -> PartMesh:
     return _tagged(part, boundary, chosen, path)
 
 
-def _end_face(boundary: Boundary, name: str, x: float, outward: float, length: float, path: Path) -> Choice:
+def _end_face(boundary: PartBoundary, name: str, x: float, outward: float, length: float, path: Path) -> Choice:
     """The facets in the plane at `x` that face away from the link."""
     corners = boundary.points[boundary.facets, 0]
     flat = np.all(np.abs(corners - x) <= IN_PLANE * length, axis=1)
@@ -145,7 +145,7 @@ def _end_face(boundary: Boundary, name: str, x: float, outward: float, length: f
     _reject(f"{path}: {name}", expected, "none", boundary)
 
 
-def _group(source: Source, boundary: Boundary, group: str, where: str) -> Choice:
+def _group(source: Source, boundary: PartBoundary, group: str, where: str) -> Choice:
     """The boundary facets of a group of facets, or those whose corners are all in a group of points."""
     if group in source.facet_groups:
         wanted = facet_keys(source.facet_groups[group], len(boundary.points))
@@ -170,7 +170,7 @@ def _group(source: Source, boundary: Boundary, group: str, where: str) -> Choice
     )
 
 
-def _nearest(boundary: Boundary, table: PlaceRecord, path: Path) -> Choice:
+def _nearest(boundary: PartBoundary, table: PlaceRecord, path: Path) -> Choice:
     """The smooth face nearest to the table's position among those that face along its normal."""
     position, normal = np.array(table.position, dtype=np.float64), np.array(table.normal, dtype=np.float64)
     where = f"{path}: interface.position of {table.name}"
@@ -195,7 +195,7 @@ def _nearest(boundary: Boundary, table: PlaceRecord, path: Path) -> Choice:
     return facing[best].facets
 
 
-def _patch_beds(boundary: Boundary, geometry: SolidGeometry, outlines: Outlines, path: Path) -> dict[str, Choice]:
+def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, outlines: Outlines, path: Path) -> dict[str, Choice]:
     """The facets under each patch, whose area is that of the patch."""
     assert isinstance(geometry.section, RectangleSection)
     slack = IN_PLANE * geometry.length
@@ -219,7 +219,7 @@ def _patch_beds(boundary: Boundary, geometry: SolidGeometry, outlines: Outlines,
     return beds
 
 
-def _tagged(part: PartMesh, boundary: Boundary, chosen: dict[str, Choice], path: Path) -> PartMesh:
+def _tagged(part: PartMesh, boundary: PartBoundary, chosen: dict[str, Choice], path: Path) -> PartMesh:
     """One tag for each face; names that chose the same facets share one."""
     tag = np.zeros(len(boundary.facets), dtype=np.int32)
     faces: dict[str, int] = {}
@@ -237,7 +237,7 @@ def _tagged(part: PartMesh, boundary: Boundary, chosen: dict[str, Choice], path:
     return replace(part, facets=boundary.facets[on_faces], facet_tag=tag[on_faces], faces=faces)
 
 
-def _joined(boundary: Boundary) -> NDArray[np.int32]:
+def _joined(boundary: PartBoundary) -> NDArray[np.int32]:
     """(b,) number of the smooth face of each facet."""
     facets, sides = boundary.facets, boundary.facets.shape[1]
     pairs = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -252,11 +252,11 @@ def _joined(boundary: Boundary) -> NDArray[np.int32]:
     return number
 
 
-def _reject(where: str, expected: str, found: str, boundary: Boundary) -> NoReturn:
+def _reject(where: str, expected: str, given: str, boundary: PartBoundary) -> NoReturn:
     faces = boundary.smooth_faces
     listed = "".join(f"\n  {face}" for face in faces[:_LISTED])
     more = f"\n  and {len(faces) - _LISTED} smaller ones" if len(faces) > _LISTED else ""
-    raise InputError(f"{where}: expected {expected}, found {found}. The part's faces:{listed}{more}")
+    raise InputError(f"{where}: expected {expected}, found {given}. The part's faces:{listed}{more}")
 
 
 def _show(vector: Array) -> str:

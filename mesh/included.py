@@ -22,9 +22,10 @@ _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
 _NASTRAN = re.compile(r"""^[ \t]*INCLUDE[ \t]*["']([^"']+)["']""", re.MULTILINE | re.IGNORECASE)
 _XDMF = re.compile(r">\s*([^<>:]+?)\s*:")
 _REFERENCES = {
-    ".inp": _ABAQUS, ".bdf": _NASTRAN, ".nas": _NASTRAN, ".fem": _NASTRAN, ".dat": _NASTRAN, ".xdmf": _XDMF,
-    ".xmf": _XDMF,
-}  # fmt: skip
+    ".inp": _ABAQUS,
+    **dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), _NASTRAN),
+    **dict.fromkeys((".xdmf", ".xmf"), _XDMF),
+}
 # What lies beside files of TetGen and of FEniCS, whose readers take it without a word in the file.
 _BESIDE = {".ele": "{}.node", ".node": "{}.ele", ".xml": "{}_*.xml"}
 DEEPEST = 20

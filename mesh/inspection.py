@@ -1,6 +1,6 @@
 """What a part's file holds, before there is a link file: size, likely unit, plane faces, bores and shafts.
 
-The faces are those that interfaces of a link choose from (`faces.Boundary.smooth_faces`).
+The faces are those that interfaces of a link choose from (`faces.PartBoundary.smooth_faces`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..common.errors import InputError
 from ..common.structs import struct
 from .cells import volume_and_center
 from .checks import METRES, check_connected, check_neighbours, check_quality, oriented, straightened
-from .faces import Boundary, SmoothFace
+from .faces import PartBoundary, SmoothFace
 from .part import is_step, source_of_file
 from .records import SolidMeshRecord
 from .source import PointMass
@@ -81,7 +81,7 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
     if known is None:
         known = "mm" if np.ptp(part.points, axis=0).max() > LONGEST else "m"
     part = part.moved(as_floats(METRES[known] * part.points))
-    boundary = Boundary.of(part)
+    boundary = PartBoundary.of(part)
     faces, face_of = boundary.smooth_faces, np.zeros(len(boundary.facets), dtype=np.int64)
     for k, face in enumerate(faces):
         face_of[face.facets] = k
@@ -113,7 +113,7 @@ def _declared(file: Path) -> Unit | None:
     return units[millimeters]
 
 
-def _part_face(boundary: Boundary, face: SmoothFace) -> PartFace:
+def _part_face(boundary: PartBoundary, face: SmoothFace) -> PartFace:
     normals = boundary.normal[face.facets]
     if face.axis is not None:
         fit = _cylinder(boundary.points[np.unique(boundary.facets[face.facets])], face)

@@ -98,12 +98,12 @@ def _cells(of: h5py.Group, width: int) -> Integers:
 
 
 def _groups(families: Mapping[str, Any]) -> dict[int, list[str]]:
-    found = dict[int, list[str]]()
+    groups = dict[int, list[str]]()
     for family in families.values():
         names = family["GRO/NOM"][()] if "GRO" in family else ()
         texts = (np.asarray(name).astype(np.uint8).tobytes().decode("utf-8", errors="replace") for name in names)
-        found[int(family.attrs["NUM"])] = [text.partition("\0")[0].strip() for text in texts]
-    return found
+        groups[int(family.attrs["NUM"])] = [text.partition("\0")[0].strip() for text in texts]
+    return groups
 
 
 def _members(of: h5py.Group, groups: Mapping[int, list[str]], count: int) -> Iterator[tuple[str, Integers]]:

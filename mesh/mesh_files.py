@@ -50,11 +50,13 @@ def read_mesh(path: Path, where: str) -> RawMesh:
         if ending == ".inp":
             from .abaqus import read_abaqus
 
-            return read_abaqus(path, where)
+            return read_abaqus(path)
         if ending in (".bdf", ".nas", ".fem") or (ending == ".dat" and not _TECPLOT.search(path.read_bytes())):
             from .nastran import read_nastran
 
-            return read_nastran(path, where)
+            return read_nastran(path)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
     except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:  # of a deck like no other
         raise InputError(f"{where}: expected a deck that can be read, found one that cannot: {error!r}") from None
     if ending == ".msh":

@@ -178,13 +178,13 @@ class _Version2:
 
     def _binary_elements(self) -> Iterator[tuple[int, Integers, Integers]]:
         announced, _, data = self._section(self._content, b"Elements").partition(b"\n")
-        at = found = 0
-        while found < int(announced):
+        at = done = 0
+        while done < int(announced):
             kind, count, tags = (int(value) for value in np.frombuffer(data, dtype="<i4", count=3, offset=at))
             if kind not in GMSH_NODES or count < 1 or tags < 0:
                 raise InputError(f"expected elements of a known type, found {count} of type {kind}")
             width = 1 + tags + GMSH_NODES[kind]
             rows = np.frombuffer(data, dtype="<i4", count=count * width, offset=at + 12).reshape(count, width)
-            at, found = at + 12 + 4 * count * width, found + count
+            at, done = at + 12 + 4 * count * width, done + count
             values = rows.astype(np.int64)
             yield kind, values[:, 1 : 1 + tags], values[:, 1 + tags :]

@@ -159,11 +159,16 @@ def _row(line: Line) -> _Row:
     if name.startswith("=") or any(entry.startswith("=") for entry in entries):
         raise InputError(f"{line.place}: expected cards one by one, found replicated ones (=)")
     follows = not name or name[0] in "+*"
+    last = entries[width + 1]
     return _Row(
-        name.rstrip("*").strip().upper(), line.place, entries[1 : width + 1],
-        name.lstrip("+* ") if follows else "", entries[width + 1].lstrip("+* "), follows,
-        entries[width + 1].startswith("*"),
-    )  # fmt: skip
+        name=name.rstrip("*").strip().upper(),
+        place=line.place,
+        fields=entries[1 : width + 1],
+        begin=name.lstrip("+* ") if follows else "",
+        end=last.lstrip("+* "),
+        follows=follows,
+        is_half=last.startswith("*"),
+    )
 
 
 # Solid elements: corners, all nodes, names of both types.
@@ -193,16 +198,13 @@ _OF_THE_LINK = (
 )  # fmt: skip
 
 
-def read_nastran(path: Path, where: str) -> RawMesh:
-    """The mesh in Nastran's bulk data; `where` (file and key) begins the message of an error.
+def read_nastran(path: Path) -> RawMesh:
+    """The mesh in Nastran's bulk data.
 
     Properties name regions, and faces where they are those of shells. Raises `InputError`, with card and line, for what
     is wrong or cannot be read.
     """
-    try:
-        return _Deck(path).mesh()
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+    return _Deck(path).mesh()
 
 
 class _Deck:

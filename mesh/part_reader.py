@@ -88,12 +88,12 @@ def main() -> None:
     os.dup2(nowhere, 1)  # OpenCASCADE writes to it
     read, arguments, seconds, where = pickle.load(sys.stdin.buffer)
     allow(seconds)
-    found: Any
+    reply: Any
     try:
-        found = read(*arguments)
+        reply = read(*arguments)
     except FfrobotError as error:
-        found = error
+        reply = error
     except MemoryError:
-        found = InputError(f"{where}: expected a part that fits into memory, found one that does not")
-    answer.write(pickle.dumps(found))
+        reply = InputError(f"{where}: expected a part that fits into memory, found one that does not")
+    answer.write(pickle.dumps(reply))
     answer.flush()

@@ -64,16 +64,16 @@ def mesh_shape(tables: PartTables) -> Source:
 
 def _in(unit: float, lengths: Lengths) -> Lengths:
     """Lengths in m, in a number, tuple or record, as multiples of `unit`; to 12 digits, the same in m and mm."""
-    found: object = lengths
+    converted: object = lengths
     if isinstance(lengths, float):
-        found = float(f"{lengths / unit:.12g}")
+        converted = float(f"{lengths / unit:.12g}")
     elif isinstance(lengths, tuple):
-        found = tuple(_in(unit, item) for item in lengths)
+        converted = tuple(_in(unit, item) for item in lengths)
     elif isinstance(lengths, Record):
-        found = lengths.model_copy(update={name: _in(unit, value) for name, value in lengths})
+        converted = lengths.model_copy(update={name: _in(unit, value) for name, value in lengths})
     elif isinstance(lengths, Outlines):
-        found = replace(lengths, edges=_in(unit, lengths.edges), width=_in(unit, lengths.width))
-    return cast(Lengths, found)
+        converted = replace(lengths, edges=_in(unit, lengths.edges), width=_in(unit, lengths.width))
+    return cast(Lengths, converted)
 
 
 def _body(geometry: SolidGeometry) -> DimTags:
@@ -153,5 +153,5 @@ def _dim_tags(entities: DimTags) -> DimTags:
     return [entity for entity in entities if entity[0] == _VOLUME]
 
 
-def _reject(path: Path, key: str, expected: str, found: str) -> NoReturn:
-    raise InputError(f"{path}: geometry.hole.{key}: expected {expected}, found {found}")
+def _reject(path: Path, key: str, expected: str, given: str) -> NoReturn:
+    raise InputError(f"{path}: geometry.hole.{key}: expected {expected}, found {given}")

@@ -91,14 +91,14 @@ def section_forces(
 
     Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
     """
-    found, length = _of_inertia(link, x, rotary), link.geometry.length
+    by_load, length = _of_inertia(link, x, rotary), link.geometry.length
     for name, position in interfaces.items():
         beyond = np.where((x < position) | (position == length), 1.0, 0.0)
         for load, unit in zip(interface_load_names([name]), np.eye(6)[:, :, None], strict=True):
-            found[load] = of_load(unit, position - x) * beyond, of_load(unit, np.array([position]))
+            by_load[load] = of_load(unit, position - x) * beyond, of_load(unit, np.array([position]))
     if link.reference.holds_root:
-        return {load: forces for load, (forces, _) in found.items()}
-    return {load: forces + of_tip_support(link, x, at_root) for load, (forces, at_root) in found.items()}
+        return {load: forces for load, (forces, _) in by_load.items()}
+    return {load: forces + of_tip_support(link, x, at_root) for load, (forces, at_root) in by_load.items()}
 
 
 def of_load(load: Array, arm: Array) -> Array:

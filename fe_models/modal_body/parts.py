@@ -143,8 +143,8 @@ class MeasuredValues(Frozen):
 
     def in_words(self) -> str:
         """Return which modes are measured as text, counted from 1."""
-        found = {"frequencies": self.frequency, "damping ratios": self.damping_ratio}
-        numbers = {what: np.flatnonzero(flags) + 1 for what, flags in found.items()}
+        flagged = {"frequencies": self.frequency, "damping ratios": self.damping_ratio}
+        numbers = {what: np.flatnonzero(flags) + 1 for what, flags in flagged.items()}
         parts = [f"{what} of modes {', '.join(map(str, of))}" for what, of in numbers.items() if len(of)]
         return " and ".join(parts)
 

@@ -13,7 +13,7 @@ from ..common.errors import InputError, did_you_mean, quoted
 from ..common.structs import struct
 from ..exchange.motion.read_motion import read_record
 from ..mbs.analysis.pcid import Pcid
-from ..mbs.fields.waypoints import Record, column_of, difference_quotients, load_record
+from ..mbs.fields.waypoints import Recorded, column_of, difference_quotients, load_record
 from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.motion import joint_motion
 from ..mbs.scene.analysis import TimedAnalysis
@@ -120,7 +120,7 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     return without_rest(Recording(joints, run.time, values, run.time))
 
 
-def _columns(path: Path, record: Record, names: Sequence[str]) -> list[int]:
+def _columns(path: Path, record: Recorded, names: Sequence[str]) -> list[int]:
     """Which column each joint has."""
     try:
         found = [column_of(record.columns, name) for name in names]

@@ -79,7 +79,9 @@ def parse_expression(text: str) -> TimeFunction:
     try:
         tree = ast.parse(body, mode="eval").body
     except SyntaxError as error:
-        raise ExpressionError(text, offset + (error.offset or 1), *_explain(body, error)) from None
+        is_product = re.search(r"\d\s*(?!e[-+\d])[A-Za-z]|\)\s*[A-Za-z\d]", body)
+        hint = "every product needs its *: 2*t" if is_product else ""
+        raise ExpressionError(text, offset + (error.offset or 1), error.msg, hint) from None
     except ValueError as error:
         raise ExpressionError(text, 1, str(error)) from None
     except (MemoryError, RecursionError):
@@ -91,12 +93,6 @@ def parse_expression(text: str) -> TimeFunction:
         return TimeFunction.expression(translation.ops, translation.constants)
     except ValueError as error:
         raise ExpressionError(text, 1, str(error)) from None
-
-
-def _explain(body: str, error: SyntaxError) -> tuple[str, str]:
-    """The problem and a hint, for what Python's parser refuses."""
-    missing_product = re.search(r"\d\s*(?!e[-+\d])[A-Za-z]|\)\s*[A-Za-z\d]", body)
-    return error.msg, "every product needs its *: 2*t" if missing_product else ""
 
 
 class _Translation:

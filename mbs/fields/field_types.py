@@ -186,5 +186,5 @@ def body_of(side: str) -> str:
 
 def under(label: str, references: Iterable[Reference]) -> Iterator[Reference]:
     """The references of a record that messages call `label`, with their full keys."""
-    for found in references:
-        yield replace(found, key=f"{label}: {found.key}" if found.key else label)
+    for reference in references:
+        yield replace(reference, key=f"{label}: {reference.key}" if reference.key else label)

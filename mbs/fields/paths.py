@@ -118,7 +118,7 @@ HALF = 0.5  # of each time of averaging to the one before, where no limit says o
 
 
 @struct
-class Limits:
+class PathLimits:
     """Limits of speed, acceleration and jerk along a path segment, m/s or rad/s and so on; infinite if none."""
 
     speed: float = inf
@@ -139,7 +139,7 @@ def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
     return averaged_step(as_floats(duration * times / times.sum()))
 
 
-def law_within(distance: float, limits: Limits, profile: Profile, smoothness: int) -> Piecewise:
+def law_within(distance: float, limits: PathLimits, profile: Profile, smoothness: int) -> Piecewise:
     """The fastest law over `distance` (m or rad) that keeps the `limits`, of one component.
 
     Raises `ValueError` where parts of it are too short beside others.
@@ -166,7 +166,7 @@ def check_durations(durations: Sequence[float], total: float) -> None:
         )
 
 
-def averaging_times(distance: float, limits: Limits) -> tuple[float, float, float]:
+def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, float]:
     """T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` within the limits; T₃ = 0 without one of jerk."""
     h, (v, a, j) = distance, limits.by_order
     T_3 = min(a / j, sqrt(v / j), (h / (2 * j)) ** (1 / 3)) if j < inf else 0.0
@@ -233,7 +233,7 @@ class Legs:
     # profile, smoothness: law of motion of each leg, and its number of continuous derivatives
     profile: Profile
     smoothness: int
-    limits: Limits  # of the speed along the path and its derivatives
+    limits: PathLimits  # of the speed along the path and its derivatives
     durations: tuple[float, ...] | None  # (k,) s of each leg; None: as long as the limits ask for
     holds: tuple[float, ...]  # (k − 1,) s at the places between
     # share of the shorter of two legs for which they overlap where there is no hold: the path then passes the place

@@ -109,7 +109,7 @@ class Waypoints:
 
 
 @dataclass(frozen=True)
-class Record:
+class Recorded:
     """A table as a program wrote it: times (T,), s, in any order, and values (T, columns).
 
     `rates` (T, columns) where the program wrote them, too. `place` of a row is where messages say that it is.
@@ -124,8 +124,8 @@ class Record:
 
     def waypoints(self) -> Waypoints:
         """Return the rows as waypoints. Raises `InputError` as `waypoints_of`."""
-        found = waypoints_of(self.columns, self.times, self.values, self.place)
-        return replace(found, remarks=(*self.remarks, *found.remarks))
+        read = waypoints_of(self.columns, self.times, self.values, self.place)
+        return replace(read, remarks=(*self.remarks, *read.remarks))
 
 
 def column_of(columns: Sequence[str], joint: str) -> int | None:
@@ -133,11 +133,11 @@ def column_of(columns: Sequence[str], joint: str) -> int | None:
     for pattern in OF_A_JOINT:
         name = pattern.format(joint)
         ends = (f"/{name}",) if name != pattern else ()
-        found = [k for k, column in enumerate(columns) if column == name or column.endswith(ends)]
-        if len(found) > 1:
-            raise ValueError(f'expected one column of joint "{joint}", found {quoted(columns[k] for k in found)}')
-        if found:
-            return found[0]
+        meant = [k for k, column in enumerate(columns) if column == name or column.endswith(ends)]
+        if len(meant) > 1:
+            raise ValueError(f'expected one column of joint "{joint}", found {quoted(columns[k] for k in meant)}')
+        if meant:
+            return meant[0]
     return None
 
 
@@ -148,13 +148,13 @@ def load_waypoints(path: Path) -> Waypoints:
     """
     record = load_record(path)
     try:
-        found = record.waypoints()
+        waypoints = record.waypoints()
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return replace(found, remarks=tuple(f"{path.name}: {remark}" for remark in found.remarks))
+    return replace(waypoints, remarks=tuple(f"{path.name}: {remark}" for remark in waypoints.remarks))
 
 
-def load_record(path: Path) -> Record:
+def load_record(path: Path) -> Recorded:
     """Read the CSV table at `path`: header `t,x,y` or `t,value` …; at least two rows.
 
     Times are in s, or in the unit that the header says. Those of a computer's clock begin at zero, with a remark.
@@ -173,7 +173,7 @@ def load_record(path: Path) -> Record:
             names[k], values[:, k] = unit[1], factor * values[:, k]
             if factor != 1.0:
                 remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in (unit[2] or unit[3]) else "rad"}')
-    return Record(names, times, values, lambda k: f"line {lines[k]}", tuple(remarks))
+    return Recorded(names, times, values, lambda k: f"line {lines[k]}", tuple(remarks))
 
 
 def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Callable[[int], str]) -> Waypoints:
@@ -200,8 +200,8 @@ def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Cal
 
 def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:
     """Times in s, and a remark where they are those of a clock."""
-    found = TIME.fullmatch(header)
-    unit = None if found is None or found[2] is None else UNITS.get(found[2].lower(), 1.0)
+    match = TIME.fullmatch(header)
+    unit = None if match is None or match[2] is None else UNITS.get(match[2].lower(), 1.0)
     first = float(times[0]) if len(times) else 0.0
     clock = next((scale for least, scale in SINCE_1970 if first * (unit or 1.0) >= least), None)
     if clock is None:
@@ -320,8 +320,8 @@ def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]
     except ValueError:
         numbers = []
     if len(numbers) != count or not all(abs(number) <= LARGEST for number in numbers):  # False of NaN
-        found = shown(",".join(row))
-        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}, found {found!r}")
+        text = shown(",".join(row))
+        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}, found {text!r}")
     return numbers
 
 

@@ -103,11 +103,8 @@ def _rows_at_motors(model: Model, tree: KinematicTree) -> Iterator[ConstraintRow
 def _output(node: Node) -> tuple[JointRecord, str, Section]:
     """The joint, name and place of the output of the gear in the joint of `node`."""
     label = f"{node.joint.name}/rotor"
-    joint = node.joint.model_copy(
-        update={
-            "name": label, "stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0
-        }
-    )  # fmt: skip
+    none = {"stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0}
+    joint = node.joint.model_copy(update={"name": label, **none})
     return joint, label, node.outer if node.backwards else node.inner
 
 

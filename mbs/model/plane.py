@@ -203,7 +203,7 @@ class _Reduction:
         planar.f, planar.g = f, g
         return planar
 
-    def _turn(self, found: _core.ConstraintModel, row: _core.ConstraintModel) -> _core.ConstraintModel:
+    def _turn(self, flat: _core.ConstraintModel, row: _core.ConstraintModel) -> _core.ConstraintModel:
         """The difference of angles of planar markers, in which directions are those of their x: see `axes_of_triad`."""
         a, b = self._of_marker(row.a), self._of_marker(row.b)
         f = a @ row.f
@@ -211,10 +211,10 @@ class _Reduction:
             raise AcrossError
         (x_a, y_a, _), (x_b, y_b, _) = a @ row.g, b @ row.g
         turned = float(np.arctan2(x_a * y_b - y_a * x_b, x_a * x_b + y_a * y_b))
-        found.kind, found.f = _core.ConstraintKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
+        flat.kind, flat.f = _core.ConstraintKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
         if abs(turned) > EXACT:
-            found.a = self._turned(row.a, -turned)
-        return found
+            flat.a = self._turned(row.a, -turned)
+        return flat
 
     def _turned(self, at: _core.MarkerAt, angle: float) -> _core.MarkerAt:
         """A marker of the ground in the place of another one, its axes turned by `angle`."""

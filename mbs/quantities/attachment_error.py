@@ -54,7 +54,7 @@ class Start(NamedTuple):
     duration: float  # s
 
 
-class Vibrations(NamedTuple):
+class Ringing(NamedTuple):
     """Vibrations in the first posture: ω² (m,), shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
 
     squares: Array
@@ -118,7 +118,7 @@ def phase_error(start: Start) -> float:
     return _of_largest(start, vibrations.amplitudes * np.minimum(2.0, np.sqrt(vibrations.squares) * slower * time))
 
 
-def start_vibrations(start: Start) -> Vibrations:
+def start_vibrations(start: Start) -> Ringing:
     """Return vibrations of the links that begin at the start of a run, under its constraints.
 
     The vibrations φ_i, ω_i have of the first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand
@@ -126,7 +126,7 @@ def start_vibrations(start: Start) -> Vibrations:
     """
     squares, shapes = elastic_shapes(start.M, np.diag(start.stiffness), start.C_q)
     accelerations = shapes.T @ (start.stiffness * start.a) / squares
-    return Vibrations(squares, shapes, accelerations / np.sqrt(squares))
+    return Ringing(squares, shapes, accelerations / np.sqrt(squares))
 
 
 def _of_largest(start: Start, amplitudes: Array) -> float:

@@ -144,5 +144,5 @@ def _open(run: Run, basis: Array) -> dict[str, tuple[str, ...]]:
     moved = np.linalg.norm(directions, axis=2).max(axis=0).reshape(len(joints), len(OF_POINT)) > OPEN
     space = run.space
     moved[:, [axis not in (*space.translations, *(3 + k for k in space.rotations)) for axis in range(6)]] = False
-    found = {name: tuple(np.array(OF_POINT)[of].tolist()) for name, of in zip(joints, moved, strict=True)}
-    return {name: components for name, components in found.items() if components}
+    free = {name: tuple(np.array(OF_POINT)[of].tolist()) for name, of in zip(joints, moved, strict=True)}
+    return {name: components for name, components in free.items() if components}

@@ -54,9 +54,9 @@ class Load(Referring):
         of_point = keys_here(self, (*OF_POINT, "force"), info)
         moment = ("moment",) if is_planar(info) else ()
         allowed = {"point": (*of_point, *moment), "joint": ("moment",), "pzt": ("voltage",)}[subject]
-        found = only(self, subject, allowed, (*of_point, "moment", "voltage"))
-        if self.force is not None and len(found) > 1:
-            raise ValueError(f'expected "force" alone with "point", found {quoted(found)}')
+        given = only(self, subject, allowed, (*of_point, "moment", "voltage"))
+        if self.force is not None and len(given) > 1:
+            raise ValueError(f'expected "force" alone with "point", found {quoted(given)}')
         return self
 
     @property

@@ -174,7 +174,7 @@ class MechanismKeys(Record):
         for table in ("load", "payload"):
             for k, record in enumerate(getattr(self, table), 1):
                 yield from under(f"{table} no. {k}", record.references())
-        yield from (replace(found, key=f"initial.{found.key}") for found in self.initial.references())
+        yield from (replace(reference, key=f"initial.{reference.key}") for reference in self.initial.references())
 
 
 class MechanismScene(MechanismKeys):

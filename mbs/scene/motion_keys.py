@@ -12,7 +12,7 @@ from ...common.arrays import Array
 from ...common.errors import quoted
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive, Quantity, Referring
-from ..fields.paths import SMOOTHNESS, Legs, Limits, Piecewise, impulses, path_of, shaped
+from ..fields.paths import SMOOTHNESS, Legs, PathLimits, Piecewise, impulses, path_of, shaped
 from ..fields.waypoints import Waypoints
 
 Place = Quantity | tuple[Quantity, ...]
@@ -137,8 +137,8 @@ class MotionKeys(Referring):
             raise ValueError('expected one of the keys "fastest" and "stretch", found both')
         limits = [key for key in LIMITS if getattr(self, key) is not None]
         if bool(limits) == (self.duration is not None):
-            found = "both" if limits else "neither"
-            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {found}')
+            given = "both" if limits else "neither"
+            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {given}')
         if self.profile in ("s-curve", "trapezoid") and limits == ["speed"]:
             raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
         if self.profile == "trapezoid" and self.jerk is not None:
@@ -160,7 +160,7 @@ class MotionKeys(Referring):
     def _legs(self, places: Array) -> Legs:
         profile, count = self.profile or "rest-to-rest", len(places) - 1
         assert profile != "spline"
-        limits = Limits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
+        limits = PathLimits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
         durations = None if self.duration is None else tuple(np.broadcast_to(self.duration, count).tolist())
         holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
         smoothness = self.smoothness or SMOOTHNESS[profile]
@@ -172,4 +172,6 @@ class MotionKeys(Referring):
         assert profile != "spline"
         smoothness, durations = self.smoothness or SMOOTHNESS[profile], tuple(np.diff(times).tolist())
         holds = (0.0,) * (len(times) - 2)
-        return Legs(waypoints.values, float(times[0]), profile, smoothness, Limits(), durations=durations, holds=holds)
+        return Legs(
+            waypoints.values, float(times[0]), profile, smoothness, PathLimits(), durations=durations, holds=holds
+        )

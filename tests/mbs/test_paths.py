@@ -9,7 +9,7 @@ import pytest
 from ffrobot.mbs.fields.paths import (
     RESIDUAL,
     Legs,
-    Limits,
+    PathLimits,
     Piecewise,
     impulses,
     law_in,
@@ -24,7 +24,7 @@ LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4)
 
 def legs(places, **keys):
     count = len(places) - 1
-    given = {"start": 0.0, "profile": "s-curve", "smoothness": 2, "limits": Limits(), "durations": (1.0,) * count}
+    given = {"start": 0.0, "profile": "s-curve", "smoothness": 2, "limits": PathLimits(), "durations": (1.0,) * count}
     return Legs(np.array(places, dtype=float), **(given | {"holds": (0.0,) * (count - 1)} | keys))
 
 
@@ -57,7 +57,7 @@ def _left(law, k, order):
 @pytest.mark.parametrize(("profile", "smoothness"), LAWS)
 @pytest.mark.parametrize("distance", [1e-4, 0.03, 0.5, 7.0])
 def test_limits_are_kept_and_one_is_reached(profile, smoothness, distance):
-    limits = Limits(1.5, 6.0, inf if profile == "trapezoid" else 50.0)
+    limits = PathLimits(1.5, 6.0, inf if profile == "trapezoid" else 50.0)
     law = law_within(distance, limits, profile, smoothness).along(np.array([distance]))
     ratios = [np.abs(law.sample(over(law, 20001), k)).max() / limit for k, limit in enumerate(limits.by_order, 1)]
     assert max(ratios) == pytest.approx(1.0, abs=1e-6)
@@ -73,7 +73,7 @@ def test_limits_are_kept_and_one_is_reached(profile, smoothness, distance):
 )
 def test_s_curve_takes_the_time_of_the_textbook(distance, duration):
     """Biagiotti and Melchiorri 2008, sec. 3.4."""
-    assert law_within(distance, Limits(1.5, 6.0, 50.0), "s-curve", 2).end == pytest.approx(duration, rel=1e-12)
+    assert law_within(distance, PathLimits(1.5, 6.0, 50.0), "s-curve", 2).end == pytest.approx(duration, rel=1e-12)
 
 
 def test_polynomial_of_smoothness_2_is_the_quintic():
@@ -99,7 +99,7 @@ def test_path_stops_at_its_places_and_holds_there():
 
 
 def test_blended_corner_stays_within_its_triangle_and_the_limits():
-    limits, places = Limits(1.0, 4.0, 40.0), [[0, 0], [1, 0], [1, 1]]
+    limits, places = PathLimits(1.0, 4.0, 40.0), [[0, 0], [1, 0], [1, 1]]
     stopping, passing = (path_of(legs(places, limits=limits, durations=None, blend=blend)) for blend in (0.0, 0.4))
     assert passing.end < stopping.end
     x, y = passing.sample(over(passing, 4001)).T

@@ -186,7 +186,7 @@ def test_sets_of_whole_instances(read, tmp_path):
     part = read(text)
     low = part.points[part.corners[np.isin(part.cell_tag, [part.regions["LOW"], *part.overlaps.get("LOW", ())])]]
     assert (len(low), low[..., 1].max()) == (3, pytest.approx(0.0, abs=1e-12))
-    assert len(read_abaqus(tmp_path / "part.inp", "").point_groups["LOW_NODES"]) == len(HALF)
+    assert len(read_abaqus(tmp_path / "part.inp").point_groups["LOW_NODES"]) == len(HALF)
 
 
 def test_nodes_of_a_set_of_elements(read):

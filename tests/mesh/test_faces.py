@@ -5,7 +5,7 @@ import pytest
 from solid_parts import face_area, rectangle
 
 from ffrobot.common.errors import InputError
-from ffrobot.mesh.faces import Boundary
+from ffrobot.mesh.faces import PartBoundary
 from ffrobot.mesh.records import CircleSection, Hole, Outlines, PlaceRecord
 
 
@@ -26,13 +26,13 @@ def at(name, position, normal):
 
 
 def test_a_box_has_six_smooth_faces(solid, mesh_part):
-    faces = Boundary.of(mesh_part(solid())).smooth_faces
+    faces = PartBoundary.of(mesh_part(solid())).smooth_faces
     assert [face.area for face in faces] == pytest.approx([0.025] * 2 + [0.015] * 2 + [0.000375] * 2)
     np.testing.assert_allclose(np.sum([face.normal for face in faces], axis=0), 0, atol=1e-12)
 
 
 def test_a_bar_has_a_mantle_with_an_axis(solid, mesh_part):
-    mantle, *ends = Boundary.of(mesh_part(solid(section=CircleSection(shape="circle", diameter=0.05)))).smooth_faces
+    mantle, *ends = PartBoundary.of(mesh_part(solid(section=CircleSection(shape="circle", diameter=0.05)))).smooth_faces
     assert abs(mantle.axis[0]) > 0.999
     assert len(ends) == 2
 

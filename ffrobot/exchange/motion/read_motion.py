@@ -16,7 +16,7 @@ from ...common.errors import InputError, blaming_file, quoted
 from ...common.extras import extras
 from ...common.tables import LARGEST, as_csv, shown
 from ...common.toml_files import read_text
-from ...mbs.fields.waypoints import Record, Waypoints
+from ...mbs.fields.waypoints import Recorded, Waypoints
 from .robot_motion import NANO, TRAJECTORY
 
 STATES = "sensor_msgs/msg/JointState"
@@ -32,7 +32,7 @@ def read_motion(path: Path) -> Waypoints:
     return _named(path, lambda path: read_record(path).waypoints())
 
 
-def read_record(path: Path) -> Record:
+def read_record(path: Path) -> Recorded:
     """The rows in a JSON or YAML file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
 
     Columns are joints, rad or m; `remarks` say what was left out.
@@ -59,7 +59,7 @@ def path_text(motion: Waypoints) -> str:
     return as_csv([["t", *motion.columns], *rows])
 
 
-def _from_text(path: Path) -> Record:
+def _from_text(path: Path) -> Recorded:
     text = read_text(path, "file of a motion")
     message = _from_json(text) if path.suffix.lower() == ".json" else _from_yaml(text)
     segments = list(_segments(message))
@@ -169,7 +169,7 @@ def _moving_at_ends(joints: Sequence[str], velocities: Array) -> Iterator[str]:
             )
 
 
-def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any], *remarks: str) -> Record:
+def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any], *remarks: str) -> Recorded:
     """`velocities`: of all points, or of none."""
     if not joints or len(set(joints)) < len(joints):
         raise InputError(f"expected joints of different names, found {len(joints)}: {shown(', '.join(joints))}")
@@ -180,12 +180,12 @@ def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any
     except (TypeError, ValueError, OverflowError):
         rates = None
     if rates is None or not np.isfinite(rates).all():
-        return Record(joints, times, values, "point {}".format, remarks)
+        return Recorded(joints, times, values, "point {}".format, remarks)
     remarks = (*remarks, *_moving_at_ends(joints, rates))
-    return Record(joints, times, values, "point {}".format, remarks, rates)
+    return Recorded(joints, times, values, "point {}".format, remarks, rates)
 
 
-def _from_bag(path: Path) -> Record:
+def _from_bag(path: Path) -> Recorded:
     if not path.exists():
         raise InputError("file of a motion not found")
     with extras():
@@ -200,7 +200,7 @@ def _from_bag(path: Path) -> Record:
         return _of_bag(bag)
 
 
-def _of_bag(bag: Any) -> Record:
+def _of_bag(bag: Any) -> Recorded:
     """The first JointTrajectory of the topic that has most; without one, the JointStates of all topics."""
     topics = {
         kind: sorted((one for one in bag.connections if one.msgtype == kind), key=lambda one: -int(one.msgcount))
@@ -225,7 +225,7 @@ def _of_bag(bag: Any) -> Record:
     return _record(plan.joint_names, rows, [point.velocities for point in plan.points], *left)
 
 
-def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Record:
+def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Recorded:
     """Positions by the time of their stamps, the first being zero, of all joints: see `_together`.
 
     Of a joint on several topics that with most messages counts. Stamps that nobody has set are times of the record.
@@ -253,7 +253,7 @@ Sample = tuple[int, int, float]
 """Stamp of a message (ns), 0 where nobody has set it, its time in the record (ns), and a position."""
 
 
-def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record:
+def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Recorded:
     """One table of joints whose samples have times of their own (ns).
 
     Times are those of the joints with most samples, where all joints have some before and after; others go between
