@@ -74,8 +74,9 @@ class MultibodySystem:
         driven = self._driven((*commands, *(drives.replayed.commands if drives.replayed else ())))
         bodies, ground = self._markers.bodies(driven), self._markers.standing()
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
+        with_moments = self._with_moments(cut)
         for number, at in enumerate(wrenches):
-            at.only_forces = number not in self._with_moments(cut)
+            at.only_forces = number not in with_moments
         self._parts = ModelParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity), cut)
 
     @cached_property

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from ...common.arrays import Array
 from ...common.deferred import ReadBy, Table
@@ -34,8 +34,8 @@ def tensor(inertia: Inertia) -> Array:
     return np.diag(array) if array.ndim == 1 else array
 
 
-def check_inertia(inertia: Inertia) -> None:
-    """Raise `ValueError` unless it is symmetric, and that of a body: no moment larger than the sum of the others.
+def check_inertia(inertia: Inertia) -> Inertia:
+    """Return it. Raises `ValueError` unless symmetric, with no principal moment larger than the sum of the others.
 
     Moments may be zero: those of a point mass, and of a rod about its axis.
     """
@@ -51,6 +51,7 @@ def check_inertia(inertia: Inertia) -> None:
             f"expected no principal moment of inertia larger than the sum of the others, found"
             f" {', '.join(f'{moment:g}' for moment in moments)}"
         )
+    return inertia
 
 
 def _about_center(J: float) -> Vector3:
@@ -92,7 +93,7 @@ class RigidBody(Record):
 
     mass: Positive
     """Mass, kg."""
-    inertia: Annotated[Inertia, Spelled(float, _about_center)]
+    inertia: Annotated[Inertia, Spelled(float, _about_center), AfterValidator(check_inertia)]
     """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about z."""
     center: Vector
     """Center of mass, m, axes of the body."""
@@ -100,12 +101,6 @@ class RigidBody(Record):
     """Points for joints, loads and trajectories by name: m, axes of the body."""
     visual: Annotated[tuple[Table[Visual], ...], IN_SPACE] = ()
     """Shapes that pictures show."""
-
-    @field_validator("inertia")
-    @classmethod
-    def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
-        check_inertia(inertia)
-        return inertia
 
 
 def _link(value: object, info: ValidationInfo) -> LinkSource:
@@ -191,14 +186,8 @@ class Payload(Referring):
     """Mass, kg."""
     center: Vector = (0.0, 0.0, 0.0)
     """Center of mass, m from the point, axes of the body or tool."""
-    inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
+    inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z), AfterValidator(check_inertia)] = (0.0, 0.0, 0.0)
     """Inertia about that center, axes of the body or tool, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about
     z."""
 
     refers_to = (("point", "body"),)
-
-    @field_validator("inertia")
-    @classmethod
-    def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
-        check_inertia(inertia)
-        return inertia
