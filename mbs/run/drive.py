@@ -156,14 +156,8 @@ class _Integration:
         (core, scene, _), control, continuation = self.system.integrated, self.control, self.continuation
         controls = integration_controls(self.analysis, self.integrator)
         controls.stops = as_list(self.ends)
-        common: dict[str, Any] = {
-            "model": core,
-            "scene": scene,
-            "times": as_list(self.times),
-            "q": start.q,
-            "v": start.v,
-        }
-        common |= {"controls": controls, "carry_on": progress}
+        common: dict[str, Any] = dict(model=core, scene=scene, times=as_list(self.times), q=start.q, v=start.v)
+        common.update(controls=controls, carry_on=progress)
         if control is None:
             # Where motors take the place of forces on a path their errors count, too
             is_judged = self.is_followed and self.system.model.motors
