@@ -22,19 +22,13 @@ face stretch the link, too, and those off the middle of the width bend it about 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
-from ...common.keys import SMALLEST
-from ...common.rotations import skew
-from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
-from ...mbs.model.body import Body, BodyPoint
-from ...mbs.model.masses import with_line_masses
 from ...mbs.quantities.stress import SectionLoads
 from .records import PztLayout
 from .sections import (
@@ -46,7 +40,6 @@ from .sections import (
     bending_row,
     felt_rows,
     layer_loads,
-    layer_section,
     link_sections,
     load_per_volt,
     own_row,
@@ -55,7 +48,6 @@ from .sections import (
     straight_loads,
 )
 
-PASSES = 6  # until modes and the stiffness of shunts at their frequencies agree
 SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
@@ -82,14 +74,14 @@ def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, A
     The stiffness (n, n) that patches add, and the modal forces per volt (k, n) that the layers' own stiffness takes of
     those on a link held straight; R is 0 where rigidities are not known.
     """
-    layers = _on_link(placed, body)
+    layers = layers_on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
     return 0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt
 
 
 def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
     """P over a motion, per length of the link, of patches that bend in the plane: p (T, n), file's; voltages (T, k)."""
-    layers = _on_link([placed], body)
+    layers = layers_on_link([placed], body)
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
     count = len(layers.points)
     density = P.reshape(len(p), count, -1) / np.array([at.weight for at in layers.points])[:, None]
@@ -99,7 +91,7 @@ def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Arr
     return SectionLoads(placed.edges, patch, x, density[..., 0], along, P @ layers.B)
 
 
-class _OnLink(NamedTuple):
+class LayersOnLink(NamedTuple):
     """Layers on their link, of each Gauss point a row for each strain of e that is felt anywhere.
 
     B (rows, n); P of coordinates p and of voltages: `by_modes` (rows, n) taken off, `by_volts` (rows, k); `straight`
@@ -114,7 +106,8 @@ class _OnLink(NamedTuple):
     yielding: Array
 
 
-def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
+def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnLink:
+    """Return what the layers of all layouts do on their link."""
     sections = link_sections(body)
     intervals, covering = _intervals(placed)
     points = list(gauss_points(body, intervals))
@@ -135,7 +128,7 @@ def _on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> _OnLink:
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
     by_volts = held[:, B.shape[1] :]
-    return _OnLink(points, B, held[:, : B.shape[1]], by_volts, straight, (f * (R @ by_volts)).sum(axis=0))
+    return LayersOnLink(points, B, held[:, : B.shape[1]], by_volts, straight, (f * (R @ by_volts)).sum(axis=0))
 
 
 def _felt(layouts: Sequence[PztLayout], strains: Array) -> Indices:
@@ -252,78 +245,6 @@ def _strains(body: ModalBody, x: Array) -> Array:
     h = np.minimum(1e-3 * body.length, 0.5 * np.abs(stations - x[:, None]).min(axis=1))
     rise = potentials(body, x + h) - potentials(body, x - h)
     return as_floats(rise / (2 * h)[:, None, None])
-
-
-@struct
-class StructureEffect:
-    """Changes of a link by patches, bare → with patches."""
-
-    mass: Array  # (2,) kg
-    inertia: Array  # (2,) about the body's z axis, kg·m²
-    frequency: Array  # (2, n) Hz
-
-
-def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
-    """Add mass and stiffness of patches to a link or a piece of it, as the layouts ask; all modes are kept.
-
-    Mass lies in the plane of the patches' normal at their offset from the axis, with its moment of inertia about the
-    line that it is on, ∫ρ (η² + ζ²) dA. The stiffness is that of the `composite` section.
-    """
-    T, sections = spatial.modal_transform, link_sections(body)
-    points, masses, spins = [], [], []
-    for layout, edges in placed:
-        extent = sections.extent(layout.normal, side(layout))
-        arm = layout.offset * np.eye(3)[2 if layout.normal == "y" else 1]
-        for place in gauss_points(body, edges) if layout.adds_mass else ():
-            at = body.interpolate(place.x)
-            moved = at.translation - skew(arm) @ at.rotation
-            points.append(BodyPoint(at.position + arm, moved @ T, at.rotation @ T))
-            A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
-            line_density = place.weight * (layout.density or 0.0)
-            masses.append(line_density * A)
-            spins.append(line_density * (I + A * layout.width**2 / 12))
-    stiff = [one for one in placed if one.layout.adds_stiffness]
-    added = T.T @ composite(stiff, body)[0] @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
-    patched = with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
-    return _with_charges(patched, body, stiff) if any(one.layout.gives_way for one in stiff) else patched
-
-
-def _with_charges(patched: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
-    """With what the charges of patches do whose electrodes are open, or behind a resistor of R Ω each.
-
-    With the charge q = C V + Φᵀp and V = −R q̇ a patch has the dynamic stiffness Φ iωR/(1 + iωRC) Φᵀ (Hagood and von
-    Flotow, J. Sound Vib. 146, 1991), ΦΦᵀ/C where R is infinite. Its stiffness and damping are those at the frequency
-    of each mode that they lead to.
-    """
-    layers = _on_link(placed, body)
-    layouts = [one.layout for one in placed for _ in one.edges]
-    share = np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
-    charged = np.flatnonzero([of.gives_way for of in layouts])
-    C = np.array([of.capacitance(clamped=True) for of in layouts]) * share + layers.yielding
-    Phi = (layers.by_volts.T @ layers.B @ patched.modal_transform)[charged] / np.sqrt(C[charged])[:, None]
-    R = np.array([layouts[k].shunt or np.inf for k in charged]) / share[charged]
-    K, modes = np.diag(patched.stiffness), np.eye(patched.n_modes)
-    values, added = patched.stiffness, np.zeros_like(K)
-    for _ in range(PASSES):
-        omega = np.sqrt(values.clip(min=SMALLEST))
-        with np.errstate(divide="ignore"):
-            lag = 1.0 / np.multiply.outer(R * C[charged], omega)  # 1/(ωRC)
-        stiff = Phi @ modes / np.sqrt(1.0 + lag**2) @ modes.T
-        damps = Phi @ modes * np.sqrt(lag / (omega * (1.0 + lag**2))) @ modes.T
-        added = stiff.T @ stiff
-        values, modes = np.linalg.eigh(K + added)
-    with_damping = replace(patched, damping=patched.damping + damps.T @ damps)
-    return with_line_masses(with_damping, (), np.zeros(0), np.zeros(0), added)
-
-
-def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
-    """Return the changes of a link by its patches."""
-    pair = (bare, patched)
-    return StructureEffect(
-        np.array([body.mass for body in pair]),
-        np.array([body.inertia[2, 2] for body in pair]),
-        np.array([np.sqrt(body.stiffness) / (2 * np.pi) for body in pair]),
-    )
 
 
 STEP = 0.1  # of the extent, from one station to the next; less is a taper

@@ -5,9 +5,9 @@ import pytest
 from beam_links import modal_body, paper_link, rectangle
 from patches_on_links import SCENE, planar_body
 
-from ffrobot.actuation.patches.composite import patched_body, structure_effect_of
 from ffrobot.actuation.patches.link_patches import placed_patches
 from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.structure import patched_body, structure_effect_of
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
 E_P, RHO_P, T_P = 63e9, 7600.0, 0.75e-3

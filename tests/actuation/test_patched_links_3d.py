@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle, tube
 
-from ffrobot.actuation.patches.composite import patched_body
 from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina, plain_lamina
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
 from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.structure import patched_body
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear

@@ -7,7 +7,8 @@ from patches_on_links import bent, on_link, planar_body
 from tables_3d import joint, rigid, scene
 
 import ffrobot
-from ffrobot.actuation.patches.composite import PlacedLayout, patched_body
+from ffrobot.actuation.patches.composite import PlacedLayout
+from ffrobot.actuation.patches.structure import patched_body
 
 ALL = ["in-plane-bending", "out-of-plane-bending", "torsion", "axial"]
 AT_REST = [0.0, 0.0, 0.0]
