@@ -106,7 +106,7 @@ class PztLayout(Record):
     poissons_ratio: float | None = None
     """Poisson's ratio −s12/s11 of the ceramic in its plane, for `strain`; of fibers under tension along them."""
     strain: Literal["uniaxial", "biaxial"] | None = None
-    """Strain across the patch: free, with d31/s11, or held, with d31/(s11 + s12); default: held on links at least
+    """Strain across the patch: free, with d31/s11, or none, with d31/(s11 + s12); default: none on links at least
     three times as wide as long, and on outlined faces, where `poissons_ratio` is given."""
     electrodes: Literal["driven", "open", "shorted"] = "driven"
     """Electrodes of the patches: driven by voltages, not connected, or connected with each other."""

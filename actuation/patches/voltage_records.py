@@ -58,7 +58,7 @@ class Amplifier(Record):
 
 
 class HysteresisKeys(Record):
-    """Hysteresis of the patches of a layout in forward runs, closed loops and loads: a sum of play operators.
+    """Hysteresis of the patches of a layout in forward runs, closed-loop control and loads: play operators.
 
     Under a voltage V a patch acts as under Σ w z: z follows V at the distance of a threshold. The other analyses plan
     without it.
@@ -69,7 +69,7 @@ class HysteresisKeys(Record):
     thresholds: tuple[NotNegative, ...]
     """Thresholds, V, ascending from 0."""
     compensate: bool = False
-    """Inverse of the hysteresis in front of voltages of replays and controllers."""
+    """Inverse of the hysteresis in front of computed voltages and of controllers."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

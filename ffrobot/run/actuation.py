@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
-from ..common.arrays import Array, Indices, as_floats, as_list
+from ..common.arrays import Array, Indices, as_floats
 from ..common.structs import struct
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.drives import Drive
@@ -79,18 +79,18 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
     }
 
 
-def given_voltages(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
+def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
     """Yield the drives of voltages that the scene prescribes for patches, behind their hysteresis."""
-    last = max((analysis.last_time for analysis in model.scene.analysis), default=0.0) or 1.0
+    last = max((analysis.last_time for analysis in scene.analysis), default=0.0) or 1.0
     times = as_floats(np.linspace(0.0, last, HYSTERESIS_TIMES))
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
-    for load in model.scene.load:
+    for load in scene.load:
         if load.pzt is not None:
             of_link = patches[bodies[load.pzt]]
             directions = modal_directions(model, of_link.per_volt)[of_link.columns(load.pzt)]
             voltage, amplifiers = load.voltage or (), of_link.arrays[load.pzt].amplifiers
             if amplifiers.hysteresis.acts:
-                wanted = np.stack([function.sample(as_list(times))[0] for function in voltage], axis=1)
+                wanted = np.stack([function.sample(times)[0] for function in voltage], axis=1)
                 voltage = tuple(spline(times, amplifiers.hysteresis.output(wanted), 1))
             yield from map(Drive, directions, voltage)
 

@@ -150,7 +150,7 @@ def _model(
         spatial |= {name: replace(body, stiffening=None) for name, body in spatial.items() if name not in known}
     model = build_model(scene, list(spatial.values()))
     model = with_robot_damping(model, robot_damping_ratios(bodies))
-    return replace(model, modal_loads=tuple(given_voltages(model, patches)))
+    return replace(model, modal_loads=tuple(given_voltages(scene, model, patches)))
 
 
 def _known_between(scene: Scene, bodies: Mapping[str, Body], links: Iterable[tuple[str, ...]]) -> set[str]:
