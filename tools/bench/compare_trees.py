@@ -32,7 +32,8 @@ def first(*names):  # older programs have them elsewhere
             pass
 
 drive, statics = first("run.drive", "analysis.drive"), first("linear.statics", "solve.statics")
-integrated = drive._integrated
+of, name = (drive._Integration, "run") if hasattr(drive, "_Integration") else (drive, "_integrated")
+integrated = getattr(of, name)
 
 def timed(*given, **named):
     before = time.process_time()
@@ -40,7 +41,7 @@ def timed(*given, **named):
     seconds.append(("integration", time.process_time() - before, run.steps))
     return run
 
-drive._integrated = timed
+setattr(of, name, timed)
 
 def run(scene):
     model, before = prepare_scene(scene).model, time.process_time()
