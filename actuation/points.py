@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.errors import InputError, did_you_mean, quoted
+from ..common.errors import InputError, check_known, quoted
 from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
@@ -195,10 +195,7 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
     """
     points = spatial.points
     if isinstance(place, str):
-        if place not in points:
-            raise InputError(
-                f'{key}: expected a point of the body ({quoted(points)}), found "{place}"' + did_you_mean(place, points)
-            )
+        check_known(place, points, f"{key}: expected a point of the body ({quoted(points)})")
         return points[place]
     if body is None:
         raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)}), found {place:g}")

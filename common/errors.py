@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
+
+from .tables import shown
 
 
 class FfrobotError(Exception):
@@ -111,6 +113,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     close = [one for one in (ELSEWHERE.get(small.replace("_", "-")),) if one in words]
     close = close or get_close_matches(small, words, n=1) or [one for one in words if one.startswith(f"{small}_")]
     return f' (did you mean "{words[close[0]]}"?)' if close else ""
+
+
+def check_known(word: str, known: Collection[str], expected: str) -> None:
+    """Raise `InputError` with the text `expected`, and the word as found, unless `word` is one of `known`."""
+    if word not in known:
+        raise InputError(f'{expected}, found "{shown(word)}"{did_you_mean(word, known)}')
 
 
 def quoted(words: Iterable[str]) -> str:

@@ -99,10 +99,18 @@ class ClosedLoop(SampledAnalysis):
         filtered = Filter(read, self.sample_time)
         reference[:] = [filtered(y) for y in reference]
         setup = Setup(
-            robot, robot.model, context.patches, input_names(robot), tuple(signal.name for signal in read), samples,
-            self.sample_time, self.delay, reference, _feed_forward(context, self, source, moved, samples),
-            robot.source,
-        )  # fmt: skip
+            robot=robot,
+            model=robot.model,
+            patches=context.patches,
+            inputs=input_names(robot),
+            outputs=tuple(signal.name for signal in read),
+            times=samples,
+            sample_time=self.sample_time,
+            delay=self.delay,
+            reference=reference,
+            feed_forward=_feed_forward(context, self, source, moved, samples),
+            source=robot.source,
+        )
         amplifiers = joined(context.patches.values())
         ranges = command_ranges(context.model, context.patches)
         if self.unlimited:

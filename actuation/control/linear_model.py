@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, Indices, NDArray, as_floats
-from ...common.errors import InputError, did_you_mean, quoted
+from ...common.errors import InputError, check_known, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.structs import struct
@@ -175,9 +175,17 @@ def state_space(
     C, D = np.hstack([by_s, by_rate]) + by_acceleration @ A[f:], by_acceleration @ B[f:]
     names = (*mechanism.names, *(f"rate of {name}" for name in mechanism.names))
     return LinearModel(
-        A, B, C, D, names, tuple(inputs), tuple(outputs),
-        mechanism.time, mechanism.M, mechanism.transformation,
-    )  # fmt: skip
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        state_names=names,
+        input_names=tuple(inputs),
+        output_names=tuple(outputs),
+        time=mechanism.time,
+        mass=mechanism.M,
+        transformation=mechanism.transformation,
+    )
 
 
 def is_kept(name: str, modes: int) -> bool:
@@ -247,9 +255,7 @@ def _some(names: tuple[str, ...]) -> str:
 def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
-        if name not in known:
-            hint = did_you_mean(name, known)
-            raise InputError(f'linear model: expected an {kind} ({quoted(known)}), found "{name}"{hint}')
+        check_known(name, known, f"linear model: expected an {kind} ({quoted(known)})")
     return [known.index(name) for name in wanted]
 
 

@@ -312,9 +312,16 @@ class Observed:
             nees = float(np.einsum("ti,tij->t", e, weighed).mean() / rank)
             inside = float((np.abs(e) <= 2 * sigma[:, moving]).mean())
         return Estimates(
-            tuple(names), values, tip, values[:, columns], np.linalg.norm(error, axis=1), sigma, nees, inside,
-            np.linalg.eigvals(first.error).astype(complex),
-        )  # fmt: skip
+            names=tuple(names),
+            values=values,
+            tip=tip,
+            position=values[:, columns],
+            error=np.linalg.norm(error, axis=1),
+            sigma=sigma,
+            nees=nees,
+            inside=inside,
+            poles=np.linalg.eigvals(first.error).astype(complex),
+        )
 
 
 def kalman_filters(

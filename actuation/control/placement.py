@@ -186,9 +186,17 @@ def place(
     voltages = [np.nan if F_p is None else float(_voltages(reach.shape, P[:, None], F_p)[0]) for _, P in found]
     best = 0 if rated[0].value >= rated[1].value else 1  # even spacing need not be on the grid
     return Placed(
-        wanted, rated[best], rated[1], reach.frequency, reach.share, np.array([voltages[best], voltages[1]]),
-        candidates.centers, gain(candidates.Phi_V), sets, method,
-    )  # fmt: skip
+        wanted=wanted,
+        best=rated[best],
+        even=rated[1],
+        frequency=reach.frequency,
+        share=reach.share,
+        largest_voltage=np.array([voltages[best], voltages[1]]),
+        candidates=candidates.centers,
+        candidate_reach=gain(candidates.Phi_V),
+        sets=sets,
+        method=method,
+    )
 
 
 def _measured(measure: str, reach: Array) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import field
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearMechanism, labelled
 from ...mbs.model.drives import Drives, PointDrive
@@ -165,11 +165,8 @@ def make_signals(
     elif sensor.strain is not None:
         link, _, place = sensor.strain.partition(".")
         points = context.links[link].stress
-        if place not in points:
-            raise InputError(
-                f'{model.scene.path}: sensor: strain: expected a point of [stress] in the link file of "{link}"'
-                f' ({quoted(points)}), found "{place}"'
-            )
+        wanted = f'a point of [stress] in the link file of "{link}" ({quoted(points)})'
+        check_known(place, points, f"{model.scene.path}: sensor: strain: expected {wanted}")
         coordinates = _modal_coordinates(model, link, whole)
         tree = (model if whole is None else whole.model).tree
         on_file = tree.nodes[tree.index[link]].body.modal_transform

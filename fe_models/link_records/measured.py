@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 
-from ...common.errors import InputError, did_you_mean, quoted
+from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
 from ...common.tables import LARGEST, parse_csv, shown
 from ...common.toml_files import read_text
@@ -65,9 +65,7 @@ def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMo
 def _check_header(path: Path, header: list[str]) -> None:
     """Raise `InputError` unless the columns are known ones, `mode` and something measured among them."""
     for name in header:
-        if name not in COLUMNS:
-            known = f"columns among {quoted(COLUMNS)}"
-            raise InputError(f'{path}: line 1: expected {known}, found "{shown(name)}"{did_you_mean(name, COLUMNS)}')
+        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
     if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
         columns = shown(",".join(header))
         raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio, found {columns!r}")
@@ -82,9 +80,9 @@ def _row(path: Path, line: int, header: list[str], row: list[str], families: tup
     if not (number.isascii() and number.isdecimal() and int(number[:9]) > 0):
         raise InputError(f'{where}: mode: expected a whole number from 1 on, found "{shown(number)}"')
     family = texts.get("family", "")
-    if family and family not in families:
-        known = f"expected {quoted(families)}" if families else "expected none of a robot, whose modes have no family"
-        raise InputError(f'{where}: family: {known}, found "{shown(family)}"{did_you_mean(family, families)}')
+    if family:
+        known = quoted(families) if families else "none of a robot, whose modes have no family"
+        check_known(family, families, f"{where}: family: expected {known}")
     frequency, damping, spread = (_number(where, name, texts.get(name, "")) for name in COLUMNS[2:])
     if frequency is None and damping is None:
         raise InputError(f"{where}: expected a frequency or a damping_ratio, found neither")

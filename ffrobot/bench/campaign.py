@@ -15,7 +15,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from ..common.errors import InputError, did_you_mean, quoted
+from ..common.errors import InputError, check_known, quoted
 from ..common.files import check_folder, write_atomically
 from ..common.tables import as_csv
 from ..mbs import _core
@@ -131,11 +131,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in self.integrators:
-            if name not in INTEGRATORS:
-                raise InputError(
-                    f'--integrators: expected some of {quoted(INTEGRATORS)}, found "{name}"'
-                    f"{did_you_mean(name, INTEGRATORS)}"
-                )
+            check_known(name, INTEGRATORS, f"--integrators: expected some of {quoted(INTEGRATORS)}")
         for tolerance in self.tolerances:
             if not TIGHTEST_TOLERANCE <= tolerance < 1:
                 raise InputError(

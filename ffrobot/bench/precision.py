@@ -179,14 +179,14 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
         with Results.from_image(results_image(solution), scene.path) as results:
             found = histories(results, name)
     return TimedRun(
-        last.statistics.integrator.name,
-        status,
-        sum(each.wall_seconds for each in runs),
-        sum(each.steps for each in runs),
-        sum(each.rejected for each in runs),
-        sum(each.evaluations for each in runs),
-        found,
-        {name: body.file_hash for name, body in solution.bodies.items() if body.path},
+        integrator=last.statistics.integrator.name,
+        status=status,
+        seconds=sum(each.wall_seconds for each in runs),
+        steps=sum(each.steps for each in runs),
+        rejected=sum(each.rejected for each in runs),
+        evaluations=sum(each.evaluations for each in runs),
+        histories=found,
+        bodies={name: body.file_hash for name, body in solution.bodies.items() if body.path},
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..actuation.motor_catalog import CatalogMotor, choice_of
 from ..common.arrays import Array, as_floats
-from ..common.errors import InputError, did_you_mean, either, quoted
+from ..common.errors import InputError, check_known, either, quoted
 from ..common.peaks import root_mean_square, shares
 from ..common.tables import shown
 from ..fe_models.modal_body import ModalBody
@@ -150,11 +150,8 @@ class OfFrequency(Goal):
         return Followed(float(body.frequency[modes.index(nominal.mode)]))
 
     def _body(self, results: Results) -> ModalBody:
-        if self.body not in (known := results.modal_files):
-            raise InputError(
-                f'"{self.text}": expected a body with a link ({quoted(known)}), found "{self.body}"'
-                f"{did_you_mean(self.body, known)}"
-            )
+        known = results.modal_files
+        check_known(self.body, known, f'"{self.text}": expected a body with a link ({quoted(known)})')
         return results.modal_body(self.body)
 
 
@@ -169,11 +166,8 @@ class OfMass(Goal):
     def read(self, results: Results) -> Reading:
         """Return the mass (kg) from modal bodies and `rigid` tables."""
         bodies = {str(body["name"]): body for body in results.scene["body"]}
-        if self.body and self.body not in bodies:
-            raise InputError(
-                f'"{self.text}": expected a body ({quoted(bodies)}), found "{self.body}"'
-                + did_you_mean(self.body, bodies)
-            )
+        if self.body:
+            check_known(self.body, bodies, f'"{self.text}": expected a body ({quoted(bodies)})')
         wanted = [self.body] if self.body else list(bodies)
         return Reading(sum(_mass(results, bodies[name]) for name in wanted), "kg")
 

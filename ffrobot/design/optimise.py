@@ -330,10 +330,17 @@ class _Searches:
             found.append(self._least(replace(self.problem, limits=limits), found[-1].design.place, f"{k} of {count}"))
         unit, other = (one.unit for one in self._both(first.design))
         return Front(
-            self.runner.path, (self.problem.objective.text, self.against.text), (unit, other),
-            tuple(map(".".join, self.space.keys)), (*found, last), self.designs.count, self.tolerance, self.space,
-            self.problem, tuple(map(self._with_both, self.tried.values())),
-        )  # fmt: skip
+            scene=self.runner.path,
+            goals=(self.problem.objective.text, self.against.text),
+            units=(unit, other),
+            keys=tuple(map(".".join, self.space.keys)),
+            points=(*found, last),
+            runs=self.designs.count,
+            tolerance=self.tolerance,
+            space=self.space,
+            problem=self.problem,
+            tried=tuple(map(self._with_both, self.tried.values())),
+        )
 
     def _least(self, problem: DesignProblem, start: Place, title: str) -> FrontPoint:
         evaluations, runner = Evaluations(self.designs, self.space, problem), self.runner
@@ -348,10 +355,15 @@ class _Searches:
             raise SolveError(f"{runner.path}: no design could be run to its end: {found.message}")
         goal, against = (one.value for one in self._both(found.best))
         return FrontPoint(
-            self.space.point(found.best.place), goal, against, self._price(found, evaluations.problem),
-            found.optimality is not None and found.optimality.reached(AIM),
-            evaluations.problem.violation(found.best.readings) <= KEPT, found.message, found.best,
-        )  # fmt: skip
+            point=self.space.point(found.best.place),
+            goal=goal,
+            against=against,
+            price=self._price(found, evaluations.problem),
+            converged=found.optimality is not None and found.optimality.reached(AIM),
+            feasible=evaluations.problem.violation(found.best.readings) <= KEPT,
+            message=found.message,
+            design=found.best,
+        )
 
     def _price(self, found: Local, problem: DesignProblem) -> float:
         """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached, NaN at the ends."""

@@ -380,9 +380,17 @@ def find_sensitivity(
         if one.failure
     )
     return Sensitivity(
-        runs.path, tuple(goal.text for goal in goals), base.readings, tuple(map(".".join, keys)), np.array(base.point),
-        entries(base, samples), failures, base.repeats or tolerance or TOLERANCE, designs.count, designs.table,
-    )  # fmt: skip
+        scene=runs.path,
+        goals=tuple(goal.text for goal in goals),
+        readings=base.readings,
+        keys=tuple(map(".".join, keys)),
+        values=np.array(base.point),
+        entries=entries(base, samples),
+        failures=failures,
+        tolerance=base.repeats or tolerance or TOLERANCE,
+        runs=designs.count,
+        table=designs.table,
+    )
 
 
 def _start(

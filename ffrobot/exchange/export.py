@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from ..common.errors import InputError, either, quoted
+from ..common.errors import InputError, check_known, either, quoted
 from ..common.files import check_new_file, check_new_folder, check_output, holds, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.tables import shown
@@ -121,8 +121,7 @@ def export_file(
     is_scene = path.suffix.lower() == ".toml"
     kind = "a scene" if is_scene else "a modal body" if is_modal_body_file(path) else "results"
     known = FORMATS[kind]
-    if file_format not in known:
-        raise InputError(f'{path}: --format: expected one of {quoted(known)} of {kind}, found "{file_format}"')
+    check_known(file_format, known, f"{path}: --format: expected one of {quoted(known)} of {kind}")
     if analysis is not None and (kind == "a modal body" or file_format == "urdf"):
         raise InputError(f"{path}: --analysis: expected it with results and FMUs only, found {kind} as {file_format}")
     if side is not None and file_format not in SIDED:

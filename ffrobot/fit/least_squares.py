@@ -127,9 +127,17 @@ def fit_frequencies(
     deviation, correlation = _uncertainty(J, r, known=uncertainty is not None)
     before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, found.x))
     return Fit(
-        tuple(keys), as_floats(start), as_floats(start * np.exp(found.x)), deviation, correlation,
-        tuple(labels), as_floats(measured), as_floats(before), as_floats(after), uncertainty,
-    )  # fmt: skip
+        keys=tuple(keys),
+        start=as_floats(start),
+        value=as_floats(start * np.exp(found.x)),
+        relative_deviation=deviation,
+        correlation=correlation,
+        labels=tuple(labels),
+        measured=as_floats(measured),
+        before=as_floats(before),
+        after=as_floats(after),
+        uncertainty=uncertainty,
+    )
 
 
 def check_distinguishable(J: Array, keys: Sequence[str]) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..common.arrays import Array, Booleans, Indices
-from ..common.errors import InputError, SolveError, did_you_mean, quoted
+from ..common.errors import InputError, SolveError, check_known, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
 from ..common.interrupts import SIGNALS, end_with_parent
 from ..common.keys import MOST_RUNS
@@ -150,7 +150,15 @@ def plan_map(
     if orientation == "auto":
         keeps = axes[0].is_place and any(path.orientation is not None for path in loaded.trajectory)
     omega = np.zeros(0) if frequencies is None else frequencies
-    return MapPlan(scene, axes, point or default_point(loaded), keeps, count, omega, folder)
+    return MapPlan(
+        scene=scene,
+        axes=axes,
+        point=point or default_point(loaded),
+        keeps_orientation=keeps,
+        count=count,
+        frequencies=omega,
+        folder=folder,
+    )
 
 
 def default_point(scene: Scene) -> str:
@@ -197,11 +205,7 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
 def check_point(solution: Solution, point: str) -> None:
     """Raise `InputError` where the robot has no such point."""
     known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
-    if point not in known:
-        raise InputError(
-            f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{point}"'
-            f"{did_you_mean(point, known)}"
-        )
+    check_known(point, known, f"{solution.scene.path}: --point: expected one of {quoted(known)}")
 
 
 def _judged(

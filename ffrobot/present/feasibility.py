@@ -13,7 +13,7 @@ from rich.table import Table
 
 from ..actuation.motor_catalog import JointTask, MotorChoice, choices, read_catalog
 from ..actuation.motors import MotorFeasibility
-from ..common.errors import InputError, quoted
+from ..common.errors import InputError, check_known, quoted
 from ..results.file import Results
 from .lines import plain_table, print_table
 
@@ -27,10 +27,9 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
                 f"{path}: expected an analysis with motors or patches, found none: joints of kinematic loops have"
                 " motors with motor = true alone"
             )
-        if analysis is not None and analysis not in judged:
-            raise InputError(
-                f'{path}: --analysis: expected an analysis with motors or patches, {quoted(judged)}, found "{analysis}"'
-            )
+        if analysis is not None:
+            wanted = f"an analysis with motors or patches, {quoted(judged)}"
+            check_known(analysis, judged, f"{path}: --analysis: expected {wanted}")
         wanted = judged if analysis is None else [analysis]
         return Group(*(table for name in wanted for table in _tables(results, name)))
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 
 from ..common.arrays import Array
-from ..common.errors import InputError, did_you_mean
+from ..common.errors import InputError, check_known
 from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_mass, read_modal_body
@@ -56,8 +56,7 @@ class LinkAccess(Datasets):
 
     def _modal_path(self, name: str) -> Path:
         files = self.modal_files
-        if name not in files:
-            raise InputError(f'{self.path}: expected a flexible body, found "{name}"{did_you_mean(name, files)}')
+        check_known(name, files, f"{self.path}: expected a flexible body")
         file = files[name]
         for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
             if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:

@@ -7,7 +7,7 @@ import platform
 import sys
 from pathlib import Path
 
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, check_known, quoted
 from ...common.version import VERSION
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
@@ -73,8 +73,8 @@ def _unit(scene: Scene, analysis: Forward) -> tuple[Model, ForwardUnit]:
 
 def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
     analyses = {each.name: each for each in scene.analysis}
-    if name is not None and name not in analyses:
-        raise InputError(f'{path}: --analysis: expected one of {quoted(analyses)}, found "{name}"')
+    if name is not None:
+        check_known(name, analyses, f"{path}: --analysis: expected one of {quoted(analyses)}")
     fitting = (each for each in scene.analysis if isinstance(each, Forward) and each.actuation is None)
     if (chosen := next((each for each in fitting if name in (None, each.name)), None)) is not None:
         return chosen

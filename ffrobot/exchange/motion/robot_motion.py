@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...common.arrays import Array, as_list, as_rows
-from ...common.errors import InputError, did_you_mean, quoted
+from ...common.errors import InputError, check_known, quoted
 from ...common.extras import extras
 from ...common.tables import as_csv
 from ...results.file import Results
@@ -72,11 +72,8 @@ def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> Join
     """
     with Results(path) as results:
         known = [name for name in results.analyses if any(_moving(results, name))]
-        if analysis is not None and analysis not in results.analyses:
-            raise InputError(
-                f"{path}: --analysis: expected one of {quoted(results.analyses)}, found"
-                f' "{analysis}"{did_you_mean(analysis, results.analyses)}'
-            )
+        if analysis is not None:
+            check_known(analysis, names := results.analyses, f"{path}: --analysis: expected one of {quoted(names)}")
         if not known or analysis not in (None, *known):
             raise InputError(f"{path}: expected an analysis with joints that move, found none in {analysis or 'it'}")
         name = analysis or known[0]

@@ -30,7 +30,7 @@ SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of s
 
 
 @dataclass(frozen=True, eq=False)
-class FlexibleLink:
+class ImportedLink:
     """A link of the URDF that a link file describes; its interface "root" is at the carrying joint.
 
     Attributes:
@@ -50,7 +50,7 @@ class FlexibleLink:
     remarks: tuple[str, ...]
 
 
-def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str) -> FlexibleLink:
+def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str) -> ImportedLink:
     """The link `name` from the link file at `source`, for a scene in `folder`, where its file is `stem`.toml.
 
     Raises:
@@ -77,7 +77,7 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     read_link(LinkTable(keys, folder / file_name))
     if part is not None:  # only now: the check above cannot go up from a folder that is not there yet
         geometry["file"] = os.path.relpath(part, folder.resolve())
-    return FlexibleLink(name, file_name, place, keys, point_of, tuple(remarks))
+    return ImportedLink(name, file_name, place, keys, point_of, tuple(remarks))
 
 
 def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:

@@ -18,7 +18,7 @@ from ...fe_models.link import cached_modal_body
 from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import from_modal_body
 from .bodies import is_possible, mechanism
-from .flexible import FlexibleLink, flexible_link
+from .flexible import ImportedLink, flexible_link
 from .read import lines_of, read_urdf
 from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of
 from .scene import SceneOfRobot
@@ -28,7 +28,7 @@ SAME = 1e-9  # relative: less is round-off
 
 
 def _in_place_of(
-    robot: Robot, link: FlexibleLink, folder: Path, *, keep_rest: bool
+    robot: Robot, link: ImportedLink, folder: Path, *, keep_rest: bool
 ) -> tuple[dict[str, Any] | None, list[str]]:
     """Payload that makes up for the difference to the <inertial> of the URDF, where it is to be kept; and remarks.
 
@@ -153,7 +153,7 @@ class Imported:
 
     robot: Robot
     scene: Mapping[str, Any]
-    flexible: tuple[FlexibleLink, ...]
+    flexible: tuple[ImportedLink, ...]
     remarks: tuple[str, ...]
     masses: tuple[MeshMass, ...]
     files: tuple[Path, ...]
@@ -210,7 +210,7 @@ def import_urdf(
 
 
 def _scene(
-    urdf: Path, robot: Robot, links: Mapping[str, FlexibleLink], folder: Path, *, fix_inertia: bool
+    urdf: Path, robot: Robot, links: Mapping[str, ImportedLink], folder: Path, *, fix_inertia: bool
 ) -> SceneOfRobot:
     shapes = (shape for link in robot.links.values() for shape in link.visual)
     paths = {shape.filename: mesh_path(shape.filename, urdf) for shape in shapes if isinstance(shape, MeshFile)}
@@ -224,7 +224,7 @@ def _scene(
 
 
 def _compared(
-    robot: Robot, links: Mapping[str, FlexibleLink], folder: Path, scene: SceneOfRobot, *, keep_rest: bool
+    robot: Robot, links: Mapping[str, ImportedLink], folder: Path, scene: SceneOfRobot, *, keep_rest: bool
 ) -> tuple[list[dict[str, Any]], list[str]]:
     payloads, remarks = [], list[str]()
     for link in links.values():

@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from ...common.errors import InputError, did_you_mean, quoted
+from ...common.errors import InputError, check_known, quoted
 from ...common.rotations import of_quaternion, of_rpy, rpy_of
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_bytes
@@ -262,8 +262,7 @@ def _joint(element: Element) -> UrdfJoint:
     name = _name(element)
     label = f'joint "{shown(name)}"'
     kind = element.get("type", "")
-    if kind not in TYPES:
-        raise InputError(f'{label}: type: expected one of {quoted(TYPES)}, found "{shown(kind)}"')
+    check_known(kind, TYPES, f"{label}: type: expected one of {quoted(TYPES)}")
     axis = element.find("axis")
     along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>"))
     if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
@@ -371,9 +370,7 @@ def root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
     for joint in joints:
         label = f'joint "{shown(joint.name)}"'
         for kind, name in (("parent", joint.parent), ("child", joint.child)):
-            if name not in links:
-                near = did_you_mean(name, links)
-                raise InputError(f'{label}: <{kind}>: expected a link of the file, found "{shown(name)}"{near}')
+            check_known(name, links, f"{label}: <{kind}>: expected a link of the file")
         if joint.child in carried:
             raise InputError(
                 f'{label}: expected one joint that carries link "{shown(joint.child)}", found a second one, "'
@@ -400,9 +397,7 @@ def check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
     for joint in joints.values():
         label, chain = f'joint "{shown(joint.name)}": <mimic>', [joint.name]
         while (follows := joints[chain[-1]].mimic) is not None:
-            if follows.joint not in joints:
-                near = did_you_mean(follows.joint, joints)
-                raise InputError(f'{label}: expected a joint of the file, found "{shown(follows.joint)}"{near}')
+            check_known(follows.joint, joints, f"{label}: expected a joint of the file")
             if follows.joint in chain:
                 raise InputError(
                     f"{label}: expected a joint that moves freely at the end of the chain, found a circle:"

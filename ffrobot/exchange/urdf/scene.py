@@ -13,7 +13,7 @@ from ...common.rotations import rpy_of
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
 from .bodies import Mechanism, MergedLinks
-from .flexible import FlexibleLink
+from .flexible import ImportedLink
 from .robot import HERE, MeshFile, Names, Origin, Primitive, Robot, UrdfJoint, three
 
 GRAVITY = [0.0, 0.0, -9.81]
@@ -34,7 +34,7 @@ class SceneOfRobot:
     """Scene made from a URDF: `keys` of the file, and `remarks` on what it could not keep."""
 
     def __init__(
-        self, robot: Robot, mechanism: Mechanism, flexible: Mapping[str, FlexibleLink], meshes: Mapping[str, str]
+        self, robot: Robot, mechanism: Mechanism, flexible: Mapping[str, ImportedLink], meshes: Mapping[str, str]
     ) -> None:
         """`meshes` are files from the folder of the scene on, by the names that the URDF has for them."""
         self.robot, self.mechanism, self.flexible, self.meshes = robot, mechanism, flexible, meshes

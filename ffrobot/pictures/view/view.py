@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from ...common.arrays import Array, Indices, Integers, NDArray, as_rows
-from ...common.errors import InputError, SolveError, did_you_mean
+from ...common.errors import InputError, SolveError, check_known
 from ...common.files import check_folder, write_atomically
 from ...common.hdf5 import image_of, in_memory
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
@@ -292,12 +292,10 @@ def _modal_body(path: Path) -> View:
 
 def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
-        analyses = results.analyses if options.analysis is None else [options.analysis]
-        if options.analysis is not None and options.analysis not in results.analyses:
-            near = did_you_mean(options.analysis, results.analyses)
-            raise InputError(
-                f'{path}: analysis: expected one of {", ".join(results.analyses)}, found "{options.analysis}"{near}'
-            )
+        analyses = results.analyses
+        if options.analysis is not None:
+            check_known(options.analysis, analyses, f"{path}: analysis: expected one of {', '.join(analyses)}")
+            analyses = [options.analysis]
         times = np.concatenate([results.time(name) for name in analyses])
         if options.time is not None and not times.min() <= options.time <= times.max():
             span = f"{times.min():g} to {times.max():g} s"
