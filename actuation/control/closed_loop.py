@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
@@ -47,7 +47,7 @@ from .margins import Feedback, lowest_frequency
 from .metrics import LoopMotion, last_change, place_of_tip
 from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
-from .records import SampledAnalysis
+from .records import SampledAnalysis, Sensor
 from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input_names, needed_sensors
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged, readings_at
 
@@ -76,14 +76,7 @@ class ClosedLoop(SampledAnalysis):
         source = context.outcomes[self.actuation]
         plant = with_compliance(without_paths(context.model))
         moved, robot, whole = with_motor_coordinates(source, plant), _robot(context, source), context.whole
-        own = [s for sensor in self.sensor for s in make_signals(plant, context, sensor, whole)]
-        needed = (
-            needed_sensors(robot, self.controller)
-            if self.observer is None
-            else estimated_sensors(robot, self.controller, self.tip or default_tip(robot.model))
-        )
-        more = [s for sensor in needed for s in make_signals(plant, context, sensor, whole)]
-        read, estimated = (merged(own, more), ()) if self.observer is None else (tuple(own), merged(more, ()))
+        read, estimated = self._signals(context, plant, robot)
         sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
         outputs, tip = replay_times(source, self), place_of(whole, self.tip) or default_tip(plant)
         models = loop_models(plant, source.time, moved, context.patches, read)
@@ -111,8 +104,7 @@ class ClosedLoop(SampledAnalysis):
             feed_forward=_feed_forward(context, self, source, moved, samples),
             source=robot.source,
         )
-        amplifiers = joined(context.patches.values())
-        ranges = command_ranges(context.model, context.patches)
+        amplifiers, ranges = joined(context.patches.values()), command_ranges(context.model, context.patches)
         if self.unlimited:
             amplifiers, ranges = amplifiers.unlimited(), np.inf * np.sign(ranges)
         observed = None
@@ -164,6 +156,20 @@ class ClosedLoop(SampledAnalysis):
             return replace(of, commanded=commanded, details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
+
+    def _signals(
+        self, context: ActuatedContext, plant: Model, robot: ControlledRobot
+    ) -> tuple[tuple[Signal, ...], tuple[Signal, ...]]:
+        """What sensors read, those that controllers need included, and what an observer estimates instead of these."""
+
+        def signals(sensors: Iterable[Sensor]) -> list[Signal]:
+            return [s for sensor in sensors for s in make_signals(plant, context, sensor, context.whole)]
+
+        own = signals(self.sensor)
+        if self.observer is None:
+            return merged(own, signals(needed_sensors(robot, self.controller))), ()
+        tip = self.tip or default_tip(robot.model)
+        return tuple(own), merged(signals(estimated_sensors(robot, self.controller, tip)), ())
 
 
 def _resolved(source: Run) -> Run:
