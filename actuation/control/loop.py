@@ -219,7 +219,7 @@ def between(times: Array, known: Array, values: Array) -> Array:
 
 
 def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float) -> Array:
-    """Commands (T, inputs) that act at `times`, or `after` (s) them: accelerations are those before a change."""
+    """Commands (T, inputs) in effect `after` seconds past `times` (T,), s, where `samples` are held after `delay`."""
     taken = slice(loop.taken)
     which = np.searchsorted(samples[taken] + delay, times + after, side="right")
     return np.vstack([loop.first, loop.commands[taken]])[which]

@@ -195,7 +195,7 @@ def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[f
 
 
 def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> LayerLoads:
-    """C (4, 4) and f (4,) of the layers, 0 but in the rows that feel them, the section free in those that do not.
+    """Loads C (4, 4) and f (4,) of the layers in the rows that feel them, the section free in the others, else 0.
 
     Free means that link and layers together carry nothing there: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f), eliminated.
     """

@@ -70,7 +70,7 @@ def plain_table(*headers: str, names: int = 2) -> Table:
 
 
 def named_tables(first: str, rows: Iterable[tuple[str, Mapping[str, str]]]) -> Iterator[Table]:
-    """A table of rows by heading (`results.tables`), below `first` their names; none of no rows."""
+    """Yield a table of named rows (see `results.tables`), the names in the column `first`; none without rows."""
     named = list(rows)
     if named:
         table = plain_table(first, *named[0][1])

@@ -136,7 +136,10 @@ class AnalysisAccess(Datasets):
         return analysis or known[0]
 
     def export_linear(self, analysis: str | None, path: Path) -> str:
-        """Write linear models, by default of the first with any, or a loop's controller to .npz or .mat; its name."""
+        """Write linear models (default: of the first analysis with any), or a loop's controller, to .npz or .mat.
+
+        Returns the name of the analysis.
+        """
         from .linear import save_models
 
         save_models(self.state_spaces(name := self.linear_analysis(analysis)), path)

@@ -68,7 +68,7 @@ def with_scene(solution: Solution, scene: Scene) -> Solution:
 
 
 def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher) -> Solution:
-    """The scene with the bodies named in so many pieces each, nothing solved yet: equations are those of the pieces."""
+    """Divide the named bodies into the given numbers of pieces; returned unsolved, with equations of the pieces."""
     divided = bodies_in_pieces(solution.scene, counts)
     if not divided and not solution.divided:
         return solution

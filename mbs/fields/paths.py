@@ -88,7 +88,7 @@ def shifted(coefficients: Array, s: Array | float) -> Array:
 
 
 def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = None) -> Piecewise:
-    """Σ weight · motion (weights 1 where not given), each held before and after itself."""
+    """Sum of weight · motion (weights 1 where not given); each motion rests before its begin and after its end."""
     breaks = merged(np.concatenate([motion.breaks for motion in motions]))
     middles = 0.5 * (breaks[1:] + breaks[:-1])
     order = max(motion.coefficients.shape[1] for motion in motions)

@@ -83,7 +83,7 @@ class Waypoints:
 
     @property
     def abrupt_hold(self) -> str:
-        """A remark on the hold of a record that its rows do not come to: they turn there, or have few digits.
+        """Remark on a hold that the record does not approach smoothly: rows turn there, or have too few digits.
 
         By accelerations of the spline in the two intervals before and after it, next to those of the rows.
         """

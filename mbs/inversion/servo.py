@@ -163,7 +163,7 @@ class Servo:
 
     @cached_property
     def of_modes(self) -> Indices:
-        """Places (n,) of all modes along v."""
+        """Indices (n,) in v of the modal coordinates of all links."""
         return np.flatnonzero(~self.model.tree.joint_columns)
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:

@@ -100,7 +100,7 @@ class MultibodySystem:
         return in_plane(self._parts, ~self.model.loop_rows)
 
     def lie_in_plane(self, directions: Sequence[Array]) -> bool:
-        """Whether all moves in a plane, and these (3,), global axes, lie in it."""
+        """Whether the mechanism moves in a plane, in which `directions` (3,), global axes, lie, too."""
         plane = self.plane
         return plane is not None and all(abs(plane.axes[2] @ direction) <= EXACT for direction in directions)
 

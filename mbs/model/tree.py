@@ -104,7 +104,7 @@ class KinematicTree:
         return Section(self.index[body], point, own, np.zeros(3))
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
-        """The tree with a body without inertia, of a label, on each joint with a rotor and one coordinate.
+        """Return the tree with a massless body, named by a label, on each one-coordinate joint with a rotor.
 
         They turn or slide on the sections `inner` as the outputs of the rotors' gears do, and stand after all others.
         """

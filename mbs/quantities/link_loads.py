@@ -41,7 +41,7 @@ def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
 
 
 def loads_in_equations(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Return the loads on `bodies` as in their equations, with trajectory forces where they act."""
+    """Return the loads that the equations apply to `bodies`, trajectory forces included."""
     return _link_loads(run, bodies, acting_forces(behind_gears(run)))
 
 

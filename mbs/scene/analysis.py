@@ -159,7 +159,7 @@ class TimedAnalysis(Analysis):
 
 
 class IntegratedAnalysis(TimedAnalysis):
-    """`integrator`: see `mbs.run.integrators` for "auto"."""
+    """Base of analyses integrated over time. `integrator`: see `mbs.run.integrators` for "auto"."""
 
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     """Method of integration; "auto" chooses."""

@@ -101,7 +101,7 @@ class Transition:
 
     @property
     def units(self) -> Array:
-        """V by which shares count (m,): the larger of the two limits of a patch."""
+        """Voltages (m,), V, that scale the unknowns: the larger of the two limits of each patch."""
         return np.abs(self.ranges["voltage"]).max(axis=0)
 
     @property

@@ -217,7 +217,7 @@ class _Posed:
 
 
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
-    """V, and how uncertain, as in `TrackedPath`, of another model of the same robot; NaN where no motion is found."""
+    """Least voltage, V, and its uncertainty (see `TrackedPath`) for another model of the robot; NaN if not found."""
     posed = _pose(model, patches, analysis, lambda: True)
     least = settled(posed.asked, posed.coarse, lambda: True)
     voltage = least.share * float(posed.asked.units.max()) if least.converged else float("nan")
