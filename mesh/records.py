@@ -36,7 +36,7 @@ class RectangleSection(Record):
 
 
 class CircleSection(Record):
-    """Solid circular section."""
+    """Solid circle."""
 
     shape: Literal["circle"]
     diameter: Positive
@@ -44,7 +44,7 @@ class CircleSection(Record):
 
 
 class TubeSection(Record):
-    """Circular tube section."""
+    """Circular tube."""
 
     shape: Literal["tube"]
     outer: Positive

@@ -74,7 +74,7 @@ Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
 
 
 class Material(Record):
-    """Linear elastic, isotropic material."""
+    """Linear elastic, isotropic."""
 
     youngs_modulus: Positive
     """Young's modulus E, Pa."""
@@ -122,7 +122,7 @@ class Region(Record):
 
 
 class BeamModel(Record):
-    """Beam theory of a link."""
+    """Beam theory."""
 
     theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
     """Beam theory: without shear, or with shear and rotary inertia of the sections."""
