@@ -28,8 +28,8 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
                 " motors with motor = true alone"
             )
         if analysis is not None:
-            wanted = f"an analysis with motors or patches, {quoted(judged)}"
-            check_known(analysis, judged, f"{path}: --analysis: expected {wanted}")
+            known = f"an analysis with motors or patches, {quoted(judged)}"
+            check_known(analysis, judged, f"{path}: --analysis: expected {known}")
         wanted = judged if analysis is None else [analysis]
         return Group(*(table for name in wanted for table in _tables(results, name)))
 
