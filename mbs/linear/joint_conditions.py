@@ -31,7 +31,7 @@ class RobotModes:
     # largest entry real
     shape: ComplexArray
     motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
-    rounding: float  # 1/s, by which a double pole at 0 may be off: `RIGID` times the `pace`
+    rounding: float  # 1/s, by which a double pole at 0 may be off: `RIGID` √‖K̂‖
 
     @property
     def frequency(self) -> Array:
@@ -73,7 +73,8 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     Z = Z * (np.abs(largest) / largest) / np.linalg.norm(Z, axis=0)
     shape = (back @ Z).T
     motion = shape @ transformation.T
-    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), RIGID * pace(K, D))
+    rounding = RIGID * pace(K, 0.0 * D)
+    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), rounding)
 
 
 def pace(K: Array, D: Array) -> float:
