@@ -73,7 +73,7 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     Z = Z * (np.abs(largest) / largest) / np.linalg.norm(Z, axis=0)
     shape = (back @ Z).T
     motion = shape @ transformation.T
-    rounding = RIGID * pace(K, 0.0 * D)
+    rounding = RIGID * float(np.sqrt(np.linalg.norm(K, 2))) if len(K) else 0.0
     return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), rounding)
 
 
