@@ -67,12 +67,14 @@ def smooth(
     from ..smooth.printed import print_smooth, write_page
     from ..smooth.smoothing import maker_of, smooth_motion
 
-    protect([*files_of(scene_file), *([motion] if motion else [])])
+    controllers = _servo(servo)
+    tables = map(Path, controllers.values() if isinstance(controllers, dict) else [controllers])
+    protect([*files_of(scene_file), *([motion] if motion else []), *tables])
     target = output or scene_file.with_suffix(".smooth.json")
     maker_of(target)  # its ending is known to be wrong before a robot is simulated
     with Display() as display:
         found = smooth_motion(
-            scene_file, motion, servo=_servo(servo), damping_ratio=damping_ratio, point=point,
+            scene_file, motion, servo=controllers, damping_ratio=damping_ratio, point=point,
             settled=settled, acceleration=acceleration or float("inf"), jerk=jerk or float("inf"),
             degrees=degrees, rate=rate, watcher=display,
         )  # fmt: skip

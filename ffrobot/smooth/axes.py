@@ -19,7 +19,9 @@ APART = 1e-4  # of a pole: nearer ones are moved so far apart, which changes G b
 UNITY = 1e-3  # by which G(0) may be off 1
 CLOSE = 0.01  # by which G may be off measured values (RMS) before more poles are tried
 PAIRS, FASTEST = (1, 2, 3), 10.0  # of poles, and how many times the largest measured frequency they may be
-LEAST = 4  # rows of a measured response
+OVERDAMPED = 1e3  # largest damping ratio of fitted poles, and one over the least
+POOR = 0.2  # of a measured response: a fit that is off by more (RMS) is none
+LEAST = 4  # rows of a measured response, at as many frequencies
 COLUMNS = ["frequency", "magnitude", "phase"]
 
 
@@ -94,9 +96,18 @@ def _measured(path: Path) -> Axis:
         expected = f"columns {','.join(COLUMNS)} and at least {LEAST} rows"
         raise InputError(f"{path}: expected {expected}, found {','.join(header)!r} and {len(rows)}")
     frequency, magnitude, phase = np.transpose([numbers_of(path, line, row, 3) for line, row in rows])
-    if min(frequency.min(), magnitude.min()) <= 0.0:
-        raise InputError(f"{path}: expected frequencies and magnitudes above 0, found others")
-    return fitted(frequency, magnitude * np.exp(1j * np.radians(phase)))
+    if min(frequency.min(), magnitude.min()) <= 0.0 or len(np.unique(frequency)) < LEAST:
+        raise InputError(f"{path}: expected magnitudes above 0 at {LEAST} or more frequencies above 0, found others")
+    response = magnitude * np.exp(1j * np.radians(phase))
+    axis = fitted(frequency, response)
+    missed, size = (np.sqrt(np.mean(np.abs(of) ** 2)) for of in (axis.at(2j * np.pi * frequency) - response, response))
+    off = float(missed / min(size, 1.0))
+    if not off <= POOR:
+        raise InputError(
+            f"{path}: expected magnitudes (1 at low frequencies, not dB) and phases (degrees, negative where motors"
+            f" lag) of a controller, found ones that {2 * PAIRS[-1]} poles are {100 * off:.0f} % off (RMS)"
+        )
+    return axis
 
 
 def fitted(frequency: Array, response: ComplexArray) -> Axis:
@@ -124,6 +135,7 @@ def fitted(frequency: Array, response: ComplexArray) -> Axis:
         start[-1] = 0.01
         low, high = np.full((2, len(start)), np.inf) * [[-1.0], [1.0]]
         low[-1], high[:pairs] = 0.0, np.log(FASTEST * np.abs(s).max() / unit)
+        low[pairs : 2 * pairs], high[pairs : 2 * pairs] = -np.log(OVERDAMPED), np.log(OVERDAMPED)
         fit = least_squares(partial(off, pairs=pairs), start, bounds=(low, high), x_scale="jac")
         error = float(np.sqrt(2 * fit.cost / len(s)))
         words = f"measured: {2 * pairs} poles, delay {1e3 * fit.x[-1] / unit:.3g} ms, off by {100 * error:.2g} % (RMS)"

@@ -103,7 +103,7 @@ class _Search:
         yield f"slower by {100 * (factor - 1):.3g} %", values, values, None
         name, values = self._first(sorted(self._shaped(kept[0][1]), key=lambda one: len(one[1])))
         yield f"shaped by {name}", values, values, None
-        if self.robot.has_gears:
+        if self.robot.has_gears and self.robot.servo.is_invertible:
             yield self._inverted(kept)
 
     def _inverted(self, averaged: Sequence[tuple[float, Array]]) -> Motion:

@@ -19,6 +19,7 @@ from .drawn import picture
 from .smoothing import Smoothed
 
 MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit", "torque")
+STUBBORN = "controllers have zeros that decay too slowly for inversion"
 COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by it alone (mm)")
 
 
@@ -74,6 +75,7 @@ def _lines(found: Smoothed) -> list[tuple[str, str]]:
         *(("note", remark) for remark in before.recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
         *([("settling", _settling(found))] if before.frequencies.size else []),
+        *([] if found.robot.servo.is_invertible else [("note", STUBBORN)]),
     ]  # fmt: skip
 
 

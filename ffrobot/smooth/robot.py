@@ -156,7 +156,7 @@ class Robot:
             k = self.joints.index(joint)
             position[:, k], rate[:, k] = gear.angle, gear.rate
         moments = np.column_stack([motor_moments(found.run)[joint] for joint in self.joints])
-        around = (self.servo.margins(times[1]), (0, 0))
+        around = (np.ceil(np.array(self.servo.margins) / times[1]).astype(int), (0, 0))
         position, moments = (np.pad(of, around, "edge") for of in (position, moments))
         command = self.servo.command(times[1], position, np.pad(rate, around))
         command[[0, -1]] = position[[0, -1]]  # at rest, whatever derivatives jump there

@@ -15,6 +15,7 @@ from .axes import Axis
 
 ROUNDED = 9  # digits of times (s) of delayed set points
 LEFT = 1e-6  # of a step: what the controller has left to do counts as done
+LASTING = 10.0  # s of set points before or after a motion, at most, in which zeros of controllers decay
 PART = 0.5  # of 1/|pole| at most between the nodes of a motor's path: its quintics are off by 3e-7 of a step
 
 
@@ -59,12 +60,17 @@ class Servo:
             left = decaying[-1]
         return quintics(np.concatenate(nodes), np.concatenate(states))
 
-    def margins(self, step: float) -> tuple[int, int]:
-        """By how many steps (s) set points of `command` begin before motors, and end after them: zeros of G decay."""
+    @property
+    def margins(self) -> tuple[float, float]:
+        """By how long (s) set points of `command` begin before motors, and end after them: zeros of G decay."""
         zeros = np.concatenate([np.roots(axis.numerator) for axis in self.axes]).astype(complex)
         before, after = _decay(zeros[zeros.real > 0.0]), _decay(zeros[zeros.real <= 0.0])
-        after += float(np.ptp([axis.delay for axis in self.axes]))
-        return int(np.ceil(before / step)), int(np.ceil(after / step))
+        return before, after + float(np.ptp([axis.delay for axis in self.axes]))
+
+    @property
+    def is_invertible(self) -> bool:
+        """Whether `margins` are short: not of zeros near the imaginary axis, which decay slowly or never."""
+        return max(self.margins) <= LASTING
 
     def command(self, step: float, position: Array, rate: Array) -> Array:
         """Set points (T, n) every `step` s for motors' positions and rates (T, n) that rest at both ends.
@@ -82,8 +88,9 @@ class Servo:
 
 
 def _decay(poles: ComplexArray) -> float:
-    """How long (s) until `LEFT` of the slowest is left; 0 without any."""
-    return float(-np.log(LEFT) / np.abs(poles.real).min(initial=np.inf))
+    """How long (s) until `LEFT` of the slowest is left; 0 without any, infinite on the imaginary axis."""
+    slowest = float(np.abs(poles.real).min(initial=np.inf))
+    return float(-np.log(LEFT)) / slowest if slowest else np.inf
 
 
 def quintics(nodes: Array, states: Array) -> Piecewise:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError, SolveError, did_you_mean, either, quoted
+from ..common.errors import InputError, SolveError, check_known, either, quoted
 from ..common.files import AnyPath
 from ..common.structs import struct
 from ..exchange.export import Content, write_content
@@ -159,10 +159,9 @@ def _servo(scene: Scene, servo: float | str | Mapping[str, float | str], ratio: 
     """The controllers of all joints with motors."""
     joints = [joint.name for joint in scene.motor_joints]
     by_joint = servo if isinstance(servo, Mapping) else dict.fromkeys(joints, servo)
-    if by_joint.keys() != set(joints):
-        wrong = next(iter(by_joint.keys() ^ set(joints)))
-        raise InputError(
-            f'{scene.path}: servo: expected one of all of {quoted(joints)}, found "{wrong}" in only one of both'
-            f"{did_you_mean(wrong, joints)}"
-        )
+    expected = f"{scene.path}: servo: expected one controller of each of {quoted(joints)}"
+    for joint in by_joint:
+        check_known(joint, joints, expected)
+    if missing := [joint for joint in joints if joint not in by_joint]:
+        raise InputError(f"{expected}, found none of {quoted(missing)}")
     return Servo(tuple(axis_of(by_joint[joint], ratio) for joint in joints))

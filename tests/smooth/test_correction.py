@@ -144,3 +144,31 @@ def test_inversion_is_of_measured_controllers_too(tmp_path):
         command, _ = model.inverted(times, law)
         ride = model.ride(0.001 * np.arange(len(command)), command)
         assert ride.settling.residual < 2e-3 * 1e-4 * 19.14325
+
+
+def test_controllers_whose_zeros_ring_for_ever_are_not_inverted(tmp_path):
+    """1 + (s/100)² is on the imaginary axis: no set points make up for what it stops."""
+    path = table(tmp_path / "path.csv", TIMES, hub=WAY * LAWS["trapezoid"].sample(TIMES)[:, 0])
+    found = smooth_motion(axis(tmp_path), path, servo="1e-4 0 1 / 1e-8 4e-6 6e-4 4e-2 1", settled=1e-3)
+    assert found.best.residual < 1e-3
+    assert not any(one.name.startswith("inverted") for one in found.candidates)
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        (lambda f, G: (f, 20 * np.log10(abs(G)) + 60, np.degrees(np.angle(G))), "not dB"),
+        (lambda f, G: (f, abs(G), -np.degrees(np.angle(G))), "degrees, negative where motors lag"),
+        (lambda f, G: (0 * f + 1, abs(G), np.degrees(np.angle(G))), "at 4 or more frequencies"),
+    ],
+)
+def test_tables_that_are_no_response_of_a_controller(tmp_path, ffrobot, columns, expected):
+    """And no command writes over one."""
+    f = np.linspace(1.0, 60.0, 40)
+    G, path = axis_of(SERVO, RATIO).at(2j * np.pi * f), tmp_path / "g.csv"
+    np.savetxt(path, np.transpose(columns(f, G)), delimiter=",", header="frequency,magnitude,phase", comments="")
+    with pytest.raises(InputError, match=expected):
+        axis_of(str(path), RATIO)
+    axis(tmp_path)
+    done = ffrobot("smooth", "scene.toml", "--servo", "g.csv", "-o", "g.csv", "--force", cwd=tmp_path)
+    assert done.returncode == 2
