@@ -144,8 +144,11 @@ class ClosedLoop(SampledAnalysis):
         quiet = max((last_change(partial(_values, of, self), outputs) for of in _exciting(plant, self)), default=0.0)
         runs = _followed(run, place_at, held, tip, quiet), _followed(closer, place_at, held, tip, quiet)
         readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
-        loops = loops_about(setup, begun, readings[: loop.taken], models, filters(read, self.sample_time))
+        found = loops_about(setup, begun, readings[: loop.taken], models)
+        filtering = filters(read, self.sample_time)
+        loops = [(model, feedback.behind(*filtering)) for model, feedback in found]
         record = loop_record(self, setup, loop, acting, runs, loops, lowest, gears=bool(plant.tree.gears))
+        record = replace(record, feedback=found[0][1] if found else None)
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T
             names = [each.name for each in estimated]
@@ -208,12 +211,8 @@ def loops_about(
     controllers: Sequence[Controller],
     readings: Array,
     models: Sequence[LinearModel],
-    filtering: tuple[Array, Array, Array, Array],
 ) -> list[tuple[LinearModel, Feedback]]:
-    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there.
-
-    `filtering`: of readings before controllers get them.
-    """
+    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there."""
     is_asked_in_order = any(isinstance(controller, PythonControl) for controller in controllers)
     latest = 0 if is_asked_in_order else max(len(setup.times) - LONGEST, 0)
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
@@ -228,9 +227,7 @@ def loops_about(
     found = [(model, at(min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
     of, motors = joined(setup.patches.values()), np.zeros((2, len(setup.robot.motors)))
     late = np.hstack([motors, np.stack([of.lag, of.delay])])
-    known = [
-        (model, replace(feedback.behind(*filtering), late=late)) for model, feedback in found if feedback is not None
-    ]
+    known = [(model, replace(feedback, late=late)) for model, feedback in found if feedback is not None]
     return known if len(known) == len(found) else []
 
 

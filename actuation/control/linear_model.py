@@ -89,7 +89,10 @@ class StateSpace:
 
 @struct
 class SampledController(StateSpace):
-    """Controllers of a loop, with observer and filters of sensors: from readings to commands, off the reference."""
+    """Controllers of a loop, with their observer: from readings to commands, off the reference.
+
+    Readings are those of sensors, behind their filters and delays; commands are those before limits.
+    """
 
     sample_time: float  # s
 

@@ -275,7 +275,6 @@ def loop_record(
         warnings=warnings,
         margins=found,
         advice=tuple(texts),
-        feedback=loops[0][1] if loops else None,
         poles=loop_eigenvalues(*loops[0], T, delay) if loops else None,
     )
 

@@ -219,12 +219,14 @@ def test_a_loop_with_an_observer_is_its_exact_discrete_model():
     assert results.attributes(group)["verdict"] == "stable"
 
 
-def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path):
-    """From readings off the reference to commands; dt of python-control, matrices of a file, a table in C."""
+@pytest.mark.parametrize("late", [0.0, 3 * T])
+def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late):
+    """From (late) readings off the reference to commands; dt of python-control, matrices of a file, a table in C."""
     control = pytest.importorskip("control")
     push = [{"point": "w.rim", "y": "1"}]
     results = ffrobot.solve(
-        wheel(sensor=[ENCODER], controller=[PID], observer=KALMAN, disturbance=push), output=tmp_path / "w.results.h5"
+        wheel(sensor=[ENCODER | {"delay": late}], controller=[PID], observer=KALMAN, disturbance=push),
+        output=tmp_path / "w.results.h5",
     )
     system = results.controller("loop").to_control()
     assert system.dt == pytest.approx(T)
