@@ -239,6 +239,13 @@ WRONG = {
 }  # fmt: skip
 
 
+def test_a_scene_is_in_a_folder(tmp_path):
+    (tmp_path / "robot.urdf").write_text(robot(BASE, ARM, joint("j", "base", "arm")))
+    with pytest.raises(InputError, match=r"expected a folder for scene\.toml, found the name of a file: -o .*arm$"):
+        import_urdf(tmp_path / "robot.urdf", tmp_path / "arm.toml", {})
+    assert not (tmp_path / "arm.toml").exists()
+
+
 @pytest.mark.parametrize(("text", "expected"), WRONG.values(), ids=WRONG)
 def test_wrong_files(text, expected, tmp_path):
     (tmp_path / "robot.urdf").write_text(text)

@@ -258,6 +258,9 @@ def _comment(text: str) -> str:
 
 def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:
     check_folder(folder)
+    if folder.suffix.lower() == Path(SCENE).suffix and not folder.exists():
+        instead = f"-o {folder.with_suffix('')}"
+        raise InputError(f"{folder}: output: expected a folder for {SCENE}, found the name of a file: {instead}")
     paths = {folder / name: text.encode() for name, text in files.items()}
     if there := [path for path, text in paths.items() if path.exists() and not (force or holds(path, text))]:
         raise InputError(
