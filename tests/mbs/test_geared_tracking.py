@@ -175,7 +175,7 @@ def test_without_voltage_motors_alone_carry():
     moments = motor_moments(run)["O"][np.abs(run.time[:, None] - at).argmin(axis=0), 0]
     assert np.abs(moments - expected).max() < 2e-4  # a spline through outputs
     servo, Phi_V = strip(3, 0.6, 20)
-    problem = asked(servo, Phi_V, (-before, 0.6 + before), 1e-3)
+    problem = replace(asked(servo, Phi_V, (-before, 0.6 + before), 1e-3), weights=Weights(1.0, 1e-3, 0.002))
     breaks = np.unique(np.concatenate([graded(-before, 0.0, 40), np.linspace(0, 0.6, 97), graded(0.6, 0.94, 40)]))
     tracked = track(problem, breaks)
     assert np.abs(tracked.voltage(breaks)).max() < 1e-5
