@@ -20,12 +20,13 @@ from ...common.structs import struct
 from ..inversion.servo import Servo
 from ..joints.twist_spring import TwistSpring
 from ..model.gears import compliance, elastic_joints
+from ..model.known_motion import rotor_torques
 from ..model.model import Model
 from ..model.motors import turning_motors
 from ..model.nodes import rotor
 
 SAMPLES = 5  # along the path, at which the torque of a gear is found in two ways
-SAME = 1e-8  # of the largest torque of a gear, these two
+SAME = 1e-8  # of the largest torque of its motor, these two
 
 
 @struct
@@ -118,10 +119,36 @@ def with_gears(servo: Servo) -> Servo:
         inertia=np.array([inertia * ratio**2 for inertia, ratio in rotors]),
     )
     without = tuple(replace(servo, model=_without_rotor(model, node.joint.name)) for node in elastic)
-    return GearedServo(**{name: getattr(servo, name) for name in _FIELDS}, gears=gears, without=without)
+    geared = GearedServo(**{name: getattr(servo, name) for name in _FIELDS}, gears=gears, without=without)
+    _check_rotors(geared, np.array([ratio for _, ratio in rotors]))
+    return geared
 
 
 _FIELDS = ("model", "end", "factor", "near_times", "near", "where", "goes_on", "offset")
+
+
+def _check_rotors(servo: GearedServo, ratios: Array) -> None:
+    """Raise `InputError` for a rotor on a body that its own motor turns, so that links would feel the gear.
+
+    A gear transmits τ − N J ψ̈ with the spin ψ̇ of its rotor. Without the rotor a motor takes as much less only where
+    the body that carries the rotor does not turn along with it.
+    """
+    model, gears = servo.model, servo.gears
+    times: Array = servo.end * np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1]
+    still = np.zeros((SAMPLES, len(servo.scale)))
+    states = servo.motion.motion(as_list(times), still, still, still, servo.postures(times))
+    spin_up = rotor_torques(model, states, times)
+    torques = servo.forces(times, still, still, still)[1]
+    for k, joint in enumerate(gears.joints):
+        tau, tau_s = torques[:, gears.columns[k]], torques[:, k - len(gears.joints)]
+        off = tau - ratios[k] * spin_up[:, model.tree.carried[joint]] - tau_s
+        if np.abs(off).max() > SAME * np.abs(tau).max():
+            is_backwards = model.driven(joint).backwards
+            remedy = "Exchange its sides in `between`" if is_backwards else "Put the motor on another joint of the loop"
+            raise InputError(
+                f'{servo.where}: expected motors on bodies that they do not turn themselves for kind = "tracking" with'
+                f' compliant gears, found that of joint "{joint}" on its first body, which turns with it. {remedy}'
+            )
 
 
 def _without_rotor(model: Model, joint: str) -> Model:
