@@ -105,11 +105,6 @@ def _twice_as_many(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:
 def _check(solution: Solution, source: Run, finer: Solution, watcher: Watcher) -> FinerCheck:
     """Replay `source`, a run of `solution`, on the same robot with finer links."""
     scene = solution.scene
-    if not source.model.motors or finer.model.tree.gears or any(getattr(j, "stiffness", None) for j in scene.joint):
-        raise InputError(
-            f'{scene.path}: analysis "{source.analysis.name}": check: expected motors, and joints without stiffness,'
-            ' for "finer"'
-        )
     run = _replayed(source, finer.model, _drives(solution, source, finer), watcher)
     followed = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
     nodes = (solution.model.tree.nodes[solution.model.tree.index[name]] for name in solution.links)

@@ -14,13 +14,12 @@ from ..actuation.control.closed_loop import ClosedLoop
 from ..actuation.control.records import JointPid, Sensor
 from ..actuation.control.robot import ControlledRobot, default_tip
 from ..common.arrays import Array
-from ..common.errors import InputError, SolveError
+from ..common.errors import SolveError
 from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.operating_points import locked_motors
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
-from ..mbs.model.gears import elastic_joints
 from ..mbs.model.known_motion import State, mass_matrices
 from ..mbs.model.model import Model, build_model, without_paths
 from ..mbs.run.context import place_of
@@ -55,13 +54,8 @@ def robust(scene: Scene) -> Scene:
 
 
 def deviations(context: ActuatedContext, source: Run) -> Deviations:
-    """Return the robustness table of a run. Raises `InputError` for robots with compliant gears."""
+    """Return the robustness table of a run of a robot with rigid gears."""
     asked: Robustness = source.analysis.robustness  # type: ignore[attr-defined]
-    if elastic_joints(context.model):
-        raise InputError(
-            f'{context.model.scene.path}: analysis "{source.analysis.name}": robustness: expected rigid gears, found'
-            " joints with stiffness; closed-loop analyses simulate these"
-        )
     held = f"zero-order hold of {1e3 * asked.sample_time:g} ms"
     runs, nominal = _Runs(context, source, asked), context.model
     robots: dict[str, list[Model]] = {"as computed": [nominal], held: [nominal]}

@@ -32,7 +32,7 @@ from .bodies import load_bodies
 from .fastest import with_paths
 from .mode_choice import mode_levels, reported_modes
 from .pieces import bending_of_links, links_in_pieces, wanted_pieces
-from .prepare import made_solution, with_bodies, with_pieces, with_scene, with_stiffening
+from .prepare import check_replays, made_solution, with_bodies, with_pieces, with_scene, with_stiffening
 from .solution import AnalysisResult, Histories, Solution
 from .stresses import find_stresses
 from .watcher import Interruption, Watcher
@@ -77,6 +77,7 @@ def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Soluti
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """Run the analyses of a prepared solution; they resume from `solution.earlier` if present."""
     check_turning(solution.model)
+    check_replays(solution)
     with Interruption(watcher) as interruption:
         judge = partial(_judged, replace(solution, earlier={}), interruption)
         scene, notes = with_paths(solution.scene, solution.model, judge, watcher.stage)
