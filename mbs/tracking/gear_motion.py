@@ -8,6 +8,7 @@ torques are then polynomials, and so is δ but for c e^{−K t/D}.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import ceil, factorial
 from typing import TYPE_CHECKING, NamedTuple
@@ -93,12 +94,47 @@ def smooth(asked: Transition, tracked: Tracked) -> Motion:
     return Motion(curve, _through(breaks, wanted + more), unmet)
 
 
-def largest_share(asked: Transition, tracked: Tracked) -> float:
-    """Of the limits of patches, or sizes where they have none, that voltages reach anywhere."""
+class Shares(NamedTuple):
+    """Of limits, the most that a motion reaches at any time; `peak_times` (motors,), s, are those of torques."""
+
+    voltage: float  # of sizes where patches have no limits
+    torques: Array  # (motors,), 0 of motors without a limit
+    peak_times: Array
+
+
+def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
+    """What voltages, and torques of motors behind gears, reach at ten Gauss points of each interval and its breaks."""
     times = np.concatenate([tracked.voltage.x, _nodes(tracked.voltage.x)])
     least, most = asked.ranges["voltage"]
     V = tracked.voltage(times)
-    return float(np.maximum(V / most, V / least).max())
+    times = np.unique(np.concatenate([at for of in tracked.gears.values() for at in (of.twist.x, _nodes(of.twist.x))]))
+    torques = np.abs(_motor_torques(asked, tracked, times))
+    of_voltages = float(np.maximum(V / most, V / least).max())
+    return Shares(of_voltages, torques.max(axis=0) / asked.limits.torque, times[torques.argmax(axis=0)])
+
+
+def torques_beyond(asked: Transition, tracked: Tracked) -> Iterator[str]:
+    """Warnings on motors whose torques exceed their limits between the points at which these are constraints."""
+    _, shares, times = largest_shares(asked, tracked)
+    names = [joint for joint, columns in asked.driven.model.motors.items() for _ in columns]
+    for k in np.flatnonzero(shares > 1.0):
+        yield (
+            f"the motor of {names[k]} reaches {100 * shares[k]:.4g} % of its moment_limit at t = {times[k]:.4g} s,"
+            " between the points of intervals where its torque is limited: a slower path, or a larger moment_limit"
+        )
+
+
+def _motor_torques(asked: Transition, tracked: Tracked, times: Array) -> Array:
+    """Torques (T, motors) of all motors, those behind gears with what accelerates their rotors ahead of the joint."""
+    gears = asked.gears
+    assert gears is not None
+    torques = asked.driven.forces(times, *(tracked.curve(times, k) for k in range(3)))[1]
+    torques = torques[:, : torques.shape[1] - len(gears.joints)]
+    for column, joint in zip(gears.columns, gears.joints, strict=True):
+        torque = tracked.gears[joint].torque
+        assert torque is not None
+        torques[:, column] = torque(times)
+    return torques
 
 
 def _gear(gears: Gears, k: int, transmitted: PPoly, rigid: PPoly) -> GearCurve:

@@ -44,7 +44,7 @@ from .advice import (
     singular_times,
     slowest,
 )
-from .gear_motion import behind_gears, largest_share, smooth
+from .gear_motion import behind_gears, largest_shares, smooth, torques_beyond
 from .geared import GearedServo, with_gears
 from .intervals import MOST_INTERVALS, SETTLED, refined, settled, start_breaks
 from .problem import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights, track
@@ -54,7 +54,8 @@ SNAP = 4.5  # power of time with which a path begins whose fourth derivative is 
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
 NEAR_OPTIMUM = 1e-5  # last Newton step where gears give: voltages make an exact motion of any that is smooth
-MOST_SHRINKINGS = 3  # of limits, for voltages of motions behind gears
+MOST_SHRINKINGS = 6  # of limits, for voltages and torques of motions behind gears
+SHRUNK = 1.002, 1.1  # factor, and power of what exceeds them, by which they do
 RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
 REPLAYED = 1e-5  # tolerance of torques alone, at most
@@ -146,6 +147,7 @@ class Tracking(TimedAnalysis):
             if objective == "least-voltage":  # without the effort's share
                 least = replace(tracked, doubt=least.doubt)
             texts = list(_warnings(context, posed, self, least))
+            texts += torques_beyond(posed.asked, tracked) if tracked.gears else ()
             if tracked.unmet > self.tolerance:
                 texts.append(
                     f"between Gauss points modal forces up to {tracked.unmet:.2g} of the largest elastic one are left"
@@ -183,7 +185,8 @@ class Tracking(TimedAnalysis):
         run = at(times)
         around = _with_torques_alone(context, run, around)
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
-        return replace(run, details=around, statistics=statistics).with_look(at)
+        peaks = largest_shares(posed.asked, tracked).peak_times if tracked.gears else ()
+        return replace(run, details=around, statistics=statistics).with_look(lambda times: at(np.union1d(times, peaks)))
 
 
 @struct
@@ -313,7 +316,7 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     if asked.gears is None:
         tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
     else:
-        tracked = _behind_gears(asked, breaks, least, analysis)
+        tracked = _behind_gears(asked, limits, breaks, least, analysis)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = _causes(context, posed) or "loosen limits or tolerance"
@@ -321,20 +324,28 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     return tracked, objective
 
 
-def _behind_gears(asked: Transition, breaks: Array, near: Tracked, analysis: Tracking) -> Tracked:
-    """With gears that give; limits shrink by what voltages of a motion without jumps exceed them between breaks."""
-    near = _without_jumps(asked, breaks, near, analysis.tolerance)
+def _behind_gears(asked: Transition, limits: Limits, breaks: Array, near: Tracked, analysis: Tracking) -> Tracked:
+    """With gears that give; limits shrink by what a motion without jumps exceeds `limits` between Gauss points.
+
+    Where that does not do, the motion that exceeds them least.
+    """
+    near, wanted = _without_jumps(asked, breaks, near, analysis.tolerance), replace(asked, limits=limits)
+    found = list[tuple[float, Tracked]]()
     for _ in range(MOST_SHRINKINGS):
         if not near.converged:
-            return near
-        tracked = behind_gears(asked, near, analysis.output_step)
-        share = largest_share(asked, tracked)
-        if asked.objective == "least-voltage" or not asked.is_limited or share <= 1.0:
             break
-        of = asked.limits.patches
-        asked = replace(asked, limits=replace(asked.limits, patches=replace(of, range=of.range / share**1.1)))
+        tracked = behind_gears(asked, near, analysis.output_step)
+        shares = largest_shares(wanted, tracked)
+        voltages = shares.voltage if asked.is_limited and asked.objective != "least-voltage" else 0.0
+        torques = shares.torques if asked.objective != "least-torque" else 0.0 * shares.torques
+        found.append((max(voltages, float(torques.max())), tracked))
+        if found[-1][0] <= 1.0:
+            break
+        by = [np.where(share > 1.0, SHRUNK[0] * share ** SHRUNK[1], 1.0) for share in (voltages, torques)]
+        patches = replace(asked.limits.patches, range=asked.limits.patches.range / by[0])
+        asked = replace(asked, limits=Limits(patches, asked.limits.torque / by[1]))
         near = track(asked, near.voltage.x, near, within=NEAR_OPTIMUM)
-    return tracked
+    return min(found, key=lambda one: one[0])[1] if found else near
 
 
 def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: float) -> Tracked:

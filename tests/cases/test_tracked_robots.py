@@ -13,8 +13,9 @@ from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.stable_inversion import invert
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.model import modal_directions
+from ffrobot.mbs.tracking.geared import with_gears
 from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
-from ffrobot.run.solve import prepare_scene
+from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
@@ -186,6 +187,69 @@ def test_replay_follows_the_path(robot):
     assert about["objective"] == "effort"
     assert off < 1e-8 * way
     assert about["without_patches"] > 100 * off
+
+
+def behind_a_gear(objective, moment_limit):
+    """The strip behind its gear, whose path jumps in the fourth derivative where it begins and ends."""
+    tables = geared(in_plane(patches("arm", 0.02, limit=200.0)), 20, hub=0.05)
+    tables["joint"][0]["moment_limit"] = moment_limit
+    tables["analysis"] = [tables["analysis"][0] | {"objective": objective, "tolerance": 1e-4}]
+    return tables
+
+
+@pytest.mark.parametrize(("objective", "moment_limit"), [("least-voltage", 4.0), ("effort", 2.4)])
+def test_torques_behind_gears_are_within_limits(objective, moment_limit):
+    """Between Gauss points, too: 5.1 and 2.8 N·m where they are constraints there alone."""
+    with ffrobot.solve(ffrobot.make_scene(**behind_a_gear(objective, moment_limit))) as results:
+        peak, verdict = results.attributes("carried/joints/hub/moment")["peak"], results.verdict["carried"]
+        about = results.attributes("carried/tracking")
+    assert 0.8 * moment_limit < peak <= moment_limit
+    assert about["objective"] == objective
+    assert verdict.answer.startswith("motors and patches can do it, within the limits")
+    assert not any("moment_limit" in text for text in verdict.warnings)
+
+
+def test_a_torque_beyond_its_limit_is_said():
+    """The least torque is that at Gauss points: how far it is exceeded, and when, as the motor's record has it."""
+    with ffrobot.solve(ffrobot.make_scene(**behind_a_gear("least-torque", 1.5))) as results:
+        of_motor, verdict = results.attributes("carried/joints/hub/moment"), results.verdict["carried"]
+    said = f"{100 * of_motor['peak'] / 1.5:.4g} % of its moment_limit at t = {of_motor['peak_time']:.4g} s"
+    assert of_motor["peak"] > 1.5
+    assert verdict.answer.startswith("limits exceeded: motor hub")
+    assert any(f"the motor of hub reaches {said}" in text for text in verdict.warnings)
+
+
+def posed(tables):
+    solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
+    return with_gears(make_servo(solution.model, solution.scene.analysis[0].end, "robot", lambda: True, 1.0))
+
+
+def moved_motors(*motors):
+    """The five-bar with motors behind gears at these joints."""
+    tables = five_bar()
+    for joint in tables["joint"]:
+        joint["motor"] = joint["name"] in motors
+    return geared(tables, 40, **dict.fromkeys(motors, 0.02))
+
+
+def test_rotors_that_their_own_motors_turn():
+    """Links feel these gears: the tip would be 0.5 mm off. B's rotor on a bar that A turns is none of them."""
+    assert posed(moved_motors("A", "B")).gears.joints == ("A", "B")
+    with pytest.raises(ffrobot.InputError, match=r'joint "B" on its first body.* another joint of the loop'):
+        posed(moved_motors("B", "D"))
+    tables = geared(in_plane(), 20, hub=0.05)
+    tables["joint"][0]["between"].reverse()
+    with pytest.raises(ffrobot.InputError, match=r'joint "hub".* Exchange its sides in `between`'):
+        posed(tables)
+
+
+@pytest.mark.parametrize("key", [{"robustness": {}}, {"check": "finer"}])
+def test_what_gears_do_not_allow_is_refused_before_the_run(key):
+    tables, kept = geared(in_plane(), 20, hub=0.05), []
+    tables["analysis"][0] |= key
+    with pytest.raises(ffrobot.InputError, match=f"{next(iter(key))}: expected "):
+        solve_scene(ffrobot.make_scene(**tables), Watcher(), kept.append)
+    assert not kept
 
 
 def test_zeros_that_pass_through_infinity():
