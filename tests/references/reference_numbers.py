@@ -63,7 +63,7 @@ and modal forces of an inversion are what its iteration leaves."""
 
 
 NEW = "not in the reference"
-COINCIDE = 1e-3  # of their size: zeros that are no farther apart
+COINCIDE = 3e-3  # of their size: zeros that are no farther apart; a double one of compliant_arm splits by 1e-3
 
 
 class Entry(NamedTuple):
