@@ -125,7 +125,7 @@ class AnalysisAccess(Datasets):
 
     def state_spaces(self, analysis: str) -> tuple[StateSpace, ...]:
         """Return linear models of an analysis, or the controller of a run. Raises `InputError` without either."""
-        is_loop = self.has(f"{analysis}/control/controller")
+        is_loop = self.has(f"{analysis}/control")
         return (self.controller(analysis),) if is_loop else self.linear(analysis)
 
     def linear_analysis(self, analysis: str | None) -> str:

@@ -244,6 +244,10 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
     np.testing.assert_array_equal(np.array(numbers, dtype=float), system.A.ravel())
     with pytest.raises(InputError, match=r'expected a closed loop of linear controllers .*"loop".*found "inverse"'):
         results.controller("inverse")
+    squared = [{"kind": "python", "python": lambda setup: lambda k, y: -100.0 * y[:1] ** 2}]
+    other = ffrobot.solve(wheel(sensor=[ENCODER], controller=[PID, *squared], disturbance=push))
+    with pytest.raises(InputError, match=r'expected a closed loop of linear controllers \(none\), found "loop"'):
+        other.state_spaces("loop")
 
 
 def test_sensors_are_outputs_of_linear_models():
