@@ -53,6 +53,8 @@ class LqrControl:
         left_out = {of for of in setup.inputs if record.pzt is not None and of.split("/")[1] not in record.pzt}
         self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
         names = [setup.inputs[i] for i in self.inputs]
+        if not names:
+            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as its inputs, found none")
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)
         waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)

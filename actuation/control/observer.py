@@ -148,8 +148,12 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
         return riccati(A.T, C.T, Q, np.diag(R))
     except ValueError as error:
         unseen, still = hidden(A, C, states), hidden(A.T, Q, states)
-        why = f"noise of `process` does not reach {', '.join(still)}" if still else str(error)
-        why = f"they cannot see {', '.join(unseen)}" if unseen else why
+        if not unseen and not still:
+            raise InputError(
+                "expected noise with which the Riccati equation has a solution to round-off, found sensors far more"
+                f" exact than `process` moves the robot? ({' '.join(str(error).split())})"
+            ) from None
+        why = f"they cannot see {', '.join(unseen)}" if unseen else f"`process` does not reach {', '.join(still)}"
         raise InputError(f"expected sensors that see every motion that does not decay, found: {why}") from None
 
 

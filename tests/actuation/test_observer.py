@@ -244,8 +244,8 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
     np.testing.assert_array_equal(np.array(numbers, dtype=float), system.A.ravel())
     with pytest.raises(InputError, match=r'expected a closed loop of linear controllers .*"loop".*found "inverse"'):
         results.controller("inverse")
-    squared = [{"kind": "python", "python": lambda setup: lambda k, y: -100.0 * y[:1] ** 2}]
-    other = ffrobot.solve(wheel(sensor=[ENCODER], controller=[PID, *squared], disturbance=push))
+    switched = [{"kind": "python", "python": lambda setup: lambda k, y: -0.01 * np.sign(y[:1])}]
+    other = ffrobot.solve(wheel(sensor=[ENCODER], controller=[PID, *switched], disturbance=push))
     with pytest.raises(InputError, match=r'expected a closed loop of linear controllers \(none\), found "loop"'):
         other.state_spaces("loop")
 
@@ -287,11 +287,13 @@ def test_sensors_are_outputs_of_linear_models():
         ({"observer": {"kind": "gains", "inputs": [], "outputs": ["joint/O"], "A": [[0.5]]}}, "B.*missing"),
         ({"sensor": [ENCODER], "observer": GAINS | {"B": [[1.0, 2.0]]}}, "expected B with 1 × 1"),
         ({"sensor": [ENCODER], "observer": GAINS | {"A": [[1.5]]}}, "below 1 in size, found 1.4"),
+        ({"sensor": [ENCODER | {"noise": 1e-30}], "observer": KALMAN}, "far more exact than `process` moves the robot"),
+        ({"controller": [{"kind": "lqr", "inputs": "patches"}]}, "expected motors or patches as its inputs"),
     ],
 )  # fmt: skip
 def test_what_an_observer_cannot_be_made_of(keys, said):
     with pytest.raises(InputError, match=said):
-        ffrobot.solve(wheel(controller=[{"kind": "lqr"}] if "sensor" in keys else [], **keys))
+        ffrobot.solve(wheel(**{"controller": [{"kind": "lqr"}] if "sensor" in keys else []} | keys))
 
 
 def test_a_slower_sensor_keeps_its_reading_and_an_observer_takes_it():
