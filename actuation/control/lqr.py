@@ -54,7 +54,7 @@ class LqrControl:
         self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
         names = [setup.inputs[i] for i in self.inputs]
         if not names:
-            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as its inputs, found none")
+            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as inputs, found none")
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)
         waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)

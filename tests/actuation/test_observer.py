@@ -288,7 +288,7 @@ def test_sensors_are_outputs_of_linear_models():
         ({"sensor": [ENCODER], "observer": GAINS | {"B": [[1.0, 2.0]]}}, "expected B with 1 × 1"),
         ({"sensor": [ENCODER], "observer": GAINS | {"A": [[1.5]]}}, "below 1 in size, found 1.4"),
         ({"sensor": [ENCODER | {"noise": 1e-30}], "observer": KALMAN}, "far more exact than `process` moves the robot"),
-        ({"controller": [{"kind": "lqr", "inputs": "patches"}]}, "expected motors or patches as its inputs"),
+        ({"controller": [{"kind": "lqr", "inputs": "patches"}]}, "expected motors or patches as inputs"),
     ],
 )  # fmt: skip
 def test_what_an_observer_cannot_be_made_of(keys, said):
