@@ -42,7 +42,7 @@ def find_stresses(
     """
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None and has_stresses(body.modal)}
     stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}
-    unknown = {name for name, of in stiff.items() if _in_plane(of, bodies[name].spatial) is None}
+    unknown = {name for name in stiff.keys() & links.keys() if _in_plane(stiff[name], bodies[name].spatial) is None}
     unknown |= {piece for name in stiff.keys() & divided.keys() for piece in divided[name].names}
     known = [name for name, link in links.items() if link.stress_loads and name not in unknown]
     loads = loads_on_links(run, known) if known else {}
