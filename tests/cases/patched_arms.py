@@ -14,7 +14,7 @@ def link(modes, height=0.006, width=0.012):
 
 def pzt(name, bends, **keys):
     return {
-        "body": "link", "name": name, "bends": bends, "count": 4, "length": 0.06, "width": 0.01, "thickness": 0.5e-3,
+        "body": "link", "name": name, "bends": bends, "count": 4, "length": 0.06, "width": 0.005, "thickness": 0.5e-3,
         "modulus": 63e9, "d31": 110e-12, "density": 7600.0, "limit": 200.0,
     } | keys  # fmt: skip
 
