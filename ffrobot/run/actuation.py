@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,12 +11,15 @@ import numpy as np
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array, Indices, as_floats
+from ..common.errors import InputError
 from ..common.structs import struct
+from ..mbs._core import TimeFunction
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model, modal_directions
 from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run
+from ..mbs.scene.analysis import Analysis
 from ..mbs.scene.space import SPACES
 from ..scene.scene import Scene
 from .bodies import LoadedBody
@@ -27,7 +30,9 @@ if TYPE_CHECKING:
     from ..actuation.patches.patches import Voltages
 
 Bodies = Mapping[str, LoadedBody]
-HYSTERESIS_TIMES = 20_001  # between which voltages of loads are straight
+LEAST_PARTS, MOST_PARTS = 20_000, 2_560_000  # of time, in which voltages of loads are straight behind hysteresis
+STRAIGHT = 2e-4  # of the largest voltage: what parts may miss
+JUMPS, BETWEEN = 100, 0.381966  # parts that may miss more; where in parts that is seen: at no simple fraction
 FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
 
 
@@ -81,18 +86,48 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
 
 def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
     """Yield the drives of voltages that the scene prescribes for patches, behind their hysteresis."""
-    last = max((analysis.last_time for analysis in scene.analysis), default=0.0) or 1.0
-    times = as_floats(np.linspace(0.0, last, HYSTERESIS_TIMES))
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
-    for load in scene.load:
+    for number, load in enumerate(scene.load, 1):
         if load.pzt is not None:
             of_link = patches[bodies[load.pzt]]
             directions = modal_directions(model, of_link.per_volt)[of_link.columns(load.pzt)]
             voltage, amplifiers = load.voltage or (), of_link.arrays[load.pzt].amplifiers
             if amplifiers.hysteresis.acts:
-                wanted = np.stack([function.sample(times)[0] for function in voltage], axis=1)
-                voltage = tuple(spline(times, amplifiers.hysteresis.output(wanted), 1))
+                times, wanted = _straight(f"{scene.path}: load no. {number}: voltage", scene.analysis, voltage)
+                acting = spline(times, amplifiers.hysteresis.output(wanted), 3)
+                voltage = tuple(function.held(times[0], times[-1]) for function in acting)
             yield from map(Drive, directions, voltage)
+
+
+def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunction]) -> tuple[Array, Array]:
+    """Times (T,), s, of all analyses, and voltages (T, k), V, which are straight in between but for a few jumps.
+
+    Raises `InputError` for voltages that turn too often for their time.
+    """
+    first = min((float(analysis.times[0]) for analysis in analyses), default=0.0)
+    last, parts = max((analysis.last_time for analysis in analyses), default=0.0), LEAST_PARTS
+    last = last if last > first else first + 1.0
+
+    def sampled(times: Array) -> Array:
+        return as_floats(np.stack([function.sample(times)[0] for function in voltage], axis=1))
+
+    while True:
+        times = as_floats(np.linspace(first, last, parts + 1))
+        values = sampled(times)
+        between = sampled(times[:-1] + BETWEEN * np.diff(times))
+        missed = np.abs(between - values[:-1] - BETWEEN * np.diff(values, axis=0))
+        bent = int(np.count_nonzero((missed > STRAIGHT * np.abs(values).max()).any(axis=1)))
+        if bent <= JUMPS:
+            return times, values
+        if 2 * parts > MOST_PARTS:
+            break
+        parts *= 2
+    if bent > BETWEEN * parts:
+        raise InputError(
+            f"{key}: expected voltages that turn at most some {MOST_PARTS // 80} times where patches have hysteresis,"
+            f" found more from {first:g} to {last:g} s: shorten the analyses"
+        )
+    return times, values
 
 
 def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:

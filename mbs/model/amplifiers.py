@@ -76,9 +76,10 @@ class Amplifiers:
         share = -np.expm1(-x) / x
         after = last - late + (now - first + late) * decay
         mean = (first + last) / 2 - late + (now - first + late) * share
-        most = h * np.minimum(self.slew, (self.current - strain) / self.capacitance)
-        least = -h * np.minimum(self.slew, (self.current + strain) / self.capacitance)
-        kept = np.clip(np.clip(after, now + least, now + most), *self.range)
+        unlimited = np.isinf(self.current)  # of which no capacitance is known
+        left = (np.where(unlimited, np.inf, (self.current - s) / self.capacitance) for s in (strain, -strain))
+        most, least = (h * np.minimum(self.slew, of) for of in left)
+        kept = np.clip(np.clip(after, now - least, now + most), *self.range)
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:

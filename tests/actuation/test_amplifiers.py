@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import paper_link
 from patches_on_links import layout
 
 import ffrobot
 from ffrobot.common.errors import SolveError
+from ffrobot.run.solve import prepare_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 
@@ -43,6 +45,14 @@ def test_capacitance():
     assert of.capacitance() == pytest.approx(free, rel=1e-14)
     k31 = 110e-12 * (63e9 / 2e-8) ** 0.5
     assert of.capacitance(clamped=True) == pytest.approx(free * (1.0 - k31**2), rel=1e-13)
+
+
+def test_no_limit_of_current_takes_no_capacitance():
+    """Whose sign is wrong of constants that contradict each other, as of a soft ceramic with another's permittivity."""
+    amplifiers = layout(count=1, d31=-320e-12, poissons_ratio=0.31, hysteresis=HYSTERESIS).amplifiers()
+    assert amplifiers.capacitance[0] < 0.0
+    wanted = 100.0 * np.sin(600.0 * TIME)[:, None]
+    np.testing.assert_array_equal(amplifiers.output(TIME, wanted, wanted), amplifiers.hysteresis.output(wanted))
 
 
 @pytest.fixture
@@ -168,6 +178,26 @@ def test_inverse_of_hysteresis_and_loop_area():
                 z = now - np.sign(now - z) * r
             expected[k] += w * z
     np.testing.assert_allclose(of.output(V), expected, atol=1e-11)
+
+
+def test_fast_voltages_of_a_long_run():
+    """Of 400 Hz over 20 s, and 100 V at a time, a play operator of 40 V is 40 V behind from the first peak on."""
+    patch = layout(count=1, hysteresis={"weights": (0.5, 0.5), "thresholds": (0.0, 40.0)}).model_dump(
+        exclude_unset=True
+    )
+    scene = {
+        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "link", "link": paper_link()}],
+        "joint": [{"name": "wall", "type": "weld", "between": ["ground", "link.root"]}],
+        "pzt": [patch], "load": [{"pzt": "link", "voltage": ["100*sin(800*pi*t)"]}],
+        "analysis": [{"name": "long", "kind": "forward", "end": 20.0, "output_step": 1.0}],
+    }  # fmt: skip
+    (drive,) = prepare_scene(ffrobot.make_scene(**scene)).model.modal_loads
+    t = 19.5 + np.linspace(0.0, 0.01, 1001)
+    V, is_rising = 100.0 * np.sin(800 * np.pi * t), np.cos(800 * np.pi * t) > 0.0
+    last = np.where(is_rising, np.maximum(-60.0, V - 40.0), np.minimum(60.0, V + 40.0))
+    missed = np.abs(drive.size.sample(t)[0] - 0.5 * (V + last))
+    assert missed.max() < 0.4  # V, where it turns or begins to follow
+    assert np.median(missed) < 1e-3
 
 
 @pytest.mark.parametrize(
