@@ -126,7 +126,10 @@ def gain(model, given, read):
 
 
 def test_a_closed_loop_acts_on_pieces_and_knows_the_links():
-    """Sensors of joints, points, patches and modes read the pieces, controllers have the names of the links."""
+    """Sensors of joints, points, patches and modes read the pieces, controllers have the names of the links.
+
+    Patches from the start on: there four modes sag under weight as pieces do within 0.3 % of the reading.
+    """
     paths = [{"name": "first", "joint": "O", "value": f"0.1+0.4*{S}"},
              {"name": "second", "joint": "A", "value": f"0.5-0.6*{S}"}]  # fmt: skip
     loop = LOOP | {
@@ -154,4 +157,7 @@ def test_a_closed_loop_acts_on_pieces_and_knows_the_links():
             ("modal/link1/1", 5e-3),
         ):
             a, b = (values[:, outputs.index(name)] for values in readings)
+            if name.startswith("pzt"):
+                assert b[0] == pytest.approx(a[0], rel=3e-3)
+                a, b = a - a[0], b - b[0]
             assert np.abs(a - b).max() < bound * np.ptp(a), name

@@ -347,7 +347,7 @@ def _deviation(
     at, voltages = kept_modes(whole, voltages_at(model, whole, context.patches), record.modes)
     known = state_space(at, voltages, readings_at(model, at, [*read, *wanted]))
     modal = [name for body in link.bodies for name in whole.names if name.startswith(f"modal/{body}/")]
-    volts = link.own[:, [k for k, name in enumerate(modal) if name in at.names]] / link.layout.capacitance()
+    volts = link.own[:, [k for k, name in enumerate(modal) if name in at.names]] / link.layout.read_capacitance
     columns = [at.names.index(name) for name in modal if name in at.names]
 
     as_sensor = Sensor(pzt=link.layout.label, noise=record.noise)

@@ -36,7 +36,7 @@ class Sensor(Referring):
     """A sensor of a joint coordinate, of a point, of the strain at a point, or of patch voltages.
 
     Accelerations are in global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
-    section. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance`.
+    section. Patches read the charge Φ_Vᵀ p over `capacitance`; none with a `shunt`.
 
     A reading is filtered by `high_pass`, gets `bias` and Gaussian noise, is cut at ±`range` and rounded to
     `resolution`, kept for `sample_time`, and known `delay` later.

@@ -7,7 +7,7 @@ from dataclasses import field
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearMechanism, labelled
@@ -20,7 +20,7 @@ from ...mbs.model.tree import KinematicTree
 from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.scene.space import SPACES
 from ..context import ActuatedContext
-from ..patches.link_patches import LinkPatches
+from ..patches.link_patches import LinkPatches, OnBody
 from .records import Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2, "accelerometer": 3, "gyro": 4}
@@ -240,15 +240,20 @@ def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Arr
 def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
     """Return, by body, (k, n) patch readings (V) per unit of the modes of the body's file.
 
-    A patch reads its charge c [φ'(x2) − φ'(x1)] over its capacitance. By reciprocity the charge of a rotation is the
-    moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The free capacitance of a patch is that of its
-    layers; one that also drives the link is read through a bridge, which leaves this voltage (Dosch, Inman and Garcia,
-    J. Intell. Mater. Syst. Struct. 3, 1992). Without charge a strained patch has the clamped capacitance.
+    A patch reads its charge over its capacitance. By reciprocity the charge of a deflection is the modal force of a
+    voltage, Φ_Vᵀ p (Lee and Moon, J. Appl. Mech. 57, 1990). A patch that also drives the link is read through a bridge,
+    which leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992). Without charge a
+    patch bends the link back, as far as modes lack these strains: `OnBody.yielding`.
     """
-    array, columns = of_link.arrays[layout], of_link.columns(layout)
-    own = array.layout.capacitance(clamped=array.layout.electrodes == "open")
-    volts = array.moment_per_volt / (own if capacitance is None else capacitance)
-    return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
+    own, columns, bodies = of_link.arrays[layout].layout, of_link.columns(layout), of_link.bodies
+    pieces = [name for name in bodies if name != of_link.body]
+
+    def volts(of: OnBody, parts: Iterable[str]) -> Array:
+        yielding = sum(bodies[part].yielding[columns] for part in parts)
+        C = own.read_capacitance + (own.electrodes == "open") * yielding
+        return as_floats(of.charge[:, columns] / (C if capacitance is None else capacitance)).T
+
+    return {name: volts(of, pieces if name in pieces else [name]) for name, of in bodies.items()}
 
 
 def check_joint(model: Model, joint: str) -> None:

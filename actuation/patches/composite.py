@@ -68,15 +68,15 @@ class GaussPoint(NamedTuple):
     station: int
 
 
-def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array]:
+def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array, Array]:
     """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
 
     The stiffness (n, n) that patches add, and the modal forces per volt (k, n) that the layers' own stiffness takes of
-    those on a link held straight; R is 0 where rigidities are not known.
+    those on a link held straight; R is 0 where rigidities are not known. Last `LayersOnLink.yielding`.
     """
     layers = layers_on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
-    return 0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt
+    return 0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt, layers.yielding
 
 
 def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
@@ -258,6 +258,7 @@ class Effects(NamedTuple):
     lever: Array  # (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals
     turn: Array  # (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad
     Phi_V: Array  # (k, n) modal forces per volt, less what the layers' own stiffness takes
+    yielding: Array  # (k,) what strains that modes lack add to the capacitance, F
 
 
 def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
@@ -266,10 +267,10 @@ def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[E
     stiff = [k for k, one in enumerate(placed) if one.layout.adds_stiffness]
     if not stiff:
         return found
-    _, shortfall = composite([placed[k] for k in stiff], body)
-    ends = np.cumsum([len(placed[k].edges) for k in stiff])
-    for k, lacking in zip(stiff, np.split(shortfall, ends[:-1]), strict=True):
-        found[k] = found[k]._replace(Phi_V=found[k].Phi_V - lacking)
+    _, *of_patches = composite([placed[k] for k in stiff], body)
+    ends = np.cumsum([len(placed[k].edges) for k in stiff])[:-1]
+    for k, lacking, yielding in zip(stiff, *(np.split(of, ends) for of in of_patches), strict=True):
+        found[k] = found[k]._replace(Phi_V=found[k].Phi_V - lacking, yielding=yielding)
     return found
 
 
@@ -294,7 +295,8 @@ def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
         if layout.strain == "biaxial":
             membrane /= 1.0 - (layout.poissons_ratio or 0.0)
         Phi_V = membrane[:, None] * _outlined(key, layout, body, edges)
-    return Effects(extent, c, lever / 2 if layout.acts_in == "twist" else np.ones(len(edges)), turn, Phi_V)
+    lever = lever / 2 if layout.acts_in == "twist" else np.ones(len(edges))
+    return Effects(extent, c, lever, turn, Phi_V, np.zeros(len(edges)))
 
 
 class _Stretches(NamedTuple):

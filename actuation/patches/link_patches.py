@@ -52,6 +52,8 @@ class OnBody:
     Phi_V: Array  # (n, k) modal forces per volt
     turn: Array  # (n, k) by how much each mode turns the ends of each patch against each other, rad
     to_link: Array  # modal forces on the modes of the link's file by those on these, (modes of the link, n)
+    charge: Array  # (n, k) of each patch per unit of each mode, C; Φ_V, of patches that no voltage drives, too
+    yielding: Array  # (k,) what strains that modes lack add to capacitances, F
 
 
 @struct
@@ -173,7 +175,7 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
     placed = placed_patches(path, layouts, body)
     found = effects(key, placed, body)
-    Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
+    charge, turn, yielding = _side_by_side(found)
     driven = driven_patches(placed)
     modes = {one.layout.label: reached_modes(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
     for layout in layouts:
@@ -186,12 +188,20 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     if len(layouts) == 1:
         reached, reach = modes[layouts[0].label], arrays[layouts[0].label]
     else:
-        reached = reached_modes((Phi_V * driven if driven.any() else Phi_V).T, body, spatial)
-        reach = _together(path, layouts, arrays, reached, Phi_V.T)
+        reached = reached_modes((charge * driven if driven.any() else charge).T, body, spatial)
+        reach = _together(path, layouts, arrays, reached, charge.T)
     if not driven.all():
-        reach, Phi_V = replace(reach, Phi_V=reach.Phi_V * driven), Phi_V * driven
-    own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
+        reach = replace(reach, Phi_V=reach.Phi_V * driven)
+    own = {layouts[0].body: OnBody(charge * driven, turn, np.eye(body.mode_count), charge, yielding)}
     return LinkPatches(arrays, modes, reach, reached, own, _slowness(body))
+
+
+def _side_by_side(found: Sequence[Effects]) -> tuple[Array, Array, Array]:
+    """Φ_V (n, k), turns (n, k) and what capacitances gain (k,) of all patches."""
+    Phi_V, turn, yielding = (
+        np.concatenate(of) for of in zip(*((one.Phi_V, one.turn, one.yielding) for one in found), strict=True)
+    )
+    return Phi_V.T, turn.T, yielding
 
 
 def _slowness(body: ModalBody) -> float:
@@ -219,12 +229,12 @@ def on_pieces(
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
     for (name, (start, modal)), to_piece in zip(pieces.items(), np.split(spread, ends[:-1]), strict=True):
-        Phi_V, turn = np.zeros((2, modal.mode_count, whole.Phi_V.shape[1]))
+        (charge, turn), yielding = np.zeros((2, modal.mode_count, len(whole.driven))), np.zeros(len(whole.driven))
         on_piece = whole.placed_on(start, modal.length)
         found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
         for (which, _), of in zip(on_piece, found, strict=True):
-            Phi_V[:, which], turn[:, which] = of.Phi_V.T * whole.driven[which], of.turn.T
-        bodies[name] = OnBody(Phi_V, turn, to_piece.T)
+            charge[:, which], turn[:, which], yielding[which] = of.Phi_V.T, of.turn.T, of.yielding
+        bodies[name] = OnBody(charge * whole.driven, turn, to_piece.T, charge, yielding)
     return replace(whole, bodies=bodies)
 
 

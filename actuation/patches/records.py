@@ -173,6 +173,11 @@ class PztLayout(Record):
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
         return volume * (self.permittivity * field**2 - (self.lamina.energy if clamped else 0.0))
 
+    @property
+    def read_capacitance(self) -> float:
+        """Capacitance of one patch as a sensor, F: clamped with open electrodes, which no charge reaches."""
+        return self.capacitance(clamped=self.electrodes == "open")
+
     def amplifiers(self) -> Amplifiers:
         """Return the amplifiers of all patches."""
         of, k = self.amplifier or Amplifier(), self.patch_count

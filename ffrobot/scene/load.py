@@ -304,6 +304,12 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
     for analysis, name in ((one, name) for one in scene.analysis for name in _commanded(one)):
         if name.removeprefix("pzt/").rpartition("/")[0] in passive:
             yield f'analysis "{analysis.name}": inputs: expected patches {DRIVEN}, found "{name}"'
+    shunted = [layout.label for layout in scene.pzt if layout.shunt is not None]
+    for analysis in scene.analysis:
+        for sensor in getattr(analysis, "sensor", ()):
+            if sensor.pzt in shunted:
+                expected = "patches without a shunt, over which their charge flows off"
+                yield f'analysis "{analysis.name}": sensor: pzt: expected {expected}, found "{sensor.pzt}"'
     joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     for k, load in enumerate(scene.load, 1):
         count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())

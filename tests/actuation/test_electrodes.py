@@ -6,6 +6,7 @@ from beam_links import beam_link, modal_body, rectangle
 from patches_on_links import SCENE
 
 import ffrobot
+from ffrobot.actuation.control.signals import volts_on_file
 from ffrobot.actuation.patches.link_patches import link_patches, placed_patches
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.structure import patched_body
@@ -77,6 +78,32 @@ def test_resistor_against_the_charge_as_a_state(strip, share):
     assert abs(found) - omega[0] == pytest.approx(abs(exact) - omega[0], rel=0.05, abs=2e-5 * omega[0])
 
 
+@pytest.mark.parametrize("count", [2, 8])
+@pytest.mark.parametrize("electrodes", ["driven", "open"])
+@pytest.mark.parametrize(("face", "offset"), [("both", 0.0), ("+y", 0.0), ("+y", 4e-3)])
+def test_readings_of_a_patch_under_a_force_at_the_tip(electrodes, face, offset, count):
+    """q = ∫ f·e dx of the composite section under the moments of the force, by however few modes; V = q/C."""
+    w, force, keys = 0.008, np.array([0.0, 1.0, 0.5]), {"count": count, "family": "all"}
+    body = modal_body(LINK | {"modes": keys})
+    layout = PATCH | PLACE | {"width": w, "face": face, "offset": offset, "electrodes": electrodes}
+    placed = placed_patches(SCENE, [layout := validate(PztLayout, layout, SCENE, None, "spatial")], body)
+    spatial = patched_body(from_modal_body("strip", body), body, placed)
+    volts = volts_on_file(link_patches(SCENE, [layout], body, spatial), "strip")["strip"] @ spatial.modal_transform
+    found = volts[0] @ (force @ spatial.points["tip"].translation / spatial.stiffness)
+    faces, sign = (2, 0.0) if face == "both" else (1, 1.0)
+    A, arm, I = (faces * w * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
+    rows = [[A, -sign * arm, -A * offset], [-sign * arm, I, sign * arm * offset]]
+    across = [-A * offset, sign * arm * offset, A * (offset**2 + w**2 / 12)]
+    EA, EI, EI_z = E * H * B, E * B * H**3 / 12, E * H * B**3 / 12
+    f = E_P * D31 / T_P * np.array([-sign * A, arm, sign * A * offset])
+    K, length = np.diag([EA, EI, EI_z]) + E_P * np.array([*rows, across]), PLACE["length"]
+    charge = length * f @ np.linalg.solve(K, (L - PLACE["centers"][0]) * np.array([0.0, *force[1:]]))
+    C = A * length / T_P**2 * EPS
+    if electrodes == "open":
+        C += length * (f @ np.linalg.solve(K, f) - A / T_P**2 * E_P * D31**2)
+    assert found == pytest.approx(charge / C, rel=1e-6)
+
+
 def test_voltages_leave_out_passive_patches(strip):
     """Whatever is asked, they get none, and nothing drives the link."""
     spatial = from_modal_body("strip", strip)
@@ -124,3 +151,6 @@ def test_voltages_for_passive_patches_are_refused():
     }  # fmt: skip
     with pytest.raises(InputError, match=r'load no. 1: pzt: expected patches that voltages drive .*, found "strip"'):
         ffrobot.make_scene(**scene)
+    seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}]}
+    with pytest.raises(InputError, match=r'"seen": sensor: pzt: expected patches without a shunt.*, found "strip"'):
+        ffrobot.make_scene(**(scene | {"load": [], "analysis": [seen]}))
