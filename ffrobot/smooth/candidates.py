@@ -19,7 +19,7 @@ from ..common.structs import struct
 from ..mbs.fields.paths import Kind, Piecewise, impulses, polynomial_law
 from ..mbs.fields.waypoints import interpolated
 from .diagnosis import Diagnosis, modes_along
-from .recording import Limits, evened, peaks
+from .recording import KEPT, Limits, evened, peaks
 from .robot import Modes, Ride, Robot, accelerations
 
 SMOOTHNESS = 5  # of the law that averages: inversion differentiates twice what strains gears
@@ -45,6 +45,7 @@ class Candidate:
         ride: the robot under it.
         off_path: rad or m, of the joints together from the path of the record.
         excess, torque: largest of speed, acceleration and jerk by their limits, and of torques; 0 without limits.
+            Beyond a limit of positions `excess` is above 1.
     """
 
     name: str
@@ -86,6 +87,8 @@ class _Search:
     def __init__(self, robot: Robot, before: Diagnosis, limits: Limits, step: float) -> None:
         self.robot, self.limits, self.step, self.tolerance = robot, limits, step, robot.tolerance
         self.sag, (self.times, self.values) = before.ride.sag, evened(before.recording).dense(step / 2)
+        low, high = limits.positions.T
+        self.low, self.high = np.minimum(low, self.values.min(axis=0)), np.maximum(high, self.values.max(axis=0))
         self.modes = modes_along(robot, before.ride)
         self.of_links = modes_along(robot, before.ride, of_links=True) if robot.has_gears and robot.bends else []
         self.periods = [1 / f for f in before.frequencies.mean(axis=0)]
@@ -181,9 +184,13 @@ class _Search:
         return max(WRONG * self._left(values), _worst(self.of_links, links))
 
     def _excess(self, values: Array, orders: int = 3) -> float:
-        """The largest part of a limit that the first so many derivatives take."""
+        """The largest part of a limit that the first so many derivatives take; above 1 beyond limits of positions.
+
+        Not where the record is there, too.
+        """
         shares = peaks(self.step * np.arange(len(values)), values) / self.limits.sizes[:3]
-        return float(shares[:orders].max())
+        beyond = float(np.maximum(values - self.high, self.low - values).max())
+        return max(float(shares[:orders].max()), 1.0 + beyond if beyond > KEPT else 0.0)
 
 
 def _worst(modes: Sequence[Modes], path: Piecewise) -> float:

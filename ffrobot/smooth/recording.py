@@ -30,7 +30,7 @@ STILL = 1e-9  # rad or m: joints that move less stand still
 TURNS, MANY = 0.4, 20  # of pairs of second differences change their sign, of so many at least; of white noise 0.73 do
 BACK = 0.5  # of a jump of the speed: what is left of it a row later, where the position jumps
 ABOVE = 0.3  # of the largest acceleration: a smaller jump of it is none
-KEPT = 1e-6  # of a limit, beyond it: round-off
+KEPT = 1e-6  # of a limit, beyond it, or rad or m beyond one of positions: round-off
 
 
 @struct
