@@ -29,6 +29,7 @@ REACHES = 1e-6  # of the largest singular value of Φ_V: smaller ones are none
 ROUNDING = 1e-13  # of the largest value, coefficients of Legendre's polynomials
 LASTS = 20.0  # D/K after which a gear has come to rest
 GONE = 1e-12  # of the largest twist: decaying parts below it are none
+MANY = np.arange(40) / 40  # of an interval, where a polynomial is looked at for its largest value
 DEGREES = np.arange(len(TEN.c))
 ON_UNIT = [  # Legendre's polynomials of ξ
     np.polynomial.Legendre.basis(k, [0, 1])  # type: ignore[no-untyped-call, unused-ignore]
@@ -103,12 +104,11 @@ class Shares(NamedTuple):
 
 
 def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
-    """What voltages, and torques of motors behind gears, reach at ten Gauss points of each interval and its breaks."""
-    times = np.concatenate([tracked.voltage.x, _nodes(tracked.voltage.x)])
+    """What voltages and torques of motors reach at many points of each interval."""
+    breaks = np.unique(np.concatenate([of.twist.x for of in tracked.gears.values()]))
+    times = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * MANY).ravel(), breaks[-1])
     least, most = asked.ranges["voltage"]
-    V = tracked.voltage(times)
-    times = np.unique(np.concatenate([at for of in tracked.gears.values() for at in (of.twist.x, _nodes(of.twist.x))]))
-    torques = np.abs(_motor_torques(asked, tracked, times))
+    V, torques = tracked.voltage(times), np.abs(_motor_torques(asked, tracked, times))
     of_voltages = float(np.maximum(V / most, V / least).max())
     return Shares(of_voltages, torques.max(axis=0) / asked.limits.torque, times[torques.argmax(axis=0)])
 
@@ -126,10 +126,11 @@ def torques_beyond(asked: Transition, tracked: Tracked) -> Iterator[str]:
 
 def _motor_torques(asked: Transition, tracked: Tracked, times: Array) -> Array:
     """Torques (T, motors) of all motors, those behind gears with what accelerates their rotors ahead of the joint."""
-    gears = asked.gears
+    gears, count = asked.gears, len(asked.limits.torque)
     assert gears is not None
-    torques = asked.driven.forces(times, *(tracked.curve(times, k) for k in range(3)))[1]
-    torques = torques[:, : torques.shape[1] - len(gears.joints)]
+    torques = np.zeros((len(times), count))
+    if len(gears.joints) < count:
+        torques[:] = asked.driven.forces(times, *(tracked.curve(times, k) for k in range(3)))[1][:, :count]
     for column, joint in zip(gears.columns, gears.joints, strict=True):
         torque = tracked.gears[joint].torque
         assert torque is not None

@@ -54,7 +54,7 @@ SNAP = 4.5  # power of time with which a path begins whose fourth derivative is 
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
 NEAR_OPTIMUM = 1e-5  # last Newton step where gears give: voltages make an exact motion of any that is smooth
-MOST_SHRINKINGS = 6  # of limits, for voltages and torques of motions behind gears
+MOST_SHRINKINGS = 8  # of limits, for voltages and torques of motions behind gears
 SHRUNK = 1.002, 1.1  # factor, and power of what exceeds them, by which they do
 RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
@@ -145,7 +145,8 @@ class Tracking(TimedAnalysis):
             _check_reach(posed, bounds, least)
             tracked, objective = _solve(context, posed, self, least)
             if objective == "least-voltage":  # without the effort's share
-                least = replace(tracked, doubt=least.doubt)
+                smoothed = 1.0 - least.surely / tracked.share if tracked.gears else 0.0
+                least = replace(tracked, doubt=max(least.doubt, smoothed))
             texts = list(_warnings(context, posed, self, least))
             texts += torques_beyond(posed.asked, tracked) if tracked.gears else ()
             if tracked.unmet > self.tolerance:
@@ -330,22 +331,27 @@ def _behind_gears(asked: Transition, limits: Limits, breaks: Array, near: Tracke
     Where that does not do, the motion that exceeds them least.
     """
     near, wanted = _without_jumps(asked, breaks, near, analysis.tolerance), replace(asked, limits=limits)
-    found = list[tuple[float, Tracked]]()
+    found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
     for _ in range(MOST_SHRINKINGS):
-        if not near.converged:
-            break
-        tracked = behind_gears(asked, near, analysis.output_step)
-        shares = largest_shares(wanted, tracked)
-        voltages = shares.voltage if asked.is_limited and asked.objective != "least-voltage" else 0.0
-        torques = shares.torques if asked.objective != "least-torque" else 0.0 * shares.torques
-        found.append((max(voltages, float(torques.max())), tracked))
-        if found[-1][0] <= 1.0:
-            break
-        by = [np.where(share > 1.0, SHRUNK[0] * share ** SHRUNK[1], 1.0) for share in (voltages, torques)]
-        patches = replace(asked.limits.patches, range=asked.limits.patches.range / by[0])
-        asked = replace(asked, limits=Limits(patches, asked.limits.torque / by[1]))
-        near = track(asked, near.voltage.x, near, within=NEAR_OPTIMUM)
-    return min(found, key=lambda one: one[0])[1] if found else near
+        if near.converged:
+            now, last, tracked = asked, near, behind_gears(asked, near, analysis.output_step)
+            shares = largest_shares(wanted, tracked)
+            voltages = shares.voltage if asked.is_limited and asked.objective != "least-voltage" else 0.0
+            torques = shares.torques if asked.objective != "least-torque" else 0.0 * shares.torques
+            if asked.objective == "least-voltage":
+                tracked = replace(tracked, share=max(tracked.share, shares.voltage))
+            found.append((max(voltages, float(torques.max())), tracked))
+            if found[-1][0] <= 1.0:
+                break
+        elif found:  # so small limits allow no motion
+            power /= 2
+        else:
+            return near
+        by = [np.where(share > 1.0, SHRUNK[0] * share**power, 1.0) for share in (voltages, torques)]
+        patches = replace(now.limits.patches, range=now.limits.patches.range / by[0])
+        asked = replace(now, limits=Limits(patches, now.limits.torque / by[1]))
+        near = track(asked, last.voltage.x, last, within=NEAR_OPTIMUM)
+    return min(found, key=lambda one: one[0])[1]
 
 
 def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: float) -> Tracked:
