@@ -165,7 +165,7 @@ def read_controller(file: h5py.File, analysis: str) -> SampledController:
 
     group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
     A, B, C, D = (np.asarray(group[key], dtype=float) for key in "ABCD")
-    states, step = tuple(f"state/{k}" for k in range(1, len(A) + 1)), float(np.median(np.diff(time)))
+    states, step = tuple(f"state/{k}" for k in range(1, len(A) + 1)), float((time[-1] - time[0]) / (len(time) - 1))
     return SampledController(A, B, C, D, states, tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"]), step)
 
 
