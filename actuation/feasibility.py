@@ -354,6 +354,8 @@ def judge_actuators(
     for body, of_link in patches.items():
         link = links[body]
         for name, array in of_link.arrays.items():
+            if not array.layout.is_driven:
+                continue
             modes = of_link.modes[name]
             trial = None if analysis.is_repeated else partial(_largest_voltage, path, run, link, array.layout)
             p, F_p = modes.coordinates(link.p), modes.forces(link.F_p)

@@ -223,8 +223,12 @@ def on_pieces(
 ) -> LinkPatches:
     """The patches of a link, on its pieces as well: a patch across a cut acts on both sides of it.
 
-    `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body.
+    `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body. Raises
+    `InputError` for charges that pieces would change.
     """
+    cuts = np.array([start for start, _ in pieces.values()])[1:]
+    for array in whole.arrays.values():
+        _check_charges(path, array, cuts)
     body, bodies = whole.body, {whole.body: whole.bodies[whole.body]}
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
@@ -236,6 +240,23 @@ def on_pieces(
             charge[:, which], turn[:, which], yielding[which] = of.Phi_V.T, of.turn.T, of.yielding
         bodies[name] = OnBody(charge * whole.driven, turn, to_piece.T, charge, yielding)
     return replace(whole, bodies=bodies)
+
+
+def _check_charges(path: Path, array: PatchArray, cuts: Array) -> None:
+    """Raise `InputError` for electrodes that `cuts` (k,), m, of the link would divide, or shunts of any of its pieces.
+
+    Shunts act at the frequencies of the link's modes, which are not those of pieces.
+    """
+    layout, slack = array.layout, 1e-6 * array.layout.length
+    where = f"{_key(path, layout.label)}: {'shunt' if layout.shunt is not None else 'electrodes'}"
+    if layout.shunt is not None:
+        raise InputError(f"{where}: expected a link in one piece with a shunt, found {len(cuts) + 1} pieces")
+    through = ((cuts > array.edges[:, :1] + slack) & (cuts < array.edges[:, 1:] - slack)).any(axis=0)
+    if layout.gives_way and through.any():
+        raise InputError(
+            f'{where}: expected no cut between pieces through a patch with electrodes = "open", found one at'
+            f" {cuts[through][0]:g} m: change pieces, or centers"
+        )
 
 
 def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:

@@ -154,3 +154,23 @@ def test_voltages_for_passive_patches_are_refused():
     seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}]}
     with pytest.raises(InputError, match=r'"seen": sensor: pzt: expected patches without a shunt.*, found "strip"'):
         ffrobot.make_scene(**(scene | {"load": [], "analysis": [seen]}))
+
+
+def test_passive_patches_need_nothing_and_pieces_leave_their_charge_whole():
+    """A shunt acts at frequencies of the whole link; a cut would make two charges of one."""
+    damped = LINK | {"damping": {"rayleigh": [0.0, 1e-7]}}
+    scene = {
+        "name": "strip", "gravity": [0.0, 0.0],
+        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"]}],
+        "trajectory": [{"name": "turn", "joint": "hub", "value": "0.1*t**3"}],
+        "analysis": [{"name": "turned", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+    }  # fmt: skip
+    whole, halves = ([{"name": "strip", "link": damped, "pieces": pieces}] for pieces in (1, 2))
+    with ffrobot.solve(ffrobot.make_scene(**scene, body=whole, pzt=[PATCH | PLACE | {"shunt": 1e4}])) as results:
+        assert not results.verdict["turned"].patches
+    for keys, message in (
+        ({"shunt": 1e4, **PLACE}, "shunt: expected a link in one piece with a shunt, found 2 pieces"),
+        ({"electrodes": "open"}, 'through a patch with electrodes = "open", found one at 0.15 m'),
+    ):
+        with pytest.raises(InputError, match=message):
+            ffrobot.solve(ffrobot.make_scene(**scene, body=halves, pzt=[PATCH | keys]))
