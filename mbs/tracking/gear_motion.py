@@ -17,9 +17,11 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ..inversion.collocation import gauss
+from ..inversion.stable_inversion import halved
 from ..run.record import GearCurve
 from .geared import GearedServo, Gears
-from .problem import Tracked, Transition
+from .intervals import MOST_INTERVALS
+from .problem import Limits, Tracked, Transition, track
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
 TEN = gauss(10)
 REACHES = 1e-6  # of the largest singular value of Φ_V: smaller ones are none
 ROUNDING = 1e-13  # of the largest value, coefficients of Legendre's polynomials
+NEAR_OPTIMUM = 1e-5  # last Newton step where gears give: voltages make an exact motion of any that is smooth
+MOST_SHRINKINGS = 8  # of limits, for voltages and torques of motions behind gears
+SHRUNK = 1.002, 1.1  # factor, and power of what exceeds them, by which they do
 LASTS = 20.0  # D/K after which a gear has come to rest
 GONE = 1e-12  # of the largest twist: decaying parts below it are none
 MANY = np.arange(40) / 40  # of an interval, where a polynomial is looked at for its largest value
@@ -52,6 +57,53 @@ class Motion(NamedTuple):
     curve: PPoly
     voltage: PPoly
     unmet: float
+
+
+def within_limits(
+    asked: Transition, limits: Limits, breaks: Array, near: Tracked, *, tolerance: float, step: float
+) -> Tracked:
+    """The motion `asked` for behind its gears; its limits shrink by what exceeds `limits` between Gauss points.
+
+    Where that does not do, the motion that exceeds them least.
+    """
+    near, wanted = _without_jumps(asked, breaks, near, tolerance), replace(asked, limits=limits)
+    found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
+    for _ in range(MOST_SHRINKINGS):
+        if near.converged:
+            now, last, tracked = asked, near, behind_gears(asked, near, step)
+            shares = largest_shares(wanted, tracked)
+            voltages = shares.voltage if asked.is_limited and asked.objective != "least-voltage" else 0.0
+            torques = shares.torques if asked.objective != "least-torque" else 0.0 * shares.torques
+            if asked.objective == "least-voltage":
+                tracked = replace(tracked, share=max(tracked.share, shares.voltage))
+            found.append((max(voltages, float(torques.max())), tracked))
+            if found[-1][0] <= 1.0:
+                break
+        elif found:  # so small limits allow no motion
+            power /= 2
+        else:
+            return near
+        by = [np.where(share > 1.0, SHRUNK[0] * share**power, 1.0) for share in (voltages, torques)]
+        patches = replace(now.limits.patches, range=now.limits.patches.range / by[0])
+        asked = replace(now, limits=Limits(patches, now.limits.torque / by[1]))
+        near = track(asked, last.voltage.x, last, within=NEAR_OPTIMUM)
+    return min(found, key=lambda one: one[0])[1]
+
+
+def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: float) -> Tracked:
+    """The optimum on intervals that are halved, all of them, while that leaves less on modes of a motion without jumps.
+
+    Splines swing where intervals are unlike, and where a zero passes through infinity finer ones do not help.
+    """
+    best = track(asked, breaks, near, within=NEAR_OPTIMUM)
+    left = smooth(asked, best).unmet if best.converged else 0.0
+    while left > tolerance and 2 * len(best.voltage.x) <= MOST_INTERVALS and asked.driven.goes_on():
+        finer = track(asked, halved(best.voltage.x), best, within=NEAR_OPTIMUM)
+        left, last = smooth(asked, finer).unmet if finer.converged else np.inf, left
+        if left > 0.5 * last:
+            break
+        best = finer
+    return best
 
 
 def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:

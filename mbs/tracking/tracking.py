@@ -23,7 +23,7 @@ from ..analysis.forward import Forward, largest_moments
 from ..fields.field_types import NotNegative, Positive
 from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along, where
 from ..inversion.servo import Servo, Stopped, make_servo
-from ..inversion.stable_inversion import halved, with_corners
+from ..inversion.stable_inversion import with_corners
 from ..inversion.zero_dynamics import Linearisation, equilibrium, linearise
 from ..model.amplifiers import joined
 from ..model.model import Model, modal_directions, path_errors
@@ -44,18 +44,15 @@ from .advice import (
     singular_times,
     slowest,
 )
-from .gear_motion import behind_gears, largest_shares, smooth, torques_beyond
+from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
-from .intervals import MOST_INTERVALS, SETTLED, refined, settled, start_breaks
+from .intervals import SETTLED, refined, settled, start_breaks
 from .problem import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights, track
 
 VOLT = 200.0  # V_ref where patches have no limits
 SNAP = 4.5  # power of time with which a path begins whose fourth derivative is zero there, at least
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
-NEAR_OPTIMUM = 1e-5  # last Newton step where gears give: voltages make an exact motion of any that is smooth
-MOST_SHRINKINGS = 8  # of limits, for voltages and torques of motions behind gears
-SHRUNK = 1.002, 1.1  # factor, and power of what exceeds them, by which they do
 RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
 REPLAYED = 1e-5  # tolerance of torques alone, at most
@@ -317,57 +314,12 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     if asked.gears is None:
         tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
     else:
-        tracked = _behind_gears(asked, limits, breaks, least, analysis)
+        tracked = within_limits(asked, limits, breaks, least, tolerance=analysis.tolerance, step=analysis.output_step)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = _causes(context, posed) or "loosen limits or tolerance"
         raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
     return tracked, objective
-
-
-def _behind_gears(asked: Transition, limits: Limits, breaks: Array, near: Tracked, analysis: Tracking) -> Tracked:
-    """With gears that give; limits shrink by what a motion without jumps exceeds `limits` between Gauss points.
-
-    Where that does not do, the motion that exceeds them least.
-    """
-    near, wanted = _without_jumps(asked, breaks, near, analysis.tolerance), replace(asked, limits=limits)
-    found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
-    for _ in range(MOST_SHRINKINGS):
-        if near.converged:
-            now, last, tracked = asked, near, behind_gears(asked, near, analysis.output_step)
-            shares = largest_shares(wanted, tracked)
-            voltages = shares.voltage if asked.is_limited and asked.objective != "least-voltage" else 0.0
-            torques = shares.torques if asked.objective != "least-torque" else 0.0 * shares.torques
-            if asked.objective == "least-voltage":
-                tracked = replace(tracked, share=max(tracked.share, shares.voltage))
-            found.append((max(voltages, float(torques.max())), tracked))
-            if found[-1][0] <= 1.0:
-                break
-        elif found:  # so small limits allow no motion
-            power /= 2
-        else:
-            return near
-        by = [np.where(share > 1.0, SHRUNK[0] * share**power, 1.0) for share in (voltages, torques)]
-        patches = replace(now.limits.patches, range=now.limits.patches.range / by[0])
-        asked = replace(now, limits=Limits(patches, now.limits.torque / by[1]))
-        near = track(asked, last.voltage.x, last, within=NEAR_OPTIMUM)
-    return min(found, key=lambda one: one[0])[1]
-
-
-def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: float) -> Tracked:
-    """On intervals that are halved, all of them, while that leaves less on modes of a motion without jumps.
-
-    Splines swing where intervals are unlike, and where a zero passes through infinity finer ones do not help.
-    """
-    best = track(asked, breaks, near, within=NEAR_OPTIMUM)
-    left = smooth(asked, best).unmet if best.converged else 0.0
-    while left > tolerance and 2 * len(best.voltage.x) <= MOST_INTERVALS and asked.driven.goes_on():
-        finer = track(asked, halved(best.voltage.x), best, within=NEAR_OPTIMUM)
-        left, last = smooth(asked, finer).unmet if finer.converged else np.inf, left
-        if left > 0.5 * last:
-            break
-        best = finer
-    return best
 
 
 def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
