@@ -401,6 +401,23 @@ def test_the_archive_is_the_library_and_the_model(robot):
     assert again.path.read_bytes() == fmu.read_bytes()
 
 
+def test_voltages_are_those_on_driven_patches(tmp_path):
+    """Passive patches have no input; what amplifiers and hysteresis leave out is told."""
+    keys = tomllib.loads(scene_text("flat arm"))
+    driven = keys["pzt"][0] | {"hysteresis": {"weights": [0.7, 0.3], "thresholds": [0.0, 5.0]}}
+    passive = {"name": "sense", "face": "-y", "shunt": 1e5, "centers": [0.13]}
+    free = {"limit": None, "allocation": None, "structural": ["stiffness"]}
+    passive = {key: value for key, value in (keys["pzt"][0] | free | passive).items() if value is not None}
+    scene = tmp_path / "scene.toml"
+    scene.write_text(tomli_w.dumps(keys | {"pzt": [driven, passive]}))
+    done = export_file(scene, "fmu", None, None)
+    assert any(text.startswith("voltages are those on the patches") for text in done.remarks)
+    with zipfile.ZipFile(done.path) as file:
+        described = file.read("modelDescription.xml").decode()
+    assert 'name="pzt/upper/3"' in described
+    assert "pzt/sense" not in described
+
+
 PATH = {"name": "path", "joint": "shoulder", "value": "t**2"}
 INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.3, "output_step": 0.01}
 AGAIN = {"name": "again", "kind": "forward", "end": 0.3, "output_step": 0.01, "actuation": "inverse", "apply": "joints"}

@@ -55,7 +55,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
         f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),
     }
     what = f"{chosen.name}, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), what, tuple(_remarks(model, unit, folder)), chosen.name
+    return zipped(content), what, tuple(_remarks(scene, model, unit, folder)), chosen.name
 
 
 class _Logged(Watcher):
@@ -103,7 +103,7 @@ def _check(path: Path, scene: Scene) -> None:
         raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
 
 
-def _remarks(model: Model, unit: ForwardUnit, folder: str) -> list[str]:
+def _remarks(scene: Scene, model: Model, unit: ForwardUnit, folder: str) -> list[str]:
     remarks = [f"inputs are constant over a communication step; binary for {folder} alone, without sources"]
     if not unit.inputs:
         remarks.append("there are no inputs: no joint has a motor, no link patches")
@@ -112,4 +112,6 @@ def _remarks(model: Model, unit: ForwardUnit, folder: str) -> list[str]:
     if names := [joint.name for joint in silent if joint.units]:
         remarks.append(f"{quoted(names)}: no outputs of their coordinates, as they are none of the state")
     remarks += hanging_joints(model, State(unit.data.q, unit.data.v))
+    if any(layout.amplifier or layout.hysteresis for layout in scene.pzt):
+        remarks.append("voltages are those on the patches: amplifiers and hysteresis do not act")
     return [*remarks, "limits of motors and patches do not act"]

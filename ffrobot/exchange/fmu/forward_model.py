@@ -199,11 +199,12 @@ def _motors(model: Model) -> Iterator[Input]:
 
 
 def voltages_of_patches(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
-    """Yield the inputs of all patches: variable, and direction (n_v,) of a unit voltage."""
+    """Yield the inputs of all patches that voltages drive: variable, and direction (n_v,) of a unit voltage."""
     for of_link in patches.values():
         directions = modal_directions(model, of_link.per_volt)
-        for layout in of_link.arrays:
-            yield from ((voltage(layout, k), row) for k, row in enumerate(directions[of_link.columns(layout)], 1))
+        for layout, array in of_link.arrays.items():
+            rows = directions[of_link.columns(layout)] if array.layout.is_driven else ()
+            yield from ((voltage(layout, k), row) for k, row in enumerate(rows, 1))
 
 
 def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
