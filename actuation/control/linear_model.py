@@ -460,7 +460,9 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
     if b.shape[1] != len(c):
         raise InputError(f"zeros: expected as many inputs as outputs, found {b.shape[1]} and {len(c)}")
-    scale = pace(K, D) or 1.0
+    scale = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0)))
+    if scale <= RIGID * pace(K, D):  # nothing but round-off is elastic
+        scale = pace(K, D) or 1.0
     s = scale * (0.1 + 0.1j)  # any that is no pole
     passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)
     weakest = np.linalg.svd(passed, compute_uv=False).min(initial=np.inf)
