@@ -171,7 +171,7 @@ def test_what_is_refused(ur5, ffrobot, tmp_path):
     assert 'expected one of "inverse", found "invers" (did you mean "inverse"?)' in done.stderr
     done = ffrobot("export", ur5, "--format", "xls")
     assert done.returncode == 2
-    assert '--format: expected one of "csv", "joint-trajectory", "rosbag2", "fmu" of results' in done.stderr
+    assert '--format: expected one of "csv", "joint-trajectory", "rosbag2", "fmu", "c" of results' in done.stderr
     done = ffrobot("export", "nosuch.h5", "--format", "sid", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == "ffrobot: nosuch.h5: expected a scene, a modal body or a results file, found no such file\n"
