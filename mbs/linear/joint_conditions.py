@@ -185,9 +185,10 @@ def free_directions(R: Array) -> Array:
 
 
 def _moved(J: Array, N: Array) -> Array:
-    """J N, (k, m); 0 where its terms cancel but for round-off, as before the joints that are free."""
-    moved = J @ N
-    return np.where(np.abs(moved) > RIGID**2 * (np.abs(J) @ np.abs(N)), moved, 0.0)
+    """J N, (k, m); 0 where its terms cancel or N is zero but for round-off, as before the joints that are free."""
+    moved, zero = J @ N, 64.0 * np.finfo(float).eps * np.abs(N).max(axis=0, initial=0.0)
+    rounding = np.maximum(RIGID**2 * (np.abs(J) @ np.abs(N)), np.abs(J).sum(axis=1, keepdims=True) * zero)
+    return np.where(np.abs(moved) > rounding, moved, 0.0)
 
 
 def _compliance(K: Array, J: Array) -> Array:
