@@ -21,23 +21,26 @@ class Robot(DrawnRobot):
 
     def __init__(self, rng):
         super().__init__(rng, 0.1, 0.5)
-        self.modes = {}  # of each link
+        self.modes, self.widths = {}, {}  # of each link
 
     def common(self, follows_path):
         """Keys of the scene that do not depend on its kind."""
         last, count = list(self.modes.items())[-1]
         patches = follows_path and self.rng.random() < 0.5
+        width = min(PATCHES["width"], self.widths[last])
         step = self.end / int(self.rng.integers(100, 600))
         kind = "pcid" if follows_path else "forward"
         return {
             "gravity": [0.0, -9.81],
-            "pzt": [{"body": last, "count": count, **PATCHES}] if patches else [],
+            "pzt": [{"body": last, "count": count, **PATCHES, "width": width}] if patches else [],
             "analysis": [{"name": "a", "kind": kind, "end": self.end, "output_step": step}],
         }
 
     def link(self, name, length):
         """With one to five modes in the plane."""
         table = self.beam(length, 2.0)
+        section = table["geometry"]["section"]
+        self.widths[name] = section.get("width", PATCHES["width"])
         self.modes[name] = int(self.rng.integers(1, 6))
         modes = {"count": self.modes[name], "family": "in-plane-bending", "attachment_modes": False}
         return {"name": name, "link": table | {"reference": self.reference(), "modes": modes}}
