@@ -20,16 +20,15 @@ from ..patches.link_patches import LinkPatches
 from .linear_model import (
     LinearModel,
     Reachability,
-    Zeros,
     controllability,
     observability,
     robot_modes,
     state_space,
-    zeros,
 )
 from .margins import Suggestion, unhurried_gains
 from .records import Sensor
 from .signals import make_signals, readings_at
+from .zeros import Zeros, zeros
 
 MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some seconds
 

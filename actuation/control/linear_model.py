@@ -1,4 +1,4 @@
-"""A robot as x' = A x + B u, y = C x + D u, in continuous time or sampled; its modes, zeros and reach."""
+"""A robot as x' = A x + B u, y = C x + D u, its modes, and which of them inputs and outputs reach."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, Indices, NDArray, as_floats
+from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError, check_known, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.structs import struct
-from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions, pace
+from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions
 from ...mbs.linear.joint_conditions import robot_modes as modes_of
 from ...mbs.linear.linearisation import LinearMechanism
 
@@ -262,72 +262,6 @@ def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
     return [known.index(name) for name in wanted]
 
 
-@struct
-class SampledModel:
-    """x(k+1) = A x(k) + B u(k) of a model whose inputs are held, u acting after a delay.
-
-    Commands that are on their way are states behind those of the model, oldest first.
-    """
-
-    A: Array
-    B: Array
-    last: Indices  # (inputs,) of the state, commands that act until the sample
-
-
-def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bool = False) -> SampledModel:
-    """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3).
-
-    `delay` (s) of all inputs, or of each. `with_last`: without delay, too, the last command is a state, which acts
-    until the sample.
-    """
-    n, m = B.shape
-    late, fraction = np.divmod(np.broadcast_to(delay, m), T)
-    is_whole = fraction <= 1e-9 * T
-    ages = np.maximum(late + ~is_whole, int(with_last)).astype(int)  # of the command that acts until the sample
-    waiting = int(ages.max(initial=0))
-    Phi, Gamma = zero_order_hold(A, B, T)
-    early = Gamma.copy()
-    for part in np.unique(fraction[~is_whole]):
-        early[:, fraction == part] = zero_order_hold(A, B[:, fraction == part], T - float(part))[1]
-    columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
-    columns[:n, :n] = Phi
-    columns[n:, n + m :] = np.eye(waiting * m)
-    places = n + m * (waiting - late.astype(int)) + np.arange(m)
-    columns[:n, places] = early
-    columns[:n, (places - m)[~is_whole]] = (Gamma - early)[:, ~is_whole]  # the older one acts first in the interval
-    last = n + m * (waiting - ages) + np.arange(m)
-    return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :], last)
-
-
-def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
-    """e^{A T} and ∫ e^{A s} ds B over T."""
-    from scipy.linalg import expm
-
-    n, m = B.shape
-    scale = float(np.abs(B).max(initial=0.0)) or 1.0  # of inputs: the unit of a command must not decide on the powers
-    block = expm(np.block([[A, B / scale], [np.zeros((m, n + m))]]) * T)
-    return block[:n, :n], block[:n, n:] * scale
-
-
-def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
-    """X = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q, for which A − B K is stable; of filters with Aᵀ and Cᵀ in their place.
-
-    Raises `ValueError` where there is none.
-    """
-    from scipy.linalg import LinAlgError, solve_discrete_are
-
-    root = np.linalg.cholesky(R)
-    B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
-    try:
-        X = solve_discrete_are(A, B, Q, np.eye(len(R)))
-    except LinAlgError as error:
-        raise ValueError(str(error)) from None
-    K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
-    if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < 1.0:
-        raise ValueError("its solution is not stable")
-    return as_floats((X + X.T) / 2)
-
-
 STILL = 1e-10  # of the largest effect on its kind of output: less is round-off
 OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mode
 
@@ -409,116 +343,3 @@ def _reach(model: LinearModel, columns: Array, left: bool) -> Reachability:
     names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(modes.frequency, 1)]
     lost = tuple(name for name, reached in zip(names, measure, strict=True) if reached < OUT_OF_REACH)
     return Reachability(measure, lost)
-
-
-INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not
-MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are rounding
-ROUNDING = 1e-13  # of a pencil, relative: what its entries and QZ leave of double precision
-RESOLVED = 1e-3  # relative error of zeros: those that round-off moves by more may as well be infinite
-
-
-@struct
-class Zeros:
-    """The finite zeros (k,) rad/s from inputs to outputs: those on the left first, the slowest of each side.
-
-    `unstable`: those with positive real part. Without any the transfer is minimum phase (undamped ones on the imaginary
-    axis are allowed); with them, an output that is held to a path needs inputs that grow or begin before the path does.
-    """
-
-    values: ComplexArray
-    unstable: ComplexArray
-
-    @property
-    def minimum_phase(self) -> bool:
-        """Whether there is no zero with positive real part."""
-        return not self.unstable.size
-
-    @property
-    def slowest(self) -> float:
-        """The size of the slowest zero with positive real part, rad/s; infinite where there is none."""
-        return float(np.abs(self.unstable).min(initial=np.inf))
-
-    def describe(self) -> str:
-        """Return number and slowest unstable zero as text."""
-        if self.minimum_phase:
-            return "minimum phase"
-        slowest = self.unstable[np.abs(self.unstable).argmin()]
-        number = f"{slowest.real:.4g}" + (f" ± {abs(slowest.imag):.4g}i" if abs(slowest.imag) > 0 else "")
-        return f"non-minimum phase: {len(self.unstable)} zeros in the right half plane, the slowest {number} rad/s"
-
-
-def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
-    """Zeros of the transfer from as many inputs as outputs (MIMO transmission zeros where more than one).
-
-    While C z = 0 the inputs act as constraint forces: with bases N of C z = 0 and N_B of Bᵀ z = 0, zeros are the
-    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Of the square pencil [A − λI, B; C, 0], all but its infinite eigenvalues of
-    relative degree two. QZ scatters those of higher degree: an eigenvalue whose distance from infinity is within the
-    error that round-off makes of it (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2) is infinite.
-    A transfer that is nothing, or singular at all s, has none. Raises `InputError` unless both have the same number.
-    """
-    K, D, B, C = model.second_order
-    b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
-    if b.shape[1] != len(c):
-        raise InputError(f"zeros: expected as many inputs as outputs, found {b.shape[1]} and {len(c)}")
-    scale = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0)))
-    if scale <= RIGID * pace(K, D):  # nothing but round-off is elastic
-        scale = pace(K, D) or 1.0
-    s = scale * (0.1 + 0.1j)  # any that is no pole
-    passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)
-    weakest = np.linalg.svd(passed, compute_uv=False).min(initial=np.inf)
-    kinds = {model.output_names[k].partition("/")[0] for k in model.outputs(outputs)}
-    peers = [k for k, name in enumerate(model.output_names) if name.partition("/")[0] in kinds]
-    if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max(initial=0.0) * np.linalg.norm(b):
-        return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
-    N, N_B = free_directions(c), free_directions(b.T)
-    mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
-    values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
-    margins = np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
-    side = np.where(np.abs(values.real) > margins, np.sign(values.real), 0.0)
-    order = by_side(values, side)
-    return Zeros(scale * values[order], scale * values[order][side[order] > 0])
-
-
-def by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
-    """The order (k,) of `values` by their `side` of the imaginary axis, by size, and by imaginary part.
-
-    Sizes within `MARGIN` of each other count as one: those of conjugates, and of ± s, differ by round-off alone.
-    """
-    size = np.abs(values)
-    order = np.lexsort((size, side))
-    apart = np.diff(size[order]) > MARGIN * np.maximum(size[order][1:], 1.0)
-    group = np.zeros(len(values))
-    group[order[1:]] = np.cumsum(apart | (np.diff(side[order]) > 0))
-    return np.lexsort((values.imag, group))
-
-
-def _eigenvalues(M: Array, D: Array, K: Array) -> tuple[ComplexArray, Array]:
-    """The finite λ of λ² M + λ D + K, and their errors by round-off; M may be singular."""
-    n, unit = len(M), np.eye(len(M))
-    if not n:
-        return np.zeros(0, dtype=complex), np.zeros(0)
-    if not np.any(D):
-        squares, errors = _finite(-K, M, INFINITE**2)
-        roots = np.sqrt(squares)
-        errors /= np.maximum(np.abs(roots), np.sqrt(errors))
-        return np.concatenate([roots, -roots]), np.tile(errors, 2)
-    A = np.block([[np.zeros((n, n)), unit], [-K, -D]])
-    E = np.block([[unit, np.zeros((n, n))], [np.zeros((n, n)), M]])
-    return _finite(A, E, INFINITE)
-
-
-def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
-    """Eigenvalues of A − λ E that round-off tells from infinity, and their errors: chordal ones, times 1 + |λ|².
-
-    Those below 1 are far from infinity, though errors of double ones (a free body's, at 0) are estimated without bound.
-    """
-    from scipy.linalg import eig
-
-    (alpha, beta), left, right = eig(A, E, left=True, homogeneous_eigvals=True)
-    finite = np.abs(alpha) < largest * np.abs(beta)
-    values, left, right = alpha[finite] / beta[finite], left[:, finite].conj(), right[:, finite]
-    of_A, of_E = (np.abs((left * (X @ right)).sum(axis=0)) for X in (A, E))
-    chordal = ROUNDING * np.hypot(np.linalg.norm(A), np.linalg.norm(E)) / np.maximum(np.hypot(of_A, of_E), 1e-300)
-    size = np.hypot(1.0, np.abs(values))
-    resolved = (chordal * size < RESOLVED) | (np.abs(values) < 1.0)
-    return values[resolved].astype(complex), (chordal * size**2)[resolved]

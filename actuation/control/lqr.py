@@ -11,16 +11,14 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from .linear_model import (
     LinearModel,
-    SampledModel,
     controllability,
     kept_modes,
     observability,
-    riccati,
-    sampled,
     state_space,
 )
 from .records import JointPid, Lqr
 from .robot import Setup, estimate
+from .sampling import SampledModel, riccati, sampled
 
 MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion

@@ -24,8 +24,9 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.keys import SMALLEST
 from ...common.structs import struct
 from ...common.toml_files import toml_key
-from .linear_model import LinearModel, locked_frequencies, sampled
+from .linear_model import LinearModel, locked_frequencies
 from .records import ControllerRecord, JointPid, ModalVelocity
+from .sampling import sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to rounding
 LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times

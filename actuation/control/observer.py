@@ -21,7 +21,7 @@ from ...common.structs import struct
 from ...mbs.model.gears import with_compliance
 from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, make_controllers
-from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
+from .linear_model import LinearModel, kept_modes, observability, state_space
 from .margins import Feedback
 from .records import (
     FilterRecord,
@@ -33,6 +33,7 @@ from .records import (
     Sensor,
 )
 from .robot import Setup, default_tip, estimated_sensors
+from .sampling import riccati, sampled, zero_order_hold
 from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge

@@ -17,10 +17,11 @@ from ..mbs.quantities.motion import body_motion, modal_rates, reported_points
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
-    from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace, Zeros
+    from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace
     from ..actuation.control.loop import LoopRecord
     from ..actuation.control.metrics import Metrics
     from ..actuation.control.observer import Estimates
+    from ..actuation.control.zeros import Zeros
     from ..mbs.analysis.operating_points import RobotAtRest
     from ..mbs.inversion.motors_only import AroundPath
     from ..mbs.run.record import Run
@@ -220,7 +221,7 @@ def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
 
 def _by_size(poles: ComplexArray) -> ComplexArray:
     """Those (k,) of a sampled loop, the smallest first, in an order that round-off does not change."""
-    from ..actuation.control.linear_model import by_side
+    from ..actuation.control.zeros import by_side
 
     return poles[by_side(poles, np.zeros(len(poles)))]
 

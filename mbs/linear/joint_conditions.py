@@ -77,11 +77,6 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), rounding)
 
 
-def pace(K: Array, D: Array) -> float:
-    """The larger of √‖K̂‖ and ‖D̂‖, 1/s, of z̈ + D̂ ż + K̂ z = 0: about that of its fastest pole."""
-    return max(float(np.sqrt(np.linalg.norm(K, 2))), float(np.linalg.norm(D, 2))) if len(K) else 0.0
-
-
 def _pairs(poles: ComplexArray) -> Indices:
     """Numbers (f, 2) of poles that belong together: conjugates, and real ones in the order of their size."""
     complex_ones = np.flatnonzero(poles.imag > 0.0)

@@ -10,9 +10,9 @@ from scipy.linalg import expm, solve_discrete_are
 
 import ffrobot
 from ffrobot.actuation.context import ActuatedContext
-from ffrobot.actuation.control.linear_model import sampled
 from ffrobot.actuation.control.lqr import gains
 from ffrobot.actuation.control.robot import RigidArm, volts_on_file
+from ffrobot.actuation.control.sampling import sampled
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed
 from ffrobot.mbs.model.model import without_paths

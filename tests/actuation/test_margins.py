@@ -7,7 +7,7 @@ import pytest
 from beam_links import beam_link, tube
 from scipy.linalg import expm
 
-from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies, sampled
+from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies
 from ffrobot.actuation.control.margins import (
     FRACTION,
     joint_gains,
@@ -20,6 +20,7 @@ from ffrobot.actuation.control.margins import (
     suggested_gains,
 )
 from ffrobot.actuation.control.records import JointPid
+from ffrobot.actuation.control.sampling import sampled
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene

@@ -10,11 +10,12 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
 import ffrobot
-from ffrobot.actuation.control.linear_model import LinearModel, riccati, sampled, zero_order_hold
+from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.actuation.control.lqr import gains
 from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
 from ffrobot.actuation.control.observer import Schedule, kalman
 from ffrobot.actuation.control.records import KalmanObserver, Sensor
+from ffrobot.actuation.control.sampling import riccati, sampled, zero_order_hold
 from ffrobot.actuation.control.signals import Filter, Signal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.exchange.export import export_file

@@ -1,0 +1,74 @@
+"""Linear models between samples: exact discrete models whose inputs are held and act late, and Riccati's equation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.arrays import Array, Indices, as_floats
+from ...common.structs import struct
+
+
+@struct
+class SampledModel:
+    """x(k+1) = A x(k) + B u(k) of a model whose inputs are held, u acting after a delay.
+
+    Commands that are on their way are states behind those of the model, oldest first.
+    """
+
+    A: Array
+    B: Array
+    last: Indices  # (inputs,) of the state, commands that act until the sample
+
+
+def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bool = False) -> SampledModel:
+    """The exact discrete model for samples every T (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3).
+
+    `delay` (s) of all inputs, or of each. `with_last`: without delay, too, the last command is a state, which acts
+    until the sample.
+    """
+    n, m = B.shape
+    late, fraction = np.divmod(np.broadcast_to(delay, m), T)
+    is_whole = fraction <= 1e-9 * T
+    ages = np.maximum(late + ~is_whole, int(with_last)).astype(int)  # of the command that acts until the sample
+    waiting = int(ages.max(initial=0))
+    Phi, Gamma = zero_order_hold(A, B, T)
+    early = Gamma.copy()
+    for part in np.unique(fraction[~is_whole]):
+        early[:, fraction == part] = zero_order_hold(A, B[:, fraction == part], T - float(part))[1]
+    columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
+    columns[:n, :n] = Phi
+    columns[n:, n + m :] = np.eye(waiting * m)
+    places = n + m * (waiting - late.astype(int)) + np.arange(m)
+    columns[:n, places] = early
+    columns[:n, (places - m)[~is_whole]] = (Gamma - early)[:, ~is_whole]  # the older one acts first in the interval
+    last = n + m * (waiting - ages) + np.arange(m)
+    return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :], last)
+
+
+def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
+    """e^{A T} and ∫ e^{A s} ds B over T."""
+    from scipy.linalg import expm
+
+    n, m = B.shape
+    scale = float(np.abs(B).max(initial=0.0)) or 1.0  # of inputs: the unit of a command must not decide on the powers
+    block = expm(np.block([[A, B / scale], [np.zeros((m, n + m))]]) * T)
+    return block[:n, :n], block[:n, n:] * scale
+
+
+def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
+    """X = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q, for which A − B K is stable; of filters with Aᵀ and Cᵀ in their place.
+
+    Raises `ValueError` where there is none.
+    """
+    from scipy.linalg import LinAlgError, solve_discrete_are
+
+    root = np.linalg.cholesky(R)
+    B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
+    try:
+        X = solve_discrete_are(A, B, Q, np.eye(len(R)))
+    except LinAlgError as error:
+        raise ValueError(str(error)) from None
+    K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
+    if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < 1.0:
+        raise ValueError("its solution is not stable")
+    return as_floats((X + X.T) / 2)
