@@ -65,13 +65,13 @@ def smooth(
     from ..run.inputs import files_of
     from ..smooth.drawn import picture
     from ..smooth.printed import print_smooth, write_page
-    from ..smooth.smoothing import maker_of, smooth_motion
+    from ..smooth.smoothing import check_target, smooth_motion
 
     controllers = _servo(servo)
     tables = map(Path, controllers.values() if isinstance(controllers, dict) else [controllers])
     protect([*files_of(scene_file), *([motion] if motion else []), *tables])
     target = output or scene_file.with_suffix(".smooth.json")
-    maker_of(target)  # its ending is known to be wrong before a robot is simulated
+    check_target(target, force=force)
     with Display() as display:
         found = smooth_motion(
             scene_file, motion, servo=controllers, damping_ratio=damping_ratio, point=point,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError, SolveError, check_known, either, quoted
-from ..common.files import AnyPath
+from ..common.files import AnyPath, check_new_file, check_new_folder
 from ..common.structs import struct
 from ..exchange.export import Content, write_content
 from ..exchange.motion.robot_motion import (
@@ -79,10 +79,11 @@ class Smoothed:
         write_content(path, make(motion), force=force)
 
 
+BAG = ".rosbag2"  # a folder
 MAKERS: Mapping[str, Callable[[JointMotions], Content]] = {
     ".json": lambda motion: joint_trajectory_text(motion)[0],
     ".csv": csv_text,
-    ".rosbag2": lambda motion: joint_trajectory_bag(motion)[0],
+    BAG: lambda motion: joint_trajectory_bag(motion)[0],
 }
 
 
@@ -91,6 +92,15 @@ def maker_of(path: Path) -> Callable[[JointMotions], Content]:
     if path.suffix not in MAKERS:
         raise InputError(f'{path}: expected a name that ends in {either(MAKERS)}, found "{path.name}"')
     return MAKERS[path.suffix]
+
+
+def check_target(path: Path, *, force: bool) -> None:
+    """Raise `InputError` for a name to which `Smoothed.write` would not write, before any work is done."""
+    maker_of(path)
+    if path.suffix == BAG:
+        check_new_folder(path)
+    else:
+        check_new_file(path, replace=force)
 
 
 def smooth_motion(

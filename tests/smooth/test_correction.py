@@ -72,6 +72,19 @@ def test_other_endings_are_rejected(tmp_path, found):
         found.write(tmp_path / "new.txt")
 
 
+def test_a_file_in_the_way_is_seen_before_anything_is_simulated(tmp_path, ffrobot):
+    axis(tmp_path)
+    table(tmp_path / "path.csv", TIMES, hub=WAY * LAWS["trapezoid"].sample(TIMES)[:, 0])
+    (tmp_path / "new.csv").write_text("mine")
+    (tmp_path / "bag.rosbag2").mkdir()
+    (tmp_path / "bag.rosbag2" / "mine").touch()
+    for name, expected in (("new.csv", "--force to replace it"), ("bag.rosbag2", "a new or empty folder")):
+        done = ffrobot("smooth", "scene.toml", "--path", "path.csv", "-o", name, cwd=tmp_path)
+        assert done.returncode == 2
+        assert expected in done.stderr
+        assert "verdict" not in done.stdout
+
+
 def test_a_flexible_link_vibrates_by_the_closed_form_under_its_motor_or_behind_an_inverted_gear(tmp_path):
     """The first mode of a cantilever, see tests/cases/test_settling.py; behind the gear its root follows the motion."""
     length, way, beta = 0.6, 0.1, 1.8751040687
