@@ -35,28 +35,34 @@ class Hysteresis:
         weights = np.diff(1.0 / W, axis=0, prepend=0.0)
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
 
+    def plays(self, z: Array, V: Array) -> Array:
+        """Return z (…, MOST_PLAYS, k) at voltages V (…, k), all on one way up or down, after z (MOST_PLAYS, k), V."""
+        V = V[..., None, :]
+        return np.clip(z, V - self.thresholds, V + self.thresholds)
+
+    def acting(self, plays: Array) -> Array:
+        """Return the voltages (…, k) that patches act under, Σ w z, of `plays` (…, MOST_PLAYS, k), V."""
+        return as_floats((self.weights * plays).sum(axis=-2))
+
     def output(self, V: Array) -> Array:
-        """Return (T, k) voltages that patches act under of V (T, k), straight between these, from rest."""
+        """Return the voltages (T, k) that patches act under of V (T, k), straight between these, from rest."""
         found, z = np.empty_like(V), np.zeros_like(self.weights)
         turns = np.flatnonzero(np.diff(np.sign(np.diff(V, axis=0)), axis=0).any(axis=1)) + 2
         begins = np.union1d(turns, np.arange(0, len(V), CHUNK))
         for one, way in zip(np.split(found, begins[1:]), np.split(V, begins[1:]), strict=True):
-            plays = np.clip(z, way[:, None] - self.thresholds, way[:, None] + self.thresholds)
-            one[:], z = (self.weights * plays).sum(axis=1), plays[-1]
+            plays = self.plays(z, way)
+            one[:], z = self.acting(plays), plays[-1]
         return found
 
 
 class Played:
-    """Play operators on their way, from rest."""
+    """State of play operators that are asked step by step, from rest on."""
 
     def __init__(self, of: Hysteresis) -> None:
         self._of, self._z = of, np.zeros_like(of.weights)
 
     def at(self, V: Array, last: Array | None = None) -> Array:
         """Return the voltages (k,) that patches act under at V (k,), on their way to the `last` (k,)."""
-        found = as_floats((self._of.weights * self._after(V)).sum(axis=0))
-        self._z = self._after(V if last is None else last)
+        found = self._of.acting(self._of.plays(self._z, V))
+        self._z = self._of.plays(self._z, V if last is None else last)
         return found
-
-    def _after(self, V: Array) -> Array:
-        return np.clip(self._z, V - self._of.thresholds, V + self._of.thresholds)
