@@ -17,7 +17,7 @@ from ..inversion.stable_inversion import invert
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from ..run.context import Context
 from .intervals import OUT_OF_REACH, settled, start_breaks
-from .problem import Transition
+from .transition import Transition
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6

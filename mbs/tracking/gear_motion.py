@@ -18,10 +18,12 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ..inversion.collocation import gauss
 from ..inversion.stable_inversion import halved
+from ..model.model import Model
 from ..run.record import GearCurve
 from .geared import GearedServo, Gears
 from .intervals import MOST_INTERVALS
-from .problem import Limits, Tracked, Transition, track
+from .problem import track
+from .transition import Limits, Tracked, Transition
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly
@@ -165,13 +167,13 @@ def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
     return Shares(of_voltages, torques.max(axis=0) / asked.limits.torque, times[torques.argmax(axis=0)])
 
 
-def torques_beyond(asked: Transition, tracked: Tracked) -> Iterator[str]:
+def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
     """Warnings on motors whose torques exceed their limits between the points at which these are constraints."""
-    _, shares, times = largest_shares(asked, tracked)
-    names = [joint for joint, columns in asked.driven.model.motors.items() for _ in columns]
-    for k in np.flatnonzero(shares > 1.0):
+    names = [joint for joint, columns in model.motors.items() for _ in columns]
+    for k in np.flatnonzero(shares.torques > 1.0):
         yield (
-            f"the motor of {names[k]} reaches {100 * shares[k]:.4g} % of its moment_limit at t = {times[k]:.4g} s,"
+            f"the motor of {names[k]} reaches {100 * shares.torques[k]:.4g} % of its moment_limit at"
+            f" t = {shares.peak_times[k]:.4g} s,"
             " between the points of intervals where its torque is limited: a slower path, or a larger moment_limit"
         )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import KW_ONLY, replace
+from dataclasses import KW_ONLY, fields, replace
 
 import numpy as np
 
@@ -119,12 +119,10 @@ def with_gears(servo: Servo) -> Servo:
         inertia=np.array([inertia * ratio**2 for inertia, ratio in rotors]),
     )
     without = tuple(replace(servo, model=_without_rotor(model, node.joint.name)) for node in elastic)
-    geared = GearedServo(**{name: getattr(servo, name) for name in _FIELDS}, gears=gears, without=without)
+    of_servo = {one.name: getattr(servo, one.name) for one in fields(servo)}
+    geared = GearedServo(**of_servo, gears=gears, without=without)
     _check_rotors(geared, np.array([ratio for _, ratio in rotors]))
     return geared
-
-
-_FIELDS = ("model", "end", "factor", "near_times", "near", "where", "goes_on", "offset")
 
 
 def _check_rotors(servo: GearedServo, ratios: Array) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ..inversion.stable_inversion import PROBES, cut, halved
-from .problem import TOLERANCE, Tracked, Transition, track
+from .problem import TOLERANCE, track
+from .transition import Tracked, Transition
 
 GRADING = 2.5  # of breaks to both ends: tanh
 MOST_INTERVALS = 1500

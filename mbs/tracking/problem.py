@@ -17,32 +17,22 @@ breaks, and T_r⁴|V̈|² takes the place of T_r²|V̇|².
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from itertools import product
 from math import comb
-from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.structs import struct
 from ..inversion.collocation import GAUSS, Elimination, bernstein_integral, piecewise, stage_states
-from ..inversion.servo import Servo
 from ..inversion.zero_dynamics import shape_along
-from ..model.amplifiers import Amplifiers
-from ..run.record import GearCurve
-from .geared import Gears
 from .interior_point import GAP, Minimum, Program, minimize
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
-
-Objective = Literal["effort", "least-voltage", "least-current", "least-torque"]
+from .transition import RATE, Tracked, Transition
+from .voltages import Voltages
 
 MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
-RATE = 0.005  # s, T_r where nothing is said
-RATE_BEHIND_GEARS = 0.002  # s, the same where gears give
 # second derivative by ξ of the cubic through values at the Gauss points, four by four
 POWERS = np.arange(2, len(GAUSS.c))
 CURVATURE = (GAUSS.c[:, None] ** (POWERS - 2) * POWERS * (POWERS - 1)) @ GAUSS.to_powers[2:]
@@ -60,95 +50,6 @@ WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relati
 ROUGH_GAP = 1e-6  # of the objective, there
 
 
-@struct
-class Limits:
-    """Limits of m patches, V, and of motors (motors,), N·m or N; infinite if none."""
-
-    patches: Amplifiers
-    torque: Array
-
-
-@struct
-class Weights:
-    """τ_ref (N·m), V_ref (V) and T_r (s)."""
-
-    torque: float
-    voltage: float
-    rate: float
-
-
-@struct
-class Transition:
-    """Boundary conditions: `rest` is p at both ends; `is_free` whether V, or V̈, may start and end at any value.
-
-    `rate` is that of the slowest zero, 1/s: voltages matter less by e^{−rate t} at the time t from the nearer end.
-    """
-
-    driven: Servo
-    Phi_V: Array  # (n, m)
-    limits: Limits
-    weights: Weights
-    rest: tuple[Array, Array]
-    objective: Objective = "effort"
-    is_free: bool = False
-    rate: float = 0.0
-    gears: Gears | None = None  # those that give; V then begins and ends at zero, with its rate
-
-    @property
-    def is_limited(self) -> bool:
-        """Whether patches have limits of voltages."""
-        return bool(np.isfinite(self.limits.patches.range).any())
-
-    @property
-    def units(self) -> Array:
-        """Voltages (m,), V, that scale the unknowns: the larger of the two limits of each patch."""
-        return np.abs(self.ranges["voltage"]).max(axis=0)
-
-    @property
-    def ranges(self) -> dict[str, Array]:
-        """Smallest and largest values (2, …) by which shares count: limits, or sizes where there are none."""
-        of, weights = self.limits.patches, self.weights
-        rate = np.full_like(of.slew, weights.voltage / (weights.rate or RATE))
-        both = np.array([[-1.0], [1.0]])
-        pairs = {
-            "voltage": (of.range, both * np.full_like(of.slew, weights.voltage)),
-            "slew": (both * of.slew, both * rate),
-            "current": (both * of.current, both * rate * of.capacitance),
-            "torque": (both * self.limits.torque, both * np.full_like(self.limits.torque, weights.torque)),
-        }
-        return {name: np.where(np.isfinite(limit), limit, size) for name, (limit, size) in pairs.items()}
-
-
-@struct
-class Tracked:
-    """p(t) and V(t) as piecewise polynomials, and how they were found."""
-
-    curve: PPoly
-    voltage: PPoly
-    converged: bool
-    iterations: int
-    share: float  # σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none
-    cost: float  # J; 0 where it is not the objective
-    # by how much less J, or σ, is for limits that are wider by one: "voltage", "slew" and "current" of patches (m,),
-    # 1/V, s/V, 1/A, and "torque" of motors (motors,) 1/(N·m) or 1/N; zero where a limit is not reached
-    prices: dict[str, Array]
-    objective: Objective  # what was made small
-    # largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one
-    unmet: float = np.nan
-    # step, found: the last Newton step, relative, and its minimum; the next step is about the square of it
-    step: float = np.inf
-    found: Minimum | None = None
-    added: float = 0.0  # what the effort adds to the objective "least-…"
-    gears: Mapping[str, GearCurve] = field(default_factory=dict)  # by joint, behind which motors are
-    # of the share, relative: twice its change by the last finer intervals, and what the effort may add
-    doubt: float = np.inf
-
-    @property
-    def surely(self) -> float:
-        """Lower bound of the share, within its uncertainty; 0 if that is unknown."""
-        return max(0.0, self.share * (1.0 - self.doubt)) if np.isfinite(self.doubt) else 0.0
-
-
 def track(
     asked: Transition, breaks: Array, near: Tracked | None = None, calm: float | None = None, within: float = TOLERANCE
 ) -> Tracked:
@@ -163,13 +64,13 @@ def track(
     N, s, n, m = *times.shape, *asked.Phi_V.shape
     flat = times.ravel()
     p_s = shape_along(driven, np.concatenate([breaks, flat]))
-    p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m if asked.gears is None else 3 * m))
+    p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m * (asked.order + 1)))
     K, sag_at = np.zeros((N, s, n)), p_s[N + 1 :]
     tau_qs = driven.quasi_static(flat, sag_at).reshape(N, s, -1)
     size = max(float(np.abs(driven.scale * p_s).max()), 1e-300)
     if near is not None:
         p, v = near.curve(breaks), near.curve(breaks, 1)
-        u = np.hstack([near.voltage(breaks, order) for order in ((0,) if asked.gears is None else (2, 0, 1))])
+        u = np.hstack([near.voltage(breaks, order) for order in (asked.order, *range(asked.order))])
         K = near.curve(flat, 2).reshape(K.shape)
     steps = _Steps(asked, breaks, tau_qs, size)
     steps.tolerance = within if calm is None else WHILE_SETTLING
@@ -217,7 +118,7 @@ class _Iterate:
         cost = steps.cost(self.found)
         return Tracked(
             piecewise(GAUSS, breaks, self.p, self.v, self.K),
-            steps.voltage(self.V),
+            steps.voltages.curve(self.V),
             self.converged,
             self.iterations,
             self.share,
@@ -278,47 +179,25 @@ class _Steps:
         self.n, self.m = asked.Phi_V.shape
         self.has_share = asked.objective != "effort"
         self.V, self.y = slice(0, self.m), slice(self.m, self.m + 2 * self.n)
-        self.states = slice(self.m, self.y.stop + (0 if asked.gears is None else 2 * self.m))
+        self.voltages = Voltages(breaks, asked.order)
+        self.states = slice(self.m, self.y.stop + asked.order * self.m)
         self.width = self.states.stop + self.has_share
+        # where in z what V follows from begins
+        self.starts = np.append([0, self.width], self.y.stop + self.m * np.arange(asked.order))
         pace = asked.weights.rate or RATE
         volts = np.full(self.m, asked.weights.voltage)
-        slow = [] if asked.gears is None else [volts, volts / pace]
         y_unit = np.concatenate([size / asked.driven.scale, np.full(self.n, size)])
-        self.state_unit = np.concatenate([y_unit, *slow])
-        control = volts if asked.gears is None else volts / pace**2
+        self.state_unit = np.concatenate([y_unit, *(volts / pace**k for k in range(asked.order))])
+        control = volts / pace**asked.order
         self.unit = np.concatenate([control, self.state_unit, np.ones(int(self.has_share))])
         self.unit_z = np.concatenate([self.unit, control])
         self.sigma = 1.0
 
-    def voltage(self, u: Array) -> PPoly:
-        """V(t) of what it follows from at breaks (N+1, …)."""
-        from scipy.interpolate import PPoly
-
-        h, (V, *states) = self.h[:, None], np.split(u, u.shape[1] // self.m, axis=1)
-        if not states:
-            return PPoly(np.array([np.diff(V, axis=0) / h, V[:-1]]), self.breaks)
-        return PPoly(np.array([np.diff(V, axis=0) / (6 * h), V[:-1] / 2, states[1][:-1], states[0][:-1]]), self.breaks)
-
-    def _volts(self, xi: Array, order: int = 0) -> tuple[Array, Array]:
-        """A derivative of V at shares ξ (S,) of intervals by what it follows from: (N, S, parts), and where in z."""
-        h, x = self.h[:, None], xi[None]
-        one, none = np.ones_like(h * x), np.zeros_like(h * x)
-        starts = np.array([0, self.width, self.y.stop, self.y.stop + self.m])
-        if self.asked.gears is None:
-            parts = ([one - x, one * x], [-one / h, one / h])[order]
-            return np.stack(parts, axis=2), starts[:2]
-        by = (
-            [h**2 * (x**2 / 2 - x**3 / 6), h**2 * x**3 / 6, one, h * x],
-            [h * (x - x**2 / 2), h * x**2 / 2, none, one],
-            [one - x, one * x, none, none],
-        )
-        return np.stack(by[order], axis=2), starts
-
     def _volts_by_z(self, xi: Array, order: int = 0) -> Array:
-        """The same (N, S, m, width + m) for all patches."""
-        parts, starts = self._volts(xi, order)
+        """A derivative of V at shares ξ (S,) of intervals by z (N, S, m, width + m)."""
+        parts = self.voltages.parts(xi, order)
         by_z, each = np.zeros((*parts.shape[:2], self.m, len(self.unit_z))), np.arange(self.m)
-        for k, start in enumerate(starts):
+        for k, start in enumerate(self.starts):
             by_z[:, :, each, start + each] = parts[:, :, k, None]
         return by_z
 
@@ -342,7 +221,7 @@ class _Steps:
         starts[:, :, self.y] = np.eye(2 * n).reshape(2, n, 2 * n)
         ends = [*stages.at_end(starts[0], starts[1], K_z)]
         reached = [*stages.at_end(p[:-1], v[:-1], K + moved)]
-        for order in range((self.states.stop - self.y.stop) // self.m):
+        for order in range(self.voltages.order):
             ends.append(self._volts_by_z(np.ones(1), order)[:, 0])
             reached.append(np.einsum("Nmz,Nz->Nm", ends[-1], z))
         offset = np.concatenate(reached, axis=1) - x[1:, self.states]
@@ -427,10 +306,9 @@ class _Steps:
         H = np.einsum("Ns,Nsta,Nstb->Nab", b, tau_z, tau_z, optimize=True)
         g = np.einsum("Ns,Nsta,Nst->Na", b, tau_z, off, optimize=True)
         of_voltages = np.zeros_like(H)
-        each, orders = np.arange(self.m), (0, 1 if self.asked.gears is None else 2)
-        for order in orders:
-            parts, starts = self._volts(GAUSS.c, order)
-            parts = parts * self.unit_z[starts] * weights.rate**order / weights.voltage
+        each, starts = np.arange(self.m), self.starts
+        for order in (0, max(1, self.voltages.order)):
+            parts = self.voltages.parts(GAUSS.c, order) * self.unit_z[starts] * weights.rate**order / weights.voltage
             share = (self.of_voltages * self.h)[:, None] * GAUSS.end_once / whole
             squares = np.einsum("Ns,Nsa,Nsb->abN", share, parts, parts)
             for (i, first), (j, second) in product(enumerate(starts), repeat=2):
@@ -450,9 +328,9 @@ class _Steps:
         def values(by_z: Array, of: Array | float = 0.0, slopes: Array | float = 0.0) -> tuple[Array, Array]:
             return of + np.einsum("Nsmz,Nz->Nsm", by_z, z, optimize=True), (slopes + by_z) * self.unit_z
 
-        within = np.zeros(1) if self.asked.gears is None else np.append(0.0, GAUSS.c)
+        within = self.voltages.within
         limited = {"voltage": values(self._volts_by_z(within))}
-        if self.asked.is_free and self.asked.gears is None:  # else V ends at zero
+        if self.asked.is_free and self.voltages.order == 0:  # else V ends at zero
             by_end = self._volts_by_z(np.ones(1))
             by_end[:-1] = 0.0
             limited["end"] = values(by_end)

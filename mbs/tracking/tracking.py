@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -47,7 +48,8 @@ from .advice import (
 from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
 from .intervals import SETTLED, refined, settled, start_breaks
-from .problem import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights, track
+from .problem import track
+from .transition import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights
 
 VOLT = 200.0  # V_ref where patches have no limits
 SNAP = 4.5  # power of time with which a path begins whose fourth derivative is zero there, at least
@@ -135,17 +137,17 @@ class Tracking(TimedAnalysis):
 
         try:
             posed = _pose(model, context.patches, self, progress)
-            bounds = _bounds(posed)
-            _check_reach(posed, bounds, None)
+            _check_reach(posed, None)
             least = settled(posed.asked, posed.coarse, progress)
             _check_found(context, posed, least)
-            _check_reach(posed, bounds, least)
+            _check_reach(posed, least)
             tracked, objective = _solve(context, posed, self, least)
             if objective == "least-voltage":  # without the effort's share
                 smoothed = 1.0 - least.surely / tracked.share if tracked.gears else 0.0
                 least = replace(tracked, doubt=max(least.doubt, smoothed))
             texts = list(_warnings(context, posed, self, least))
-            texts += torques_beyond(posed.asked, tracked) if tracked.gears else ()
+            shares = largest_shares(posed.asked, tracked) if tracked.gears else None
+            texts += () if shares is None else torques_beyond(model, shares)
             if tracked.unmet > self.tolerance:
                 texts.append(
                     f"between Gauss points modal forces up to {tracked.unmet:.2g} of the largest elastic one are left"
@@ -154,36 +156,17 @@ class Tracking(TimedAnalysis):
         except Stopped:
             place = where(model.scene.path, self)
             raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
-        pre, servo = posed.around[0], posed.servo
-        post = float(tracked.curve.x[-1]) - self.end
-        most = float(posed.asked.units.max())
-        around = TrackedPath(
-            pre_actuation=pre,
-            post_actuation=post,
-            least_voltage=least.share * most,
-            least_voltage_doubt=least.doubt * least.share * most,
-            least_share=least.share if posed.asked.is_limited else float("nan"),
-            objective=objective,
-            cost=tracked.cost,
-            held=servo.model,
-            unmet=tracked.unmet,
-            bounds=bounds,
-            prices={
-                kind: model.by_motor(of)
-                if kind == "torque"
-                else {name: prices[0] for name, prices in _by_body(context, of[None]).items()}
-                for kind, of in tracked.prices.items()
-            },
-        )
-        times = output_times(self.end, self.output_step, pre, post)
+        around = _around(context, posed, tracked, least, objective)
+        times = output_times(self.end, self.output_step, around.pre_actuation, around.post_actuation)
 
         def at(times: Array) -> Run:
-            return replace(_outcome(self, model, servo, tracked, context, times), details=around, twists=tracked.gears)
+            run = _outcome(self, model, posed.servo, tracked, context, times)
+            return replace(run, details=around, twists=tracked.gears)
 
         run = at(times)
         around = _with_torques_alone(context, run, around)
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
-        peaks = largest_shares(posed.asked, tracked).peak_times if tracked.gears else ()
+        peaks = () if shares is None else shares.peak_times
         return replace(run, details=around, statistics=statistics).with_look(lambda times: at(np.union1d(times, peaks)))
 
 
@@ -216,6 +199,14 @@ class _Posed:
     breaks: Array
     coarse: Array
 
+    @cached_property
+    def bounds(self) -> Bounds | None:
+        """What each zero requires, V; None where motors alone have no bounded motion."""
+        try:
+            return bounds_of_zeros(self.servo, self.asked, self.linear, self.around, self.asked.units)
+        except SolveError:
+            return None
+
 
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
     """Least voltage, V, and its uncertainty (see `TrackedPath`) for another model of the robot; NaN if not found."""
@@ -226,7 +217,7 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 
 
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
-    """The least voltage on the first breaks. Raises as `Tracking.run`, and `Stopped`."""
+    """The problem of a path: its robot, limits, ends, and the first breaks. Raises as `Tracking.run`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
     servo = with_gears(make_servo(model, end, place, progress, 1.0, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
@@ -293,12 +284,12 @@ def _is_beyond(posed: _Posed, least: Tracked) -> bool:
     return least.share > 1.0 + ENOUGH and posed.asked.is_limited
 
 
-def _check_reach(posed: _Posed, bounds: Bounds | None, least: Tracked | None) -> None:
+def _check_reach(posed: _Posed, least: Tracked | None) -> None:
     """Raise `SolveError` where a zero, or the least voltage, surely needs far more than the limits."""
-    shares = [] if bounds is None else (bounds.voltages / posed.asked.units.max()).tolist()
+    shares = [] if posed.bounds is None else (posed.bounds.voltages / posed.asked.units.max()).tolist()
     shares += [] if least is None else [least.surely]
     if posed.asked.is_limited:
-        check_within_reach(posed.servo, posed.linear, bounds, max(shares, default=0.0))
+        check_within_reach(posed.servo, posed.linear, posed.bounds, max(shares, default=0.0))
 
 
 def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
@@ -349,13 +340,6 @@ def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracke
     yield from far_patches(context, posed.linear.zeros[[0, -1]])
 
 
-def _bounds(posed: _Posed) -> Bounds | None:
-    try:
-        return bounds_of_zeros(posed.servo, posed.asked, posed.linear, posed.around, posed.asked.units)
-    except SolveError:
-        return None
-
-
 def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> TrackedPath:
     """With the distance from the path under the same torques without voltages, by forward simulation."""
     analysis = run.analysis
@@ -390,6 +374,29 @@ def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     voltage = given.voltage or (float(known.max()) if known.size else VOLT)
     rate = RATE_BEHIND_GEARS if isinstance(servo, GearedServo) else RATE
     return Weights(torque, voltage, rate if given.rate is None else given.rate)
+
+
+def _around(context: Context, posed: _Posed, tracked: Tracked, least: Tracked, objective: Objective) -> TrackedPath:
+    """The actuation of a path by the motion `tracked`."""
+    most = float(posed.asked.units.max())
+    return TrackedPath(
+        pre_actuation=posed.around[0],
+        post_actuation=float(tracked.curve.x[-1]) - posed.servo.end,
+        least_voltage=least.share * most,
+        least_voltage_doubt=least.doubt * least.share * most,
+        least_share=least.share if posed.asked.is_limited else float("nan"),
+        objective=objective,
+        cost=tracked.cost,
+        held=posed.servo.model,
+        unmet=tracked.unmet,
+        bounds=posed.bounds,
+        prices={
+            kind: context.model.by_motor(of)
+            if kind == "torque"
+            else {name: prices[0] for name, prices in _by_body(context, of[None]).items()}
+            for kind, of in tracked.prices.items()
+        },
+    )
 
 
 def _outcome(analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array) -> Run:

@@ -15,7 +15,8 @@ from ffrobot.mbs.inversion.stable_inversion import invert
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.tracking.geared import with_gears
-from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
+from ffrobot.mbs.tracking.problem import track
+from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
 

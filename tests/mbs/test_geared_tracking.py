@@ -17,7 +17,8 @@ from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.tracking.gear_motion import behind_gears
 from ffrobot.mbs.tracking.geared import Gears, with_gears
 from ffrobot.mbs.tracking.intervals import graded
-from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
+from ffrobot.mbs.tracking.problem import track
+from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
 

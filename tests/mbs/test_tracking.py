@@ -24,7 +24,8 @@ from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.tracking.advice import bounds_of_zeros
 from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
-from ffrobot.mbs.tracking.problem import Limits, Transition, Weights, track
+from ffrobot.mbs.tracking.problem import track
+from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
 
