@@ -127,13 +127,13 @@ ELSEWHERE = {
     "file_format",
     metavar="FORMAT",
     required=True,
-    help="Format: of results csv, joint-trajectory, rosbag2, fmu; of scenes urdf, fmu; of bodies sid, mbdyn,"
+    help="Format: of results csv, joint-trajectory, rosbag2, fmu, c; of scenes urdf, fmu; of bodies sid, mbdyn,"
     " craig-bampton, exudyn.",
 )
 @click.option(
     "--analysis",
     metavar="NAME",
-    help="Analysis; default: the first with moving joints, for fmu the first linear or forward one.",
+    help="Analysis; default: the first with moving joints, for fmu and c the first linear or forward one.",
 )
 @click.option(
     "--side",
@@ -158,8 +158,9 @@ def export(
     csv               time, and position, velocity and torque of every joint, and of motors before compliant gears
     joint-trajectory  JSON in the layout of ROS 2's trajectory_msgs/JointTrajectory, with effort
     rosbag2           a folder, the bag of ROS 2 with that message; needs rosbags (extra "ros")
-    fmu               FMI 2.0, model exchange and co-simulation, of a linear model; with C sources, compiled where
-                      there is a C compiler
+    fmu               FMI 2.0, model exchange and co-simulation, of a linear model; co-simulation of the controllers
+                      of a closed loop (--analysis); with C sources, compiled where there is a C compiler
+    c                 a header file with the matrices of either
     sid               SID_FEM, standard input data of flexible bodies (Wallrapp)
     mbdyn             .fem of MBDyn's modal joint
     craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes

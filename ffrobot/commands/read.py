@@ -46,14 +46,15 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
 @click.option("--analysis", metavar="NAME", help="Analysis [the first linear one].")
 @output_option("FILE.npz|FILE.mat", "Output file [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
-    """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
+    """Export a linear model, or controllers of a closed loop: matrices A, B, C, D with names of rows and columns."""
     from ..common.hdf5 import reading
     from ..results.file import Results
 
     path = output or results_file.with_suffix(".npz")
     with reading(results_file), Results(results_file) as results:
         name = results.export_linear(analysis, path)
-    click.echo(f"{path}: linear model of {name}")
+        what = "controllers" if results.has(f"{name}/control") else "linear model"
+    click.echo(f"{path}: {what} of {name}")
 
 
 @click.command()

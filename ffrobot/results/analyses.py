@@ -105,7 +105,7 @@ class AnalysisAccess(Datasets):
         """Linear models of an analysis, one for each of its times. Raises `InputError` if there is none."""
         if not self.has(f"{analysis}/linear"):
             raise InputError(
-                f'{self.path}: expected a linear analysis ({quoted(self._with_models())}), found "{analysis}"'
+                f'{self.path}: expected a linear analysis ({quoted(self._with("linear"))}), found "{analysis}"'
             )
         from .linear import read_linear
 
@@ -117,7 +117,7 @@ class AnalysisAccess(Datasets):
         Raises `InputError` where the analysis has none: no loop, or controllers that are not linear.
         """
         if not self.has(f"{analysis}/control/controller"):
-            known = quoted(name for name in self.analyses if self.has(f"{name}/control/controller"))
+            known = quoted(self._with("control/controller"))
             raise InputError(f'{self.path}: expected a closed loop of linear controllers ({known}), found "{analysis}"')
         from .linear import read_controller
 
@@ -130,9 +130,11 @@ class AnalysisAccess(Datasets):
 
     def linear_analysis(self, analysis: str | None) -> str:
         """`analysis`, or the first one with linear models. Raises `InputError` if there is none."""
-        known = self._with_models()
+        known = self._with("linear")
         if analysis is None and not known:
-            raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none')
+            loops = self._with("control/controller")
+            hint = f"; the name of a closed loop ({quoted(loops)}) selects its controllers" if loops else ""
+            raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none{hint}')
         return analysis or known[0]
 
     def export_linear(self, analysis: str | None, path: Path) -> str:
@@ -145,5 +147,6 @@ class AnalysisAccess(Datasets):
         save_models(self.state_spaces(name := self.linear_analysis(analysis)), path)
         return name
 
-    def _with_models(self) -> list[str]:
-        return [name for name in self.analyses if self.has(f"{name}/linear")]
+    def _with(self, group: str) -> list[str]:
+        """Names of the analyses with such a group."""
+        return [name for name in self.analyses if self.has(f"{name}/{group}")]
