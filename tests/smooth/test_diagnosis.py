@@ -45,16 +45,17 @@ LAWS = {
 
 
 @pytest.mark.parametrize(
-    ("law", "stiffer", "expected"),
-    [("trapezoid", 0.0, 4.85094), ("trapezoid", 0.1, 1.17276), ("trapezoid", -0.1, 10.56507),
-     ("s-curve", 0.0, 19.14325), ("s-curve", 0.1, 13.04147), ("nonic", -0.1, 2.683050)],
+    ("law", "stiffer", "expected", "bandwidth"),
+    [("trapezoid", 0.0, 4.85094, SERVO), ("trapezoid", 0.1, 1.17276, SERVO), ("trapezoid", -0.1, 10.56507, SERVO),
+     ("s-curve", 0.0, 19.14325, SERVO), ("s-curve", 0.1, 13.04147, SERVO), ("nonic", -0.1, 2.683050, SERVO),
+     ("s-curve", 0.0, 19.14325, 10.0), ("s-curve", 0.0, 19.14325, 30.0)],
 )  # fmt: skip
-def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected):
+def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected, bandwidth):
     """|∫ θ̈ e^(−iωt) dt|/ω, mrad, by an ideal controller, times |G(iω)|; by simulation and by the linear model."""
     times = np.arange(501) * 0.001
     path = table(tmp_path / "path.csv", times, hub=WAY * LAWS[law].sample(times)[:, 0])
-    found = smooth_motion(axis(tmp_path, stiffer), path, servo=SERVO, damping_ratio=RATIO)
-    s, servo = 1j * OMEGA * np.sqrt(1 + stiffer), 2 * np.pi * SERVO
+    found = smooth_motion(axis(tmp_path, stiffer), path, servo=bandwidth, damping_ratio=RATIO)
+    s, servo = 1j * OMEGA * np.sqrt(1 + stiffer), 2 * np.pi * bandwidth
     angle = 1e-3 * expected * abs(servo**2 / (s**2 + 2 * RATIO * servo * s + servo**2))
     assert found.before.residual == pytest.approx(2 * np.sin(angle), rel=5e-4)
     assert found.before.alone[0] == pytest.approx(2 * angle, rel=5e-4)
