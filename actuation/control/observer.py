@@ -159,8 +159,15 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
 
 
 def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
-    """States of x(k+1) = A x in motions that do not die out and that C x does not show (Popov–Belevitch–Hautus)."""
+    """States of x(k+1) = A x in motions that do not die out and that C x does not show (Popov–Belevitch–Hautus).
+
+    States are scaled first, as their units are arbitrary.
+    """
+    from scipy.linalg import matrix_balance
+
     found: dict[str, None] = {}
+    A, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    C = C * scale
     size = np.linalg.norm(C, axis=1, keepdims=True)
     C = C / np.where(size > 0.0, size, 1.0)
     for value in np.linalg.eigvals(A):

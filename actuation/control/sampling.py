@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.structs import struct
+
+DOUBLINGS = 40  # of steps of the Riccati recursion: errors of filters that die out, however slowly, are gone by then
+CONVERGED = 1e-10  # of the largest entry, of a doubling: the next one changes its square
 
 
 @struct
@@ -66,9 +71,30 @@ def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
     B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
     try:
         X = solve_discrete_are(A, B, Q, np.eye(len(R)))
-    except LinAlgError as error:
-        raise ValueError(str(error)) from None
+    except (LinAlgError, ValueError) as error:  # often only its reordering of eigenvalues
+        if (found := by_doubling(A, B, Q)) is None:
+            raise ValueError(str(error)) from None
+        X = found
     K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
     if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < 1.0:
         raise ValueError("its solution is not stable")
     return as_floats((X + X.T) / 2)
+
+
+def by_doubling(A: Array, B: Array, X: Array) -> Array | None:
+    """Return X of `riccati` with R = 1 by doubling, from Q on (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306).
+
+    Step k is 2ᵏ of the Riccati recursion. None where it does not converge, or R is below round-off of Bᵀ X B.
+    """
+    unit, G = np.eye(len(A)), B @ B.T
+    with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+        for _ in range(DOUBLINGS):
+            W, before = unit + G @ X, X
+            through = np.linalg.solve(W.T, A.T).T
+            X, G = X + A.T @ X @ np.linalg.solve(W, A), G + through @ G @ A.T
+            A, X, G = through @ A, (X + X.T) / 2, (G + G.T) / 2
+            if not (np.isfinite(X).all() and np.isfinite(G).all()):
+                return None
+            if np.abs(X - before).max() <= CONVERGED * np.abs(X).max():
+                return X if np.abs(B.T @ X @ B).max(initial=0.0) * np.finfo(float).eps < 1.0 else None
+    return None

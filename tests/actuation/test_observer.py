@@ -13,9 +13,9 @@ import ffrobot
 from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.actuation.control.lqr import gains
 from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
-from ffrobot.actuation.control.observer import Schedule, kalman
+from ffrobot.actuation.control.observer import Schedule, hidden, kalman
 from ffrobot.actuation.control.records import KalmanObserver, Sensor
-from ffrobot.actuation.control.sampling import riccati, sampled, zero_order_hold
+from ffrobot.actuation.control.sampling import by_doubling, riccati, sampled, zero_order_hold
 from ffrobot.actuation.control.signals import Filter, Signal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.exchange.export import export_file
@@ -55,6 +55,23 @@ def test_riccati_of_one_state_in_closed_form():
     half = ((a * a - 1) * r + q) / 2
     found = riccati(np.array([[a]]), np.eye(1), np.array([[q]]), np.array([[r]]))
     assert found[0, 0] == pytest.approx(half + np.sqrt(half**2 + q * r), rel=1e-12)
+
+
+def test_riccati_by_doubling():
+    """As by eigenvalues, whose reordering may fail; none of an integrator unseen, and of noise below round-off."""
+    rng = np.random.default_rng(0)
+    A, B = np.eye(4) + np.diag([0.1, 0.1, 0.0], 1) + 1e-2 * rng.standard_normal((4, 4)), rng.standard_normal((4, 2))
+    found = by_doubling(A, B, np.eye(4))
+    np.testing.assert_allclose(found, solve_discrete_are(A, B, np.eye(4), np.eye(2)), rtol=1e-9)
+    assert by_doubling(np.eye(2), np.array([[1.0], [0.0]]), np.eye(2)) is None
+    assert by_doubling(A, 1e10 * B, np.eye(4)) is None
+
+
+def test_motions_that_sensors_see_in_any_units():
+    """An angle shows its rate, also beside stiff modes; a motion that nothing reads is named."""
+    A = np.array([[1.0, 1e-3, 0.0], [0.0, 1.0, 1e5], [0.0, 0.0, 0.5]])
+    assert hidden(A, np.array([[1.0, 0.0, 0.0]]), ("angle", "rate", "mode")) == []
+    assert hidden(A, np.array([[0.0, 1.0, 0.0]]), ("angle", "rate", "mode")) == ["angle"]
 
 
 def test_two_masses_by_spectral_factorization():
