@@ -48,7 +48,15 @@ from .metrics import LoopMotion, last_change, place_of_tip
 from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
 from .records import SampledAnalysis, Sensor
-from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input_names, needed_sensors
+from .robot import (
+    ControlledRobot,
+    Setup,
+    default_tip,
+    estimated_sensors,
+    input_names,
+    needed_sensors,
+    whole_robot,
+)
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged, readings_at
 
 APART = 1e-6  # of a run, between two times of a spline
@@ -75,7 +83,7 @@ class ClosedLoop(SampledAnalysis):
         assert self.actuation is not None
         source = context.outcomes[self.actuation]
         plant = with_compliance(without_paths(context.model))
-        moved, robot, whole = with_motor_coordinates(source, plant), _robot(context, source), context.whole
+        moved, robot, whole = with_motor_coordinates(source, plant), whole_robot(context, source), context.whole
         read, estimated = self._signals(context, plant, robot)
         sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
         outputs, tip = replay_times(source, self), place_of(whole, self.tip) or default_tip(plant)
@@ -180,13 +188,6 @@ def _resolved(source: Run) -> Run:
     run = source.closer
     apart = np.diff(run.time, prepend=-np.inf) > APART * np.ptp(source.time)
     return run.at([int(k) for k in np.flatnonzero(apart)])
-
-
-def _robot(context: ActuatedContext, source: Run) -> ControlledRobot:
-    """What controllers know of: whole links also where the plant has their pieces."""
-    if context.whole is None:
-        return ControlledRobot(without_paths(context.model), context.patches, source)
-    return ControlledRobot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
 
 
 def loop_models(

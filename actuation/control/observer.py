@@ -9,7 +9,7 @@ their way, and the filters of sensors, are states of the model; the first are kn
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import fields, replace
 
@@ -32,7 +32,7 @@ from .records import (
     ScheduledObserver,
     Sensor,
 )
-from .robot import Setup, default_tip, estimated_sensors
+from .robot import ControlledRobot, Setup, default_tip, estimated_sensors
 from .sampling import riccati, sampled, zero_order_hold
 from .signals import Signal, filters, make_signals, merged, readings_at
 
@@ -95,11 +95,17 @@ def kalman(
 ) -> Observer:
     """The steady-state filter of a model that has what is read and estimated among its outputs.
 
-    `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for noise that acts on no
-    input of the model, and where something that does not die out cannot be seen.
+    `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for sensors without noise,
+    for noise that acts on no input of the model, and where something that does not die out cannot be seen.
     """
     inputs, T, delay = sampling
     names = [signal.name for signal in read]
+    exact = [s.name for s in read if not (s.sensor.deviation(T) or s.sensor.resolution)]
+    if exact or not read:
+        raise InputError(
+            "expected sensors with noise, noise_density or resolution, found"
+            + (f" none of these of {quoted(exact)}" if exact else " no sensor")
+        )
     rows, columns = model.outputs(names), model.inputs(inputs)
     added, process = model.inputs(list(record.disturbance)), model.inputs(list(record.process))
     n, d = len(model.A), len(added)
@@ -336,6 +342,21 @@ class Observed:
         )
 
 
+def signals_of(robot: ControlledRobot, context: ActuatedContext, sensors: Iterable[Sensor]) -> list[Signal]:
+    """Return what sensors read of a robot with whole links and gears that give."""
+    plant = with_compliance(robot.model)
+    return [signal for sensor in sensors for signal in make_signals(plant, context, sensor)]
+
+
+def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, signals: Sequence[Signal]) -> LinearModel:
+    """Return the linear model of a filter about output `row` of the robot's motion; the readings `signals` are outputs.
+
+    Its links have their lowest modes alone, and its inputs are also the forces that `record` names.
+    """
+    mechanism, voltages = kept_modes(*robot.linear(row, record.points), record.modes)
+    return state_space(mechanism, voltages, readings_at(with_compliance(robot.model), mechanism, signals))
+
+
 def kalman_filters(
     record: KalmanObserver | ScheduledObserver,
     context: ActuatedContext,
@@ -345,27 +366,17 @@ def kalman_filters(
 ) -> tuple[Schedule, list[str]]:
     """The filters at instants of the path that estimate `more`, and in words the modes that `sensors` cannot see there.
 
-    Raises `InputError` for sensors without noise, and as `kalman` does.
+    Raises `InputError` as `kalman` does.
     """
     robot, source, T = setup.robot, setup.source, setup.sample_time
-    plant = with_compliance(robot.model)
-    read, estimated = ([s for one in of for s in make_signals(plant, context, one)] for of in (sensors, more))
-    exact = [s.name for s in read if not (s.sensor.deviation(T) or s.sensor.resolution)]
-    if exact or not read:
-        raise InputError(
-            "expected sensors with noise, noise_density or resolution, found"
-            + (f" none of these of {quoted(exact)}" if exact else " no sensor")
-        )
+    read, estimated = (signals_of(robot, context, of) for of in (sensors, more))
     wanted = merged(estimated, ())
     names, signals = [signal.name for signal in wanted], (*read, *wanted)
     at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)
     instants = sorted({int(np.abs(source.time - t).argmin()) for t in at})
-    pushed = (name.split("/") for name in (*record.process, *record.disturbance))
-    points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
     filters_there, unseen = [], dict[str, None]()
     for row in instants:
-        mechanism, voltages = kept_modes(*robot.linear(row, points), record.modes)
-        model = state_space(mechanism, voltages, readings_at(plant, mechanism, signals))
+        model = model_of_filter(record, robot, row, signals)
         filters_there.append(kalman(record, model, read, names, (setup.inputs, T, setup.delay)))
         if lost := observability(model, [signal.name for signal in read]).lost:
             unseen[f"observer: sensors cannot see {', '.join(lost)}"] = None

@@ -19,13 +19,7 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from ...mbs.analysis.operating_points import (
-    InstantAnalysis,
-    OperatingPoints,
-    find_operating_points,
-    of_earlier,
-    row_at,
-)
+from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.fields.field_types import Reference
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.run.record import Details, Run
@@ -35,12 +29,11 @@ from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray
 from ..patches.records import PztLayout
-from .linear import voltages_at
-from .linear_model import LinearModel, kept_modes, state_space
-from .observer import kalman
+from .linear_model import LinearModel, state_space
+from .observer import kalman, model_of_filter, signals_of
 from .records import EstimateRecord, Placement, Sensor
-from .robot import default_tip
-from .signals import Signal, make_signals, readings_at
+from .robot import default_tip, whole_robot
+from .signals import Signal
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
 CHUNK = 200  # sets whose voltages over the path are held in memory together
@@ -68,12 +61,13 @@ class PatchableLink:
 class Candidates:
     """Places (k,) m for the center of one patch, `gap` of which two patches lie apart at least, and Φ_V there.
 
-    Phi_V (n, k) modal forces per volt, zero columns where the section has a step.
+    Phi_V (n, k) modal forces per volt, zero columns where the section has a step; `capacitance` (k,) as sensors, F.
     """
 
     centers: Array
     gap: int
     Phi_V: Array
+    capacitance: Array
 
 
 @struct
@@ -146,7 +140,7 @@ def place(
 ) -> Placed:
     """Find the best centers for the patches of a link; `model` for controllability, F_p (T, m) for voltages.
 
-    `deviation`: of the estimated tip, m, with patches of modal forces per volt (m, count) as sensors.
+    `deviation`: of the estimated tip, m, with sensors that read (m, count) V of each unit of p.
 
     Controllability of a mode is what its gramian grows with under light damping, Σ (φᵀ b_k)² over the patches, b_k the
     modal forces of a patch per volt (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to what the
@@ -172,18 +166,22 @@ def place(
     def gain(Phi_V: Array) -> Array:
         return np.asarray(np.square(reach.shape @ Phi_V) / largest[:, None])
 
-    def judge(Phi_V: Array) -> Array:
-        """Values (sets,) of sets of patches, Phi_V (n, sets, count)."""
-        if deviation is not None:
-            return -np.array([deviation(of_set) for of_set in Phi_V.swapaxes(0, 1)])
+    def judge(Phi_V: Array, capacitance: Array) -> Array:
+        """Values (sets,) of sets of patches, Phi_V (n, sets, count) and capacitances (sets, count)."""
+        if deviation is not None:  # by reciprocity the charge of a deflection p is Φ_Vᵀ p
+            return -np.array([deviation(volts) for volts in (Phi_V / capacitance).swapaxes(0, 1)])
         if F_p is not None:
             return -_voltages(reach.shape, Phi_V, F_p)
         return _measured(wanted.measure, gain(Phi_V.reshape(len(Phi_V), -1)).reshape(-1, *Phi_V.shape[1:]).sum(axis=2))
 
-    indices, sets, method = _search(candidates, count, wanted.most_sets, lambda i: judge(candidates.Phi_V[:, i]))
-    found = [(candidates.centers[indices], candidates.Phi_V[:, indices]), (even.edges.mean(axis=1), even.Phi_V)]
-    rated = [Evaluation(x, gain(Phi_V).sum(axis=1), float(judge(Phi_V[:, None])[0])) for x, Phi_V in found]
-    voltages = [np.nan if F_p is None else float(_voltages(reach.shape, P[:, None], F_p)[0]) for _, P in found]
+    Phi_V, C = candidates.Phi_V, candidates.capacitance
+    indices, sets, method = _search(candidates, count, wanted.most_sets, lambda i: judge(Phi_V[:, i], C[i]))
+    found = [
+        (candidates.centers[indices], Phi_V[:, indices], C[indices]),
+        (even.edges.mean(axis=1), even.Phi_V, even.read_capacitance),
+    ]
+    rated = [Evaluation(x, gain(P).sum(axis=1), float(judge(P[:, None], of[None])[0])) for x, P, of in found]
+    voltages = [np.nan if F_p is None else float(_voltages(reach.shape, P[:, None], F_p)[0]) for _, P, _ in found]
     best = 0 if rated[0].value >= rated[1].value else 1  # even spacing need not be on the grid
     return Placed(
         wanted=wanted,
@@ -265,13 +263,14 @@ def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count:
             f" ({link.length:g} m, centers every {spacing:g} m), found {count} of {length:g} m"
         )
     centers = length / 2 + spacing * np.arange(steps + 1)
-    columns = np.zeros((len(link.stiffness), len(centers)))
+    columns, capacitance = np.zeros((len(link.stiffness), len(centers))), np.ones(len(centers))
     for k, center in enumerate(centers):
         try:
-            columns[:, k] = link.patches(count=None, centers=(float(center),)).Phi_V[:, 0]
+            patch = link.patches(count=None, centers=(float(center),))
         except InputError:  # across a step of the section: such a patch does nothing
             continue
-    return Candidates(centers, gap, columns)
+        columns[:, k], capacitance[k] = patch.Phi_V[:, 0], patch.read_capacitance[0]
+    return Candidates(centers, gap, columns, capacitance)
 
 
 class PatchPlacement(InstantAnalysis):
@@ -327,40 +326,39 @@ class PatchPlacement(InstantAnalysis):
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
         run, about = find_operating_points(context, self)
         at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
-        deviation = None if wanted.estimate is None else _deviation(context, wanted.estimate, link, about)
+        deviation = None if wanted.estimate is None else _deviation(context, wanted.estimate, link, run)
         return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None, deviation))
 
 
 def _deviation(
-    context: ActuatedContext, record: EstimateRecord, link: PatchableLink, about: OperatingPoints
+    context: ActuatedContext, record: EstimateRecord, link: PatchableLink, run: Run
 ) -> Callable[[Array], float]:
-    """Return the standard deviation (m) of the tip's estimate by patches of modal forces per volt (m, count).
+    """Return the standard deviation (m) of the tip's estimate by sensors that read (m, count) V of each unit of p.
 
-    By reciprocity a patch reads these times p over its capacitance. Raises `InputError` where no filter exists.
+    The filter is that of a closed loop about `run`, and has whole links. Raises `InputError` where there is none.
     """
-    model, q = about.model, about.q[0]
-    tip = Sensor(point=record.tip or default_tip(model))
-    read, wanted = ([s for one in of for s in make_signals(model, context, one)] for of in (record.sensor, [tip]))
-    pushed = (name.split("/") for name in (*record.process, *record.disturbance))
-    points = {parts[1]: parts[1] for parts in pushed if parts[0] == "force"}
-    whole = LinearEquations(model, q, points).at(float(about.time[0]), q, about.v[0], about.a[0])
-    at, voltages = kept_modes(whole, voltages_at(model, whole, context.patches), record.modes)
-    known = state_space(at, voltages, readings_at(model, at, [*read, *wanted]))
-    modal = [name for body in link.bodies for name in whole.names if name.startswith(f"modal/{body}/")]
-    volts = link.own[:, [k for k, name in enumerate(modal) if name in at.names]] / link.layout.read_capacitance
-    columns = [at.names.index(name) for name in modal if name in at.names]
-
+    key, robot = f"{context.model.scene.path}: placement.estimate", whole_robot(context, run)
+    tip = Sensor(point=record.tip or default_tip(robot.model))
+    read, wanted = (signals_of(robot, context, of) for of in (record.sensor, (tip,)))
+    known = model_of_filter(record, robot, 0, [*read, *wanted])
+    to_file = robot.model.tree.nodes[robot.model.tree.index[link.name]].body.modal_transform
+    own = _patches(context, link.name).modes[link.layout.label].coordinates(to_file.T).T
+    columns = [k for k, name in enumerate(known.state_names) if name.startswith(f"modal/{link.name}/")]
+    own = own[:, : len(columns)]  # the lowest modes are kept
     as_sensor = Sensor(pzt=link.layout.label, noise=record.noise)
 
-    def deviation(Phi_V: Array) -> float:
-        patches = [Signal(f"patch/{k}", as_sensor) for k in range(Phi_V.shape[1])]
+    def deviation(volts: Array) -> float:
+        patches = [Signal(f"patch/{k}", as_sensor) for k in range(volts.shape[1])]
         C = np.zeros((len(patches), len(known.A)))
-        C[:, columns] = Phi_V.T @ volts
+        C[:, columns] = volts.T @ own
         model = replace(
             known, C=np.vstack([known.C, C]), D=np.vstack([known.D, np.zeros((len(C), known.D.shape[1]))]),
             output_names=(*known.output_names, *(patch.name for patch in patches)),
         )  # fmt: skip
-        found = kalman(record, model, [*read, *patches], [s.name for s in wanted], ((), record.sample_time, 0.0))
+        try:
+            found = kalman(record, model, [*read, *patches], [s.name for s in wanted], ((), record.sample_time, 0.0))
+        except InputError as error:
+            raise InputError(f"{key}: {error}") from None
         of_tip = found.E[: len(wanted)]
         return float(np.sqrt(np.trace(of_tip @ found.covariance @ of_tip.T)))
 

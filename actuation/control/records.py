@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -101,6 +101,20 @@ class Sensor(Referring):
         if self.strain is not None:
             link = self.strain.partition(".")[0]
             yield from (Reference("strain", link), Reference("strain", link, "flexible body"))
+
+
+def check_sampling(sensors: Sequence[Sensor], T: float, whose: str, *, at_every_sample: bool) -> None:
+    """Raise `ValueError` for delays and sample times that are no multiples of T (s), or longer if `at_every_sample`."""
+    for k, sensor in enumerate(sensors, 1):
+        for key in ("delay", "sample_time"):
+            samples = (getattr(sensor, key) or 0.0) / T
+            if abs(samples - round(samples)) > 1e-6 or (key == "sample_time" and 0.0 < samples < 0.5):
+                raise ValueError(
+                    f"expected a multiple of {whose} ({T:g} s) as {key} of sensor no. {k}, found"
+                    f" {getattr(sensor, key):g} s"
+                )
+            if round(samples) > 1 and key == "sample_time" and at_every_sample:
+                raise ValueError(f"expected sensors that read at every sample, found no. {k} slower")
 
 
 class ControllerRecord(Referring):
@@ -261,6 +275,20 @@ class FilterRecord(Record):
     disturbance: dict[str, Positive] = Field(default_factory=dict)
     """Constant loads to be estimated, by input, with their drift; N·m, V or N per √s."""
 
+    @property
+    def points(self) -> dict[str, str]:
+        """Points "BODY.POINT" at which forces are inputs, each by its own name."""
+        return {reference.name: reference.name for reference in FilterRecord.references(self)}
+
+    def references(self) -> Iterator[Reference]:
+        """Yield references to points at which forces are inputs."""
+        for key in ("process", "disturbance"):
+            for name in getattr(self, key):
+                kind, _, rest = name.partition("/")
+                point = rest.rpartition("/")[0]
+                if kind == "force" and "." in point:
+                    yield Reference(key, point)
+
 
 class KalmanRecord(ObserverRecord, FilterRecord):
     """Keys of Kalman filters of a loop."""
@@ -346,12 +374,18 @@ class EstimateRecord(FilterRecord):
     tip: PointReference | None = None
     """Point "BODY.POINT" to be estimated; by default the tip of the robot."""
 
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        check_sampling(self.sensor, self.sample_time, "sample_time", at_every_sample=True)
+        return self
+
     def references(self) -> Iterator[Reference]:
-        """What is measured and estimated."""
+        """Yield references to what is measured, pushed and estimated."""
         for k, sensor in enumerate(self.sensor, 1):
-            yield from under(f"placement.estimate.sensor no. {k}", sensor.references())
+            yield from under(f"sensor no. {k}", sensor.references())
+        yield from super().references()
         if self.tip is not None:
-            yield Reference("placement.estimate.tip", self.tip)
+            yield Reference("tip", self.tip)
 
 
 class Placement(Record):
@@ -396,7 +430,7 @@ class Placement(Record):
         if self.pzt is not None:
             yield Reference("placement.pzt", self.pzt, "patches")
         if self.estimate is not None:
-            yield from self.estimate.references()
+            yield from under("placement.estimate", self.estimate.references())
 
 
 class SampledAnalysis(ActuatedAnalysis):
@@ -445,16 +479,8 @@ class SampledAnalysis(ActuatedAnalysis):
             raise ValueError(f"expected a delay shorter than the run ({end:g} s), found {self.delay:g} s")
         if end and end / self.sample_time > MOST_OUTPUTS:
             raise ValueError(f"expected at most {MOST_OUTPUTS} samples, found sample_time = {self.sample_time:g} s")
-        for k, sensor in enumerate(self.sensor, 1):
-            for key in ("delay", "sample_time"):
-                samples = (getattr(sensor, key) or 0.0) / self.sample_time
-                if abs(samples - round(samples)) > 1e-6 or (key == "sample_time" and 0.0 < samples < 0.5):
-                    raise ValueError(
-                        f"expected a multiple of the loop's sample_time ({self.sample_time:g} s) as {key} of sensor no."
-                        f" {k}, found {getattr(sensor, key):g} s"
-                    )
-                if round(samples) > 1 and key == "sample_time" and isinstance(self.observer, KalmanRecord):
-                    raise ValueError(f"expected sensors that read at every sample, found no. {k} slower")
+        is_filtered = isinstance(self.observer, KalmanRecord)
+        check_sampling(self.sensor, self.sample_time, "the loop's sample_time", at_every_sample=is_filtered)
         feeds = [isinstance(one, StateFeedback) for one in self.controller]
         if any(feeds) and not isinstance(self.observer, GainsObserver):
             raise ValueError('expected an observer of kind = "gains" with "state-feedback", found none')
@@ -474,6 +500,8 @@ class SampledAnalysis(ActuatedAnalysis):
         ):  # fmt: skip
             for k, record in enumerate(records, 1):
                 yield from under(f"{label} no. {k}", record.references())
+        if isinstance(self.observer, KalmanRecord):
+            yield from under("observer", self.observer.references())
         if self.tip is not None:
             yield Reference("tip", self.tip)
 

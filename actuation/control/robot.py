@@ -17,13 +17,14 @@ from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labell
 from ...mbs.model.body import Body
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
 from ...mbs.model.kinematics import ZERO
-from ...mbs.model.model import Model, build_model, constraint_values
+from ...mbs.model.model import Model, build_model, constraint_values, without_paths
 from ...mbs.model.nodes import rows_of_joint
 from ...mbs.model.system import MultibodySystem
 from ...mbs.posture.posture import MET, mobility, posture_search
 from ...mbs.posture.start import undeformed_posture
 from ...mbs.run.gears import with_motor_coordinates
 from ...mbs.run.record import Run
+from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
@@ -217,6 +218,13 @@ class ControlledRobot:
     def rigid(self) -> RigidArm:
         """Return the robot with rigid links. Raises `InputError` if the motors do not fit the mechanism."""
         return RigidArm(self.model, self.source.q[0])
+
+
+def whole_robot(context: ActuatedContext, source: Run) -> ControlledRobot:
+    """Return the robot of an analysis about the motion `source`, with whole links also where the plant has pieces."""
+    if context.whole is None:
+        return ControlledRobot(without_paths(context.model), context.patches, source)
+    return ControlledRobot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
 
 
 def input_names(robot: ControlledRobot) -> tuple[str, ...]:

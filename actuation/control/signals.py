@@ -249,8 +249,8 @@ def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None =
     pieces = [name for name in bodies if name != of_link.body]
 
     def volts(of: OnBody, parts: Iterable[str]) -> Array:
-        yielding = sum(bodies[part].yielding[columns] for part in parts)
-        C = own.read_capacitance + (own.electrodes == "open") * yielding
+        yielding = as_floats(np.sum([bodies[part].yielding[columns] for part in parts], axis=0))
+        C = own.read_capacitance(yielding)
         return as_floats(of.charge[:, columns] / (C if capacitance is None else capacitance)).T
 
     return {name: volts(of, pieces if name in pieces else [name]) for name, of in bodies.items()}

@@ -232,6 +232,7 @@ class PatchArray(Reach):
     turn: Array  # (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x
     link: ModalBody  # the modal body of the link that they are on
     lever: Array  # (k,) strain of the surface by unit turn per length and distance: 1 of bending
+    read_capacitance: Array  # (k,) F, as sensors; see `PztLayout.read_capacitance`
 
     @property
     def body(self) -> str:
@@ -283,7 +284,7 @@ def assembled(
     """The patches in modal coordinates p, of which T (n_file, n) makes those of the modal body; `stiffness` (n,)."""
     layout, edges = placed
     return PatchArray(
-        layout, edges, of.extent, of.per_volt, (of.turn @ T).T, body, of.lever,
+        layout, edges, of.extent, of.per_volt, (of.turn @ T).T, body, of.lever, layout.read_capacitance(of.yielding),
         Phi_V=(of.Phi_V @ T).T, amplifiers=layout.amplifiers(),
         W_sqrt=W_sqrt, frequency=np.sqrt(stiffness) / (2 * np.pi), served=served,
     )  # fmt: skip

@@ -173,10 +173,14 @@ class PztLayout(Record):
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
         return volume * (self.permittivity * field**2 - (self.lamina.energy if clamped else 0.0))
 
-    @property
-    def read_capacitance(self) -> float:
-        """Capacitance of one patch as a sensor, F: clamped with open electrodes, which no charge reaches."""
-        return self.capacitance(clamped=self.electrodes == "open")
+    def read_capacitance(self, yielding: Array) -> Array:
+        """Return the capacitances (k,) of patches as sensors, F.
+
+        With open electrodes, which no charge reaches, they are clamped, but for the strains that modes lack: `yielding`
+        (k,), F, as in `Effects`. Else they are free.
+        """
+        is_open = self.electrodes == "open"
+        return self.capacitance(clamped=is_open) + is_open * yielding
 
     def amplifiers(self) -> Amplifiers:
         """Return the amplifiers of all patches."""

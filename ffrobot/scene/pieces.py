@@ -103,10 +103,12 @@ T = TypeVar("T")
 
 def _renamed(value: T, places: Mapping[str, str]) -> T:
     new: Any = value
-    if isinstance(value, str):
-        new = places.get(value, value)
+    if isinstance(value, str):  # a point, or an input at one, "force/BODY.POINT/x"
+        new = "/".join(places.get(part, part) for part in value.split("/"))
     elif isinstance(value, tuple):
         new = tuple(_renamed(entry, places) for entry in value)
+    elif isinstance(value, dict):
+        new = {_renamed(key, places): _renamed(entry, places) for key, entry in value.items()}
     elif isinstance(value, Record):
         new = value.model_copy(update={key: _renamed(getattr(value, key), places) for key in value.model_fields_set})
     return new

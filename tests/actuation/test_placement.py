@@ -10,6 +10,7 @@ import ffrobot
 from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.placement import PatchableLink, locked_modes, place
 from ffrobot.actuation.control.records import Placement
+from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.model import build_model
 from ffrobot.scene.load import make_scene
@@ -106,35 +107,74 @@ def test_voltages_over_a_path(arm):
     assert two.largest_voltage[0] < one.largest_voltage[0]
 
 
-def test_patches_as_sensors_by_the_deviation_of_the_estimated_tip(tmp_path):
+STEP = 1e-3
+PATCH = {"body": "arm", "length": 0.06, "width": 0.02, "thickness": 0.5e-3, "modulus": 63e9, "d31": 110e-12}
+PATCH |= {"structural": False, "allocation": "least-squares", "permittivity": 1.5e-8}
+OPEN = {"electrodes": "open", "face": "+y", "structural": ["stiffness"]}
+ESTIMATE = {
+    "modes": 2, "process": {"force/arm.tip/y": 2.0, "joint/hub": 0.1}, "noise": 0.5, "sample_time": STEP,
+    "tip": "arm.tip", "sensor": [{"joint": "hub", "noise": 1e-5}],
+}  # fmt: skip
+
+
+def scene_of(patch, pieces, *analyses):
+    link = beam_link(0.6, rectangle(0.004, 0.02), 20, damping={"rayleigh": [0.0, 1e-5]}, modes={"count": 3})
+    return make_scene(
+        name="arm", gravity=[0.0, 0.0], body=[{"name": "arm", "link": link, "pieces": pieces}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "motor": True}],
+        trajectory=[{"name": "still", "joint": "hub", "value": "0"}], pzt=[PATCH | patch], analysis=list(analyses),
+    )  # fmt: skip
+
+
+def sensors_placed(patch, pieces=1, estimate=ESTIMATE, **keys):
+    wanted = {"body": "arm", "count": 1, "criterion": "estimate", "estimate": estimate, "spacing": 0.06} | keys
+    return ffrobot.solve(scene_of(patch, pieces, {"name": "where", "kind": "placement", "placement": wanted}))
+
+
+def deviation_in_a_loop(patch, pieces=1):
+    """That of the tip, m, by the filter of a closed loop."""
+    observer = {"kind": "kalman", "modes": 2, "process": ESTIMATE["process"]}
+    sensors = [*ESTIMATE["sensor"], {"pzt": "arm", "noise": ESTIMATE["noise"]}]
+    loop = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": STEP, "tip": "arm.tip"}
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.01, "output_step": STEP}
+    found = ffrobot.solve(scene_of(patch, pieces, inverse, loop | {"observer": observer, "sensor": sensors}))
+    return float(np.sqrt(np.square(found["loop/control/estimate/points/arm.tip/sigma"][0]).sum()))
+
+
+def test_patches_as_sensors_by_the_deviation_of_the_estimated_tip():
     """The value is the deviation that the filter of a closed loop has with its patch there, and the least of all."""
-    process, noise, T = {"force/arm.tip/y": 2.0}, 0.5, 1e-3
-    encoder = {"joint": "hub", "noise": 1e-5}
-    link = beam_link(0.6, rectangle(0.004, 0.02), 20, damping={"ratio": 0.005}, modes={"count": 3})
-    patch = {"body": "arm", "length": 0.06, "width": 0.02, "thickness": 0.5e-3, "modulus": 63e9, "d31": 110e-12}
-    patch |= {"structural": False, "allocation": "least-squares", "permittivity": 1.5e-8}
-    keys = {"name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "arm", "link": link}]}
-    keys["joint"] = [{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "motor": True}]
-    keys["trajectory"] = [{"name": "still", "joint": "hub", "value": "0"}]
-    estimate = {"modes": 2, "process": process | {"joint/hub": 0.1}, "noise": noise, "sample_time": T, "tip": "arm.tip"}
-    estimate["sensor"] = [encoder]
-    placement = {"body": "arm", "count": 1, "criterion": "estimate", "estimate": estimate, "spacing": 0.06}
-    search = {"name": "where", "kind": "placement", "placement": placement}
-    results = ffrobot.solve(make_scene(**keys, pzt=[patch | {"count": 1}], analysis=[search]))
+    results = sensors_placed({"count": 1})
     best = results["where/placement/best/centers"][()]
-    observer = {"kind": "kalman", "modes": 2, "process": estimate["process"]}
-
-    def loop(centers):
-        sensors = [encoder, {"pzt": "arm", "noise": noise}]
-        analysis = [
-            {"name": "inverse", "kind": "pcid", "end": 0.01, "output_step": T},
-            {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": T, "tip": "arm.tip",
-             "observer": observer, "sensor": sensors},
-        ]  # fmt: skip
-        with_patch = [patch | {"centers": [float(x) for x in centers]}]
-        found = ffrobot.solve(make_scene(**keys, pzt=with_patch, analysis=analysis))
-        return float(np.sqrt(np.square(found["loop/control/estimate/points/arm.tip/sigma"][0]).sum()))
-
     value = -results["where/placement/best/value"][()]
-    assert loop(best) == pytest.approx(value, rel=1e-6)
-    assert all(loop([x]) >= value * (1 - 1e-6) for x in results["where/placement/candidates"][()][::3])
+    assert deviation_in_a_loop({"centers": [float(x) for x in best]}) == pytest.approx(value, rel=1e-6)
+    places = results["where/placement/candidates"][()][::3]
+    assert all(deviation_in_a_loop({"centers": [float(x)]}) >= value * (1 - 1e-6) for x in places)
+
+
+@pytest.mark.parametrize("pieces", [1, 2])
+@pytest.mark.parametrize("patch", [{}, OPEN])
+def test_estimates_by_patches_of_any_electrodes_and_links_in_pieces(patch, pieces):
+    """A patch stays where the scene has it, and so does the stiffness that the filter knows."""
+    patch |= {"centers": [0.21]}
+    results = sensors_placed(patch, pieces)
+    assert results["where/placement/best/centers"][()] == pytest.approx([0.21])
+    assert -results["where/placement/best/value"][()] == pytest.approx(deviation_in_a_loop(patch, pieces), rel=1e-6)
+
+
+NOISY = {"joint": "hub", "noise": 1e-5}
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"sensor": [{"joint": "hub"}]}, 'estimate: expected sensors with noise, .* none of these of "joint/hub'),
+        ({"sensor": []}, "estimate: expected sensors that see every .*: they cannot see joint/hub"),
+        ({"sensor": [NOISY | {"delay": 1.5 * STEP}]}, r"multiple of sample_time \(0.001 s\) as delay"),
+        ({"sensor": [NOISY | {"sample_time": 2 * STEP}]}, "read at every sample, found no. 1 slower"),
+        ({"process": {"force/arm.top/y": 1.0}}, 'process: expected a point of "arm" .*, found "arm.top"'),
+        ({"process": {"force": 1.0}}, 'estimate: linear model: expected an input .*, found "force"'),
+    ],
+)
+def test_filters_that_patches_cannot_serve(keys, said):
+    with pytest.raises(InputError, match=said):
+        sensors_placed({"count": 1}, estimate=ESTIMATE | keys)
