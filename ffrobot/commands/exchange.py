@@ -159,7 +159,7 @@ def export(
     joint-trajectory  JSON in the layout of ROS 2's trajectory_msgs/JointTrajectory, with effort
     rosbag2           a folder, the bag of ROS 2 with that message; needs rosbags (extra "ros")
     fmu               FMI 2.0, model exchange and co-simulation, of a linear model; co-simulation of the controllers
-                      of a closed loop (--analysis); with C sources, compiled where there is a C compiler
+                      of closed-loop control (--analysis); with C sources, compiled where there is a C compiler
     c                 a header file with the matrices of either
     sid               SID_FEM, standard input data of flexible bodies (Wallrapp)
     mbdyn             .fem of MBDyn's modal joint

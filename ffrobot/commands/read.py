@@ -46,7 +46,7 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
 @click.option("--analysis", metavar="NAME", help="Analysis [the first linear one].")
 @output_option("FILE.npz|FILE.mat", "Output file [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
-    """Export a linear model, or controllers of a closed loop: matrices A, B, C, D with names of rows and columns."""
+    """Export a linear model, or the controllers of closed-loop control: matrices A, B, C, D and their names."""
     from ..common.hdf5 import reading
     from ..results.file import Results
 

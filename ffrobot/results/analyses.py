@@ -133,7 +133,7 @@ class AnalysisAccess(Datasets):
         known = self._with("linear")
         if analysis is None and not known:
             loops = self._with("control/controller")
-            hint = f"; the name of a closed loop ({quoted(loops)}) selects its controllers" if loops else ""
+            hint = f"; the name of closed-loop control ({quoted(loops)}) selects its controllers" if loops else ""
             raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none{hint}')
         return analysis or known[0]
 

@@ -260,7 +260,9 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
     assert f"#define N_X {len(system.A)}" in text
     numbers = re.search(r"double A\[\] = \{(.*?)\}", text, re.DOTALL)[1].split(",")
     np.testing.assert_array_equal(np.array(numbers, dtype=float), system.A.ravel())
-    with pytest.raises(InputError, match=r'found none; the name of a closed loop \("loop"\) selects its controllers'):
+    with pytest.raises(
+        InputError, match=r'found none; the name of closed-loop control \("loop"\) selects its controllers'
+    ):
         results.export_linear(None, tmp_path / "c.npz")
     with pytest.raises(InputError, match=r'expected a closed loop of linear controllers .*"loop".*found "inverse"'):
         results.controller("inverse")
