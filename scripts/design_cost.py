@@ -106,8 +106,8 @@ def sensitivities(folder: Path) -> None:
         ("arm_3r", SPACE_KEYS, ("shoulder", "elbow")),
     ):
         scene = pcid_of(case, folder)
-        goals = [f"{what} joints.{joint}.moment" for joint in joints for what in ("rms", "peak")]
-        derivatives = partial(ffrobot.sensitivity, scene, goals, keys, folder / case, processes=processors())
+        responses = [f"{what} joints.{joint}.moment" for joint in joints for what in ("rms", "peak")]
+        derivatives = partial(ffrobot.sensitivity, scene, responses, keys, folder / case, processes=processors())
         found, cost = against_solves(scene, derivatives)
         scale = np.abs(found.values) / np.abs(found.value)[:, None]
         error = (found.error * scale).max(axis=1) / np.maximum(1.0, np.abs(found.logarithmic).max(axis=1))

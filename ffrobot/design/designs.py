@@ -1,4 +1,4 @@
-"""Designs of one scene: keys with numbers, a run for each, kept and taken up as those of sweeps, and goals by them."""
+"""Designs of one scene: values of keys, a run for each (stored and reused as in sweeps), and its responses."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ from ..scene.scene import Scene
 from ..sweep.files import Variation, run_files
 from ..sweep.runs import RESULTS, Row, Workers
 from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, run_sweep
-from .readings import Followed, Goal, Reading
+from .readings import Followed, Reading, Response
 
-OUTPUTS = 1000  # at least, where goals are peaks or means over time: they do not depend on those of the scene
+OUTPUTS = 1000  # at least, where responses are peaks or means over time: they do not depend on those of the scene
 ALGEBRAIC = ("static", "pcid")
 """Kinds of analysis that, where they take no steps, solve equations to rounding at every time."""
 
 
 def changes_for(
-    path: Path, goals: Sequence[Goal], tolerance: float | None, *, keep_steps: bool = False
+    path: Path, responses: Sequence[Response], tolerance: float | None, *, keep_steps: bool = False
 ) -> dict[Key, Any]:
-    """Changes of the scene at `path`: analyses that no goal needs are left out, the others have at most `tolerance`.
+    """Return changes of the scene at `path`: no analysis that no response needs, `tolerance` or less in the others.
 
     Replays of inverse analyses on finer links, which change no result, are left out too. There are `OUTPUTS` at least.
     `keep_steps`: of integrations.
     """
     scene = load_scene(path)
-    needed = _needed(scene, goals)
+    needed = _needed(scene, responses)
     whole = run_files(path, {}, path.parent).scene["analysis"]
     tables = deepcopy([table for table in whole if table["name"] in needed])
     for table, record in zip(tables, (one for one in scene.analysis if one.name in needed), strict=True):
@@ -55,7 +55,7 @@ def changes_for(
             table["tolerance"] = min(tolerance, record.tolerance)
         if keep_steps and record.is_integrated and isinstance(record, IntegratedAnalysis):
             table["keep_steps"] = True
-        if isinstance(record, TimedAnalysis) and any(goal.needs_motion for goal in goals):
+        if isinstance(record, TimedAnalysis) and any(response.needs_motion for response in responses):
             table["output_step"] = record.output_step / ceil(OUTPUTS * record.output_step / record.end * (1 - 1e-9))
     return {("analysis",): tables}
 
@@ -79,12 +79,14 @@ def repeated_steps(results: Results) -> dict[Key, Any] | None:
     return {("analysis", name, "repeat_steps"): str(results.path.absolute()) for name in stepping}
 
 
-def _needed(scene: Scene, goals: Sequence[Goal]) -> set[str]:
-    """Names of the analyses that goals name, by default the first, and of those that they rest on."""
+def _needed(scene: Scene, responses: Sequence[Response]) -> set[str]:
+    """Names of the analyses that responses name, by default the first, and of those that they rest on."""
     names = [one.name for one in scene.analysis]
     moving = next((one.name for one in scene.analysis if isinstance(one, TimedAnalysis)), names[0])
     default = {False: names[0], True: moving}
-    found = {goal.analysis if goal.analysis in names else default[goal.is_of_rest] for goal in goals} or {names[0]}
+    found = {
+        response.analysis if response.analysis in names else default[response.is_of_rest] for response in responses
+    } or {names[0]}
     for one in reversed(scene.analysis):  # each rests on earlier ones only
         if one.name in found and one.source is not None:
             found.add(one.source)
@@ -161,17 +163,17 @@ class Design:
         """Open the results file of the run, for use in a `with`."""
         return Results(self.folder / RESULTS)
 
-    def read(self, goals: Iterable[Goal]) -> tuple[Reading, ...]:
-        """The goals of a design that completed. Raises `InputError` where its results do not have them."""
+    def read(self, responses: Iterable[Response]) -> tuple[Reading, ...]:
+        """The responses of a design that completed. Raises `InputError` where its results do not have them."""
         with self.results() as results:
-            return tuple(goal.read(results) for goal in goals)
+            return tuple(response.read(results) for response in responses)
 
-    def follow(self, goals: Sequence[Goal], readings: Sequence[Reading]) -> tuple[Followed, ...]:
-        """Goals computed besides those solved for, from a design's `readings`; empty where the design failed."""
+    def follow(self, responses: Sequence[Response], readings: Sequence[Reading]) -> tuple[Followed, ...]:
+        """Responses computed besides those solved for, from a design's `readings`; empty where the design failed."""
         if not self.completed:
             return ()
         with self.results() as results:
-            return tuple(goal.follow(results, one) for goal, one in zip(goals, readings, strict=True))
+            return tuple(response.follow(results, one) for response, one in zip(responses, readings, strict=True))
 
 
 class SpentError(Exception):

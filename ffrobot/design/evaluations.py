@@ -1,4 +1,4 @@
-"""Designs at places of the unit cube, each run once: goals, gradients, how near to an optimum, all in one table.
+"""Designs at places of the unit cube, each run once: responses, gradients, how near to an optimum, all in one table.
 
 With the objective F to be least, excesses g ≤ 0 and bounds b of u: ∇F + Σ λ_i ∇g_i + Σ μ_j ∇b_j = 0 with λ, μ ≥ 0, and
 0 where a limit or bound is not reached (Karush, Kuhn and Tucker). Of the gradients there are, the multipliers that come
@@ -32,15 +32,15 @@ from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point, in_words, repeated_steps
-from .goals import KEPT, DesignProblem
 from .readings import Followed, Reading
+from .responses import KEPT, DesignProblem
 from .sensitivity import weights
 from .variables import DesignSpace, Place
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Design at one point: `readings` of all goals, or none and the `failure` that tells why.
+    """Design at one point: `readings` of all responses, or none and the `failure` that tells why.
 
     `again`: changes of scenes beside it with which runs take its steps again; None where they choose their own.
     """
@@ -53,7 +53,7 @@ class Evaluated:
 
     @property
     def completed(self) -> bool:
-        """Whether its goals are known."""
+        """Whether its responses are known."""
         return not self.failure
 
     @property
@@ -93,7 +93,7 @@ class Evaluations:
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
     ) -> list[tuple[Followed, ...]]:
-        """Goals of neighbours of `base`, peaks taken at its peak times; empty where a design failed.
+        """Responses of neighbours of `base`, peaks taken at its peak times; empty where a design failed.
 
         `again`: changes with which runs take the steps of the base.
         """
@@ -106,10 +106,10 @@ class Evaluations:
         first = not any(one.completed for one in self._searched.values())
         try:
             with design.results() as results:
-                readings = tuple(goal.read(results) for goal in self.problem.goals)
+                readings = tuple(response.read(results) for response in self.problem.responses)
                 found = Evaluated(place, design, readings, again=repeated_steps(results))
         except InputError as error:
-            if first:  # a goal that means nothing
+            if first:  # a response that means nothing
                 raise
             return Evaluated(place, design, (), str(error))
         if first:
@@ -119,19 +119,19 @@ class Evaluations:
     def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:
         known = base.place, design.folder
         if known not in self._followed:
-            self._followed[known] = design.follow(self.problem.goals, base.readings)
+            self._followed[known] = design.follow(self.problem.responses, base.readings)
         return self._followed[known]
 
 
 def write_designs(found: Evaluations, path: Path) -> None:
-    """One line for each design of a search: values of keys and goals, the largest excess of a limit, its folder."""
+    """One line for each design of a search: values of keys and responses, the largest excess of a limit, its folder."""
     problem = found.problem
-    goals = [problem.objective.text, *(limit.text for limit in problem.limits)]
-    columns = ["design", *map(".".join, found.space.keys), "status", *goals, "violation", "folder", "message"]
+    responses = [problem.objective.text, *(limit.text for limit in problem.limits)]
+    columns = ["design", *map(".".join, found.space.keys), "status", *responses, "violation", "folder", "message"]
     rows: list[list[object]] = []
     for k, one in enumerate(found.searched):
         row = one.design.row
-        values = one.values if one.completed else ("",) * len(goals)
+        values = one.values if one.completed else ("",) * len(responses)
         violation = problem.violation(one.readings) if one.completed else ""
         status = row.status if one.completed or row.status != "completed" else "failed"
         rows.append([k, *row.values, status, *values, violation, one.design.folder.name, one.failure])
@@ -139,9 +139,9 @@ def write_designs(found: Evaluations, path: Path) -> None:
 
 
 Beside = dict[float, Sequence[Followed]]
-"""Goals beside a design by the offset of one coordinate."""
+"""Responses beside a design by the offset of one coordinate."""
 
-ROUNDING = 1e-11  # of goals: differs between runs with the same steps
+ROUNDING = 1e-11  # of responses: differs between runs with the same steps
 DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 
 
@@ -172,7 +172,7 @@ class Differentiation:
     curvature: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        shape = len(self.evaluations.problem.goals), len(self.evaluations.space.variables)
+        shape = len(self.evaluations.problem.responses), len(self.evaluations.space.variables)
         self.curvature = np.full(shape, np.nan)
         self._tried = False
 
@@ -221,12 +221,12 @@ class Differentiation:
     def _samples(
         self, base: Evaluated, offsets: Mapping[int, list[float]], again: Mapping[Key, Any] | None
     ) -> dict[int, Beside]:
-        """By variable: the goals beside the base by offset; other offsets where a design there has failed."""
+        """By variable: the responses beside the base by offset; other offsets where a design there has failed."""
         found: dict[int, Beside] = {j: {} for j in offsets}
         for _ in range(2):
             moved = [(j, offset) for j in offsets for offset in offsets[j]]
-            goals = self.evaluations.beside(base, [_moved(base.place, j, offset) for j, offset in moved], again)
-            for (j, offset), values in zip(moved, goals, strict=True):
+            responses = self.evaluations.beside(base, [_moved(base.place, j, offset) for j, offset in moved], again)
+            for (j, offset), values in zip(moved, responses, strict=True):
                 if values and all(np.isfinite(one.value) for one in values):
                     found[j][offset] = values
             left = {j: [-x for x in tried if -x not in tried] for j, tried in offsets.items() if not found[j]}
@@ -252,7 +252,9 @@ class Differentiation:
             if not beside:
                 continue
             x = np.array([0.0, *beside])
-            f = np.array([base.values, *([one.value for one in values] for values in beside.values())])  # (x, goals)
+            f = np.array(
+                [base.values, *([one.value for one in values] for values in beside.values())]
+            )  # (x, responses)
             h = float(np.abs(x).min(where=x != 0.0, initial=np.inf))
             slope, uncertain = weights(x) @ (f - f[0]), noise * np.abs(f).max(axis=0) / h
             if x.size == 3:
@@ -261,12 +263,12 @@ class Differentiation:
                 bent = 0.5 * np.nan_to_num(curvature[:, j]) * x[1]
                 slope, uncertain = slope - bent, uncertain + np.abs(bent)
             gradient[:, j], error[:, j] = slope, uncertain
-        goals = self.evaluations.problem.goals
+        responses = self.evaluations.problem.responses
         kinks = dict.fromkeys(
-            f"{goal.text}: close to this design another peak is the largest, {one.elsewhere}"
+            f"{response.text}: close to this design another peak is the largest, {one.elsewhere}"
             for beside in samples.values()
             for values in beside.values()
-            for goal, one in zip(goals, values, strict=True)
+            for response, one in zip(responses, values, strict=True)
             if one.elsewhere
         )
         return Slopes(gradient, error, tuple(kinks))

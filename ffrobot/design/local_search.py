@@ -1,6 +1,6 @@
 """Searches along gradients from one start; all rows of catalogs; differential evolution.
 
-What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of the goals.
+What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of the responses.
 
 A design that fails reads as far worse than the last one that did not, with its excesses: SLSQP's line search and
 trust-constr's radius then shorten the step towards that one.
@@ -20,7 +20,7 @@ from ..common.arrays import Array, as_floats
 from ..run.watcher import Watcher
 from .designs import SpentError
 from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, optimality
-from .goals import KEPT
+from .responses import KEPT
 from .variables import DesignSpace, Place
 
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum
@@ -30,7 +30,7 @@ DOWN = 0.05  # of the gradient since it was judged last: is judged again
 FAR = 1e-2  # violation up to which an optimizer is left to itself: limits that it follows are always exceeded a little
 NEARER = 0.9  # of the violation: much less
 PATIENCE = 4  # gradients without that: the violation itself is made less
-SHORTEST = 1e-6  # step of SLSQP, of a number's range: its line search refuses steps where a limit trades for the goal
+SHORTEST = 1e-6  # step of SLSQP, of a range: its line search refuses steps where a limit trades for the response
 ITERATIONS = 200
 FTOL = 1e-9  # of the objective, and of excesses
 GTOL, XTOL = 1e-7, 1e-9  # of trust-constr
@@ -70,7 +70,7 @@ class SearchFunctions:
     ) -> None:  # fmt: skip
         self._differentiation, self._tell, self._judged, self._excess = differentiation, tell, judged, excess
         self._evaluations = differentiation.evaluations
-        variables, count = self._evaluations.space.variables, len(self._evaluations.problem.goals)
+        variables, count = self._evaluations.space.variables, len(self._evaluations.problem.responses)
         self._free = [j for j, variable in enumerate(variables) if not variable.is_catalogue]
         self._tops, self._limits = ([*range(1, count)], []) if excess else ([0], [*range(1, count)])
         self._place, self.best, self._good = np.array(start.place), start, start
@@ -125,11 +125,11 @@ class SearchFunctions:
         return as_floats(np.column_stack([rows[chosen], level]))
 
     def _rows(self, x: Array) -> Array:
-        """(1 + m) goals, scaled."""
+        """(1 + m) responses, scaled."""
         evaluations = self._evaluations
         one = self._at(x)
         if not one.completed:
-            worse = np.isin(np.arange(len(evaluations.problem.goals)), self._tops) * FAILED
+            worse = np.isin(np.arange(len(evaluations.problem.responses)), self._tops) * FAILED
             return as_floats(evaluations.problem.scaled(self._good.values) + worse)
         self.best = best_of(evaluations, [self.best, one])
         return evaluations.problem.scaled(one.values)
@@ -236,7 +236,7 @@ def search_from(
 ) -> Local:
     """Search along gradients from one start, at first with unjudged gradients, then with judged ones.
 
-    What SLSQP then leaves, whose line search may come to nothing where a limit trades for the goal almost linearly,
+    What SLSQP then leaves, whose line search may come to nothing where a limit trades for the response almost linearly,
     trust-constr goes on with. Where one ends beyond limits, the largest excess is made less until they are kept; where
     that fails with judged gradients, the search ends.
     """
@@ -310,9 +310,9 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
     def values(places: Array) -> Array:
         """(1 + m, S) of S places (n, S), or of one (n); infinite where designs fail."""
         designs = evaluations.at([tuple(map(float, place)) for place in places.reshape(count, -1).T])
-        failed = [np.inf] * len(problem.goals)
+        failed = [np.inf] * len(problem.responses)
         return np.array([problem.scaled(one.values) if one.completed else failed for one in designs]).reshape(
-            -1, len(problem.goals)
+            -1, len(problem.responses)
         ).T  # fmt: skip
 
     def on_improvement(x: Array, convergence: float) -> None:

@@ -1,12 +1,12 @@
 """The best design of a scene: `ffrobot optimise`. Every design is a run that is kept, as those of sensitivities are.
 
 Numbers are sought by SLSQP or trust-constr with gradients, from the scene's own values and further starts of a Latin
-hypercube; catalogs, and goals that are rough, by differential evolution or by trying every row. What is found last
+hypercube; catalogs, and responses that are rough, by differential evolution or by trying every row. What is found last
 is judged by central differences: multipliers of limits and bounds, and how far the gradient is from theirs.
 
-Two goals against each other, the least of one for each value that the other may have (Pareto front), are found by the
-ε-constraint method (Haimes, Lasdon & Wismer 1971): the ends are the best designs for each goal alone; between them the
-second goal is limited, in equal ratios where both ends have one sign. Each search begins at its neighbor's design.
+The Pareto front of two responses, the least of one for each value of the other, is found by the ε-constraint method
+(Haimes, Lasdon & Wismer 1971). Its ends are the best designs for each response alone. Between them the second response
+is limited, in equal ratios where both ends have one sign. Each search begins at its neighbor's design.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from ..sweep.files import run_files
 from .designs import Designs, Runs, SpentError, changes_for, may_repeat, number
 from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
 from .finding import CsvFile, Finding, TextTable, floats, with_unit
-from .goals import KEPT, DesignProblem, Limit, parse_goal, read_problem, with_motors
 from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
 from .optimum_record import Optimum, parallel, states_of
-from .readings import Goal, Reading
+from .readings import Reading, Response
+from .responses import KEPT, DesignProblem, Limit, parse_response, read_problem, with_motors
 from .variables import DesignSpace, Place, read_space
 
 BEST = "best"  # folder of the best design's scene
@@ -48,7 +48,7 @@ def find_optimum(
     problem = with_motors(problem, space)
     chosen = _method(space, method, runs)
     check_start(path, space, chosen)
-    evaluations = Evaluations(_designs(runner, space, problem.goals, tolerance, runs), space, problem)
+    evaluations = Evaluations(_designs(runner, space, problem.responses, tolerance, runs), space, problem)
     differentiation = Differentiation(evaluations, tolerance)
     try:
         searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
@@ -87,9 +87,9 @@ def check_start(path: Path, space: DesignSpace, method: str) -> None:
             )
 
 
-def _designs(runner: Runs, space: DesignSpace, goals: Sequence[Goal], tolerance: float, most: int) -> Designs:
+def _designs(runner: Runs, space: DesignSpace, responses: Sequence[Response], tolerance: float, most: int) -> Designs:
     """Designs in `space`. Raises `InputError` for a bound that is impossible wherever the others are."""
-    fixed = changes_for(runner.path, goals, tolerance, keep_steps=may_repeat(space.keys))
+    fixed = changes_for(runner.path, responses, tolerance, keep_steps=may_repeat(space.keys))
     designs = Designs(runner, space.keys, space.own, fixed, most)
     others = [] if space.start_place is None else [space.start_place]
     others += [(0.0,) * len(space.variables), tuple(variable.top for variable in space.variables)]
@@ -180,7 +180,7 @@ class FrontPoint:
 
     Attributes:
         point: values of the keys.
-        goal, against: of both responses there, in the `units` of the front.
+        response, against: of both responses there, in the `units` of the front.
         price: ∂response/∂against along the front; NaN at its ends.
         converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
         message: why the search ended where it is not.
@@ -188,7 +188,7 @@ class FrontPoint:
     """
 
     point: tuple[object, ...]
-    goal: float
+    response: float
     against: float
     price: float
     converged: bool
@@ -199,7 +199,7 @@ class FrontPoint:
 
 @dataclass(frozen=True)
 class Front(Finding):
-    """A Pareto front: `points` from the least `goals[0]` to the least `goals[1]`, found with `runs` runs.
+    """A Pareto front: `points` from the least `responses[0]` to the least `responses[1]`, found with `runs` runs.
 
     `tried` are the designs of all searches, each once. They have the responses of `problem`, its limits along the whole
     curve included, and then the second response.
@@ -209,7 +209,7 @@ class Front(Finding):
     title = "Pareto front"
 
     scene: Path
-    goals: tuple[str, str]
+    responses: tuple[str, str]
     units: tuple[str, str]
     keys: tuple[str, ...]
     points: tuple[FrontPoint, ...]
@@ -222,7 +222,7 @@ class Front(Finding):
     @property
     def values(self) -> Array:
         """Values (N, 2) of both responses."""
-        return np.array([(one.goal, one.against) for one in self.points])
+        return np.array([(one.response, one.against) for one in self.points])
 
     @property
     def shortfall(self) -> str:
@@ -232,18 +232,18 @@ class Front(Finding):
 
     def headline(self) -> str:
         """Number of designs and their responses, in one line."""
-        return f"{self.goals[0]} against {self.goals[1]}: {len(self.points)} designs"
+        return f"{self.responses[0]} against {self.responses[1]}: {len(self.points)} designs"
 
     def sections(self) -> Iterator[TextTable]:
         """Table with a line for each design: both responses, shadow price, keys."""
         price = " per ".join(unit or "1" for unit in self.units)
-        heading = (*map(with_unit, self.goals, self.units), f"price ({price})", *self.keys, "")
+        heading = (*map(with_unit, self.responses, self.units), f"price ({price})", *self.keys, "")
         yield TextTable(heading, self._rows())
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         for one in self.points:
             cost = f"{-one.price:.4g}" if np.isfinite(one.price) else ""
-            yield (f"{one.goal:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
+            yield (f"{one.response:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
 
     def remarks(self) -> Iterator[str]:
         """Lines with the method and notes on the accuracy."""
@@ -251,32 +251,32 @@ class Front(Finding):
         yield f"how        {how}"
         for one in self.points:
             if one.message and not one.converged:
-                yield f"note       {self.goals[1]} {one.against:.6g}: {one.message}"
+                yield f"note       {self.responses[1]} {one.against:.6g}: {one.message}"
 
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV table with one line for each design; `price` is ∂response/∂against along the front."""
-        columns = [*self.goals, "price", *self.keys, "converged", "feasible", "message"]
+        columns = [*self.responses, "price", *self.keys, "converged", "feasible", "message"]
         yield CsvFile("front.csv", "table of the front", columns, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
         for one in self.points:
             price = one.price if np.isfinite(one.price) else ""
             states = ("yes" if state else "no" for state in (one.converged, one.feasible))
-            yield [one.goal, one.against, price, *one.point, *states, one.message]
+            yield [one.response, one.against, price, *one.point, *states, one.message]
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the front and of all designs."""
         states = states_of(self.problem, self.tried, [one.design for one in self.points])
-        limits = [(limit.goal.text, limit) for limit in self.problem.limits]
-        goals = [(self.goals[0], None), *limits, (self.goals[1], None)]
-        return [self._curve(), parallel(self.space, goals, self.tried, states, "on the curve")]
+        limits = [(limit.response.text, limit) for limit in self.problem.limits]
+        responses = [(self.responses[0], None), *limits, (self.responses[1], None)]
+        return [self._curve(), parallel(self.space, responses, self.tried, states, "on the curve")]
 
     def _curve(self) -> Points:
-        goal, against = self.values.T
+        response, against = self.values.T
         return Points(
-            name="front", title=f"{self.goals[0]} against {self.goals[1]}",
-            x_label=with_unit(self.goals[1], self.units[1]), y_label=with_unit(self.goals[0], self.units[0]),
-            x=floats(against), y=floats(goal),
+            name="front", title=f"{self.responses[0]} against {self.responses[1]}",
+            x_label=with_unit(self.responses[1], self.units[1]), y_label=with_unit(self.responses[0], self.units[0]),
+            x=floats(against), y=floats(response),
             sure=tuple(bool(one.converged and one.feasible) for one in self.points),
         )  # fmt: skip
 
@@ -285,7 +285,7 @@ def _state(one: FrontPoint) -> str:
     return "beyond a limit" if not one.feasible else "" if one.converged else "not converged"
 
 
-SAME = 1e-6  # of the second goal: ends of a front that are one design
+SAME = 1e-6  # of the second response: ends of a front that are one design
 
 
 def find_front(
@@ -294,13 +294,13 @@ def find_front(
 ) -> Front:  # fmt: skip
     """Compute a Pareto front: see `ffrobot.trade_off`."""
     path, problem = runner.path, read_problem(minimise, None, subject_to)
-    space, other = read_space(path, vary), parse_goal(against, "--against")
+    space, other = read_space(path, vary), parse_response(against, "--against")
     if other.text == problem.objective.text:
         raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
     if catalogue := next((v for v in space.variables if v.is_catalogue), None):
         raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
     check_start(path, space, "slsqp")
-    designs = _designs(runner, space, (*problem.goals, other), tolerance, runs)
+    designs = _designs(runner, space, (*problem.responses, other), tolerance, runs)
     return _Searches(runner, space, designs, problem, other, tolerance).front(points)
 
 
@@ -310,7 +310,7 @@ class _Searches:
     space: DesignSpace
     designs: Designs
     problem: DesignProblem
-    against: Goal
+    against: Response
     tolerance: float
     tried: dict[Path, Evaluated] = field(default_factory=dict)
 
@@ -331,7 +331,7 @@ class _Searches:
         unit, other = (one.unit for one in self._both(first.design))
         return Front(
             scene=self.runner.path,
-            goals=(self.problem.objective.text, self.against.text),
+            responses=(self.problem.objective.text, self.against.text),
             units=(unit, other),
             keys=tuple(map(".".join, self.space.keys)),
             points=(*found, last),
@@ -353,10 +353,10 @@ class _Searches:
         self.tried |= {one.design.folder: one for one in evaluations.searched}
         if not found.best.completed:
             raise SolveError(f"{runner.path}: no design could be run to its end: {found.message}")
-        goal, against = (one.value for one in self._both(found.best))
+        response, against = (one.value for one in self._both(found.best))
         return FrontPoint(
             point=self.space.point(found.best.place),
-            goal=goal,
+            response=response,
             against=against,
             price=self._price(found, evaluations.problem),
             converged=found.optimality is not None and found.optimality.reached(AIM),
@@ -366,16 +366,16 @@ class _Searches:
         )
 
     def _price(self, found: Local, problem: DesignProblem) -> float:
-        """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached, NaN at the ends."""
-        if found.optimality is None or not problem.limits or problem.limits[0].goal is not self.against:
+        """Return ∂response/∂limit of the second response, the first limit: 0 if inactive, NaN at the ends."""
+        if found.optimality is None or not problem.limits or problem.limits[0].response is not self.against:
             return np.nan
         scale = problem.limits[0].scale * problem.factors(found.best.values)[0]
         return float(-np.nan_to_num(found.optimality.limits[0]) / scale)
 
     def _with_both(self, one: Evaluated) -> Evaluated:
-        """With readings of all goals, those of the limits, and the second one."""
-        goals = (*self.problem.goals, self.against)
-        return replace(one, readings=one.design.read(goals)) if one.completed else one
+        """With readings of all responses, those of the limits, and the second one."""
+        responses = (*self.problem.responses, self.against)
+        return replace(one, readings=one.design.read(responses)) if one.completed else one
 
     def _both(self, one: Evaluated) -> tuple[Reading, ...]:
         return one.design.read((self.problem.objective, self.against))

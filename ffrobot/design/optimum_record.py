@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array, as_floats
-from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_goal
+from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_response
 from ..results.verdict import Verdict
 from .designs import number
 from .evaluations import Evaluated, Optimality
 from .finding import CsvFile, Finding, TextTable, failed_runs, numbers, with_unit
-from .goals import KEPT, DesignProblem, Limit
 from .local_search import AIM, Local
+from .responses import KEPT, DesignProblem, Limit
 from .variables import DesignSpace, DesignVariable
 
 
@@ -29,30 +29,30 @@ def states_of(problem: DesignProblem, designs: Sequence[Evaluated], best: Sequen
             return "failed"
         if one.design.folder in chosen:
             return "best"
-        return "kept" if problem.violation(one.readings[: len(problem.goals)]) <= KEPT else "exceeded"
+        return "kept" if problem.violation(one.readings[: len(problem.responses)]) <= KEPT else "exceeded"
 
     return tuple(map(state, designs))
 
 
 def parallel(
     space: DesignSpace,
-    goals: Sequence[tuple[str, Limit | None]],
+    responses: Sequence[tuple[str, Limit | None]],
     designs: Sequence[Evaluated],
     states: tuple[State, ...],
     best_label: str,
 ) -> Parallel:
-    """A line for each design over the variables of `space` and the `goals`, with limits, that it has readings of."""
+    """Return a line for each design over the variables of `space` and the `responses` that are known, with limits."""
     points = [space.point(one.place) for one in designs]
     axes: list[Axis] = []
     for variable in space.variables:
         first = space.keys.index(variable.keys[0])
         for k in range(len(variable.keys) if variable.is_catalogue else 1):
             axes.append(_axis(variable, k, [point[first + k] for point in points]))
-    for g, (text, limit) in enumerate(goals):
+    for g, (text, limit) in enumerate(responses):
         unit = next((one.readings[g].unit for one in designs if one.completed), "")
         values = numbers(one.values[g] if one.completed else np.nan for one in designs)
         bound, sense = (limit.bound, limit.sense) if limit is not None else (None, 1.0)
-        axes.append(axis_of_goal(with_unit(text, unit), values, bound, 1 if sense > 0 else -1))
+        axes.append(axis_of_response(with_unit(text, unit), values, bound, 1 if sense > 0 else -1))
     title = f"{len(designs)} designs"
     return Parallel(name="designs", title=title, axes=tuple(axes), states=states, best_label=best_label)
 
@@ -65,7 +65,7 @@ def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple
         name="convergence", title=f"{problem.objective.text}, design by design",
         y_label=with_unit(problem.objective.text, unit),
         values=numbers(values), states=states, best=_best_so_far(problem, designs, values),
-        logarithmic=axis_of_goal("", numbers(values)).logarithmic,
+        logarithmic=axis_of_response("", numbers(values)).logarithmic,
     )  # fmt: skip
 
 
@@ -83,7 +83,9 @@ def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> Axis:
         return Axis(label=variable.name, values=tuple(map(float, values)), **keys)
     name, column = ".".join(variable.keys[k]), list(dict.fromkeys(row[k] for row in variable.rows))
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in column):
-        return axis_of_goal(name, tuple(map(float, column))).model_copy(update={"values": tuple(map(float, values))})
+        return axis_of_response(name, tuple(map(float, column))).model_copy(
+            update={"values": tuple(map(float, values))}
+        )
     numbered = tuple(float(column.index(value)) for value in values)
     return Axis(label=name, values=numbered, low=-0.5, high=len(column) - 0.5, names=tuple(map(str, column)))
 
@@ -219,9 +221,9 @@ class Optimum(Finding):
         yield from (f"price      {text}" for text in self._prices_in_words())
         if self.optimality is not None:
             yield from (f"note       {text}" for text in self.optimality.kinks)
-        for goal, reading in zip(self.problem.goals, self.best.readings, strict=False):
+        for response, reading in zip(self.problem.responses, self.best.readings, strict=False):
             if reading.remark:
-                yield f"note       {goal.text}: {reading.remark}"
+                yield f"note       {response.text}: {reading.remark}"
         if self.message:
             yield f"note       {self.message}"
         if len(self.searches) > 1:
@@ -239,7 +241,7 @@ class Optimum(Finding):
             if np.isfinite(price):
                 unit = self.best.readings[1 + self.problem.limits.index(limit)].unit
                 room = limit.sense * SHARE * limit.scale
-                yield f"{limit.goal.text}: {self._trade(limit.bound, room, price, unit)}"
+                yield f"{limit.response.text}: {self._trade(limit.bound, room, price, unit)}"
         for variable, price, u in zip(self.space.variables, self.bound_prices, self.best.place, strict=True):
             if np.isfinite(price):
                 bound = variable.low if u < 0.5 else variable.high
@@ -257,7 +259,7 @@ class Optimum(Finding):
 
     def _numbers(self) -> Iterator[list[object]]:
         problem, starts = self.problem, self.start.values or (np.nan,) * len(self.best.values)
-        yield ["goal", problem.objective.text, starts[0], self.value, "", "", "", ""]
+        yield ["response", problem.objective.text, starts[0], self.value, "", "", "", ""]
         for variable, price in zip(self.space.variables, self.bound_prices, strict=True):
             bounds = ("", "") if variable.is_catalogue else (variable.low, variable.high)
             for key in variable.keys:
@@ -266,15 +268,15 @@ class Optimum(Finding):
                 yield ["key", self.keys[k], start, self.values[k], *bounds, *_reached(price)]
         for k, (limit, price) in enumerate(zip(problem.limits, self.prices, strict=True)):
             within = ("", limit.bound) if limit.sense > 0 else (limit.bound, "")
-            yield ["limit", limit.goal.text, starts[k + 1], self.limits[k], *within, *_reached(price)]
+            yield ["limit", limit.response.text, starts[k + 1], self.limits[k], *within, *_reached(price)]
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of all designs and of the convergence."""
         problem = self.problem
         states = states_of(problem, self.tried, [self.best])
-        goals = [(problem.objective.text, None), *((limit.goal.text, limit) for limit in problem.limits)]
+        responses = [(problem.objective.text, None), *((limit.response.text, limit) for limit in problem.limits)]
         best = "best" if self.feasible else "nearest"
-        return [parallel(self.space, goals, self.tried, states, best), progress(problem, self.tried, states)]
+        return [parallel(self.space, responses, self.tried, states, best), progress(problem, self.tried, states)]
 
     def _key_rows(self) -> Iterator[tuple[str, str, str, str]]:
         owners = [variable for variable in self.space.variables for _ in variable.keys]

@@ -1,4 +1,4 @@
-"""What a goal is: a scalar by results, which is followed to those of a changed scene.
+"""What a response is: a scalar by results, which is followed to those of a changed scene.
 
 A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
 Danskin 1966), as long as no other time overtakes it. The time is that of the top itself, where d/dt = 0, which lies
@@ -27,10 +27,10 @@ from ..sweep.runs import by_dots, is_vector
 
 @dataclass(frozen=True)
 class Reading:
-    """A goal's value by results. Of a peak also where it is.
+    """A response's value by results. Of a peak also where it is.
 
     Attributes:
-        value: of the goal.
+        value: of the response.
         unit: empty where it is not known.
         time: of a peak, s; NaN of all else.
         edge: "first" or "last" where that is an end of the run, which may move.
@@ -72,7 +72,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Followed:
-    """The value of a goal by other results, a peak at its own place; `elsewhere`: where the largest value is now.
+    """The value of a response by other results, a peak at its own place; `elsewhere`: where the largest value is now.
 
     `coarse`: as of `Reading`.
     """
@@ -82,7 +82,7 @@ class Followed:
     coarse: float = float("nan")
 
 
-class Goal:
+class Response:
     """One scalar result to optimize or limit; `text` is the user's name for it."""
 
     text: str
@@ -243,7 +243,7 @@ NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
 
 
 @dataclass(frozen=True)
-class Peak(Goal):
+class Peak(Response):
     """The largest absolute value of a history, of any of its columns; of vectors their length."""
 
     text: str

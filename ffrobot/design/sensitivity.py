@@ -1,9 +1,10 @@
-"""Derivatives of goals by numbers of a scene and its links: `ffrobot sensitivity`.
+"""Derivatives of responses by numbers of a scene and its links: `ffrobot sensitivity`.
 
-Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/steps.py`). Their
-differences have no noise but rounding, which many thousand steps, and modes of links that are computed anew, make 1e-13
-to 1e-11 of a goal. Truncation grows with the number of periods that vibrations pass through. So the steps of every key
-are small, three of two sizes (`THREE`), which check each other; others follow where derivatives err by more than `AIM`.
+Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/steps.py`). The
+noise of their differences is round-off, 1e-13 to 1e-11 of a response after thousands of steps and with new modes of
+links. Truncation grows with the number of periods that vibrations pass through. So the
+steps of every key are small, three of two sizes (`THREE`), which check each other. Others follow where derivatives err
+by more than `AIM`.
 
 Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
 integrated with a tighter tolerance than the scene's. Where errors are above `AIM` and still fall with smaller steps,
@@ -28,8 +29,8 @@ from ..sweep.files import number_at
 from ..sweep.sweep import Key
 from .designs import Designs, Point, Runs, changes_for, may_repeat, parse_key, repeated_steps
 from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, numbers
-from .goals import parse_goal
-from .readings import Followed, Goal, Reading
+from .readings import Followed, Reading, Response
+from .responses import parse_response
 
 LEVELS = 3  # sizes of steps that one extrapolation takes at most
 NOISE = 3.0  # times what one divided difference says of it: with luck it says little
@@ -96,20 +97,20 @@ def _highest(offsets: Array) -> Array:
     return as_floats(1.0 / np.prod(apart, axis=1))
 
 
-AIM = 1e-5  # estimated error, of the largest percent per percent of a goal, or of 1, that needs no other steps
+AIM = 1e-5  # estimated error, of the largest percent per percent of a response, or of 1, that needs no other steps
 RESOLVING = 8.0  # times nearer are values between outputs, at least, than with every second output
-ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
+ROUGH = 1e-2  # of a derivative: beyond, the response is hardly smooth
 
 
 @dataclass(frozen=True)
 class Base:
-    """The place where derivatives are taken: k `keys` with their values `point`, and g `goals` with their `readings`.
+    """Where derivatives are taken: k `keys` with their values `point`, and g `responses` with their `readings`.
 
     `steps` (k) are the largest ones. `repeats`: the tolerance of runs that take the steps of the scene's own again; 0
     where they choose their own. `again`: the changes of their scenes with which they do.
     """
 
-    goals: tuple[Goal, ...]
+    responses: tuple[Response, ...]
     readings: tuple[Reading, ...]
     keys: tuple[Key, ...]
     point: Point
@@ -124,11 +125,11 @@ class Base:
 
 @dataclass(frozen=True)
 class Sample:
-    """Key number `k` changed by `offset`: the goals there, none where the run failed, and why it did."""
+    """Key number `k` changed by `offset`: the responses there, none where the run failed, and why it did."""
 
     k: int
     offset: float
-    goals: tuple[Followed, ...]
+    responses: tuple[Followed, ...]
     failure: str = ""
 
 
@@ -138,7 +139,7 @@ Method = Literal["differences", "repeated steps", "one-sided", "none"]
 
 @dataclass(frozen=True)
 class Entry:
-    """∂goal/∂key with the estimate of its error, both in SI units, NaN where there is none.
+    """∂response/∂key with the estimate of its error, both in SI units, NaN where there is none.
 
     `method`: one of `Method`; `step`: the largest that was taken; `notes`: what to mind; `unresolved`: the part of the
     error that outputs are too far apart for, which no other step lessens.
@@ -154,7 +155,7 @@ class Entry:
 
 def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], ...]:
     """Return derivatives as rows by response and columns by key."""
-    return tuple(tuple(_entry(base, g, k, samples) for k in range(len(base.keys))) for g in range(len(base.goals)))
+    return tuple(tuple(_entry(base, g, k, samples) for k in range(len(base.keys))) for g in range(len(base.responses)))
 
 
 def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
@@ -163,7 +164,7 @@ def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[
     for g, row in enumerate(rows):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
         for k, one in enumerate(row):
-            sizes = sorted({abs(each.offset) for each in samples if each.k == k and each.goals}, reverse=True)
+            sizes = sorted({abs(each.offset) for each in samples if each.k == k and each.responses}, reverse=True)
             is_good = _relative(one.error - one.unresolved, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
             if sizes and not is_good and np.isclose(abs(one.step), sizes[-LEVELS:][0] if smaller else sizes[0]):
                 rough.add(k)
@@ -172,9 +173,9 @@ def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[
 
 def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
     samples = [one for one in all_samples if one.k == k]
-    whole = [one for one in samples if one.goals and np.isfinite(one.goals[g].value)]
+    whole = [one for one in samples if one.responses and np.isfinite(one.responses[g].value)]
     offsets = np.array([0.0, *(one.offset for one in whole)])
-    nominal, beside = base.readings[g], [one.goals[g] for one in whole]
+    nominal, beside = base.readings[g], [one.responses[g] for one in whole]
     found = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
     by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
     unresolved = abs(by_coarse - found.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
@@ -206,8 +207,8 @@ def _notes(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Iterator[st
 
     if failed := next((one for one in nearest if one.failure), None):
         yield f"{at(failed)}: {failed.failure}"
-    if jump := next((one for one in nearest if one.goals and one.goals[g].elsewhere), None):
-        yield f"a kink: {at(jump)} the largest value is {jump.goals[g].elsewhere}"
+    if jump := next((one for one in nearest if one.responses and one.responses[g].elsewhere), None):
+        yield f"a kink: {at(jump)} the largest value is {jump.responses[g].elsewhere}"
 
 
 def _is_rough(base: Base, g: int, k: int, error: float, value: float) -> bool:
@@ -215,13 +216,13 @@ def _is_rough(base: Base, g: int, k: int, error: float, value: float) -> bool:
 
 
 def _relative(error: float, base: Base, g: int, k: int) -> float:
-    """|`error`| of percent per percent; of a goal or a key that is 0 in its unit."""
+    """|`error`| of percent per percent; of a response or a key that is 0 in its unit."""
     return abs(error) * (abs(base.point[k]) or 1.0) / (abs(base.readings[g].value) or 1.0)
 
 
 COLUMNS = (
-    "goal", "value", "unit", "time", "key", "key_value", "derivative", "error", "percent_per_percent", "method", "step",
-    "notes",
+    "response", "value", "unit", "time", "key", "key_value", "derivative", "error", "percent_per_percent", "method",
+    "step", "notes",
 )  # fmt: skip
 HEADING = ("key", "value", "% per %", "derivative", "error", "by")
 HOW = {
@@ -237,7 +238,7 @@ class Sensitivity(Finding):
 
     Attributes:
         scene: its file.
-        goals, readings: the responses, and their values in the scene.
+        responses, readings: the responses, and their values in the scene.
         keys: with dots; `values` (k,) are theirs in the scene.
         entries: the derivatives, [response][key].
         failures: messages of failed designs.
@@ -249,7 +250,7 @@ class Sensitivity(Finding):
     title = "Sensitivities"
 
     scene: Path
-    goals: tuple[str, ...]
+    responses: tuple[str, ...]
     readings: tuple[Reading, ...]
     keys: tuple[str, ...]
     values: Array
@@ -289,14 +290,16 @@ class Sensitivity(Finding):
 
     def headline(self) -> str:
         """The key with the largest influence on each response."""
-        return "; ".join(f"{goal}: {self.keys[self.ranked(g)[0]]} matters most" for g, goal in enumerate(self.goals))
+        return "; ".join(
+            f"{response}: {self.keys[self.ranked(g)[0]]} matters most" for g, response in enumerate(self.responses)
+        )
 
     def sections(self) -> Iterator[TextTable]:
         """Tables, one for each response, the most influential key first."""
-        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
             rows = [self._row(g, k) for k in self.ranked(g)]
             when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
-            yield TextTable(HEADING, rows, line=f"{goal}: {reading.in_words(8)}{when}", of=goal)
+            yield TextTable(HEADING, rows, line=f"{response}: {reading.in_words(8)}{when}", of=response)
 
     def _row(self, g: int, k: int) -> tuple[str, ...]:
         one = self.entries[g][k]
@@ -310,25 +313,25 @@ class Sensitivity(Finding):
         yield CsvFile("sensitivity.csv", "table of sensitivities", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
-        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
             time = "" if np.isnan(reading.time) else reading.time
             for k, (key, value) in enumerate(zip(self.keys, self.values, strict=True)):
                 one = self.entries[g][k]
                 yield [
-                    goal, reading.value, reading.unit, time, key, float(value), one.derivative, one.error,
+                    response, reading.value, reading.unit, time, key, float(value), one.derivative, one.error,
                     self.logarithmic[g, k], one.method, one.step, "; ".join(one.notes),
                 ]  # fmt: skip
 
     def diagrams(self) -> list[Bars]:
         """Tornado diagrams, one for each response."""
-        return [self._tornado(g) for g in range(len(self.goals))]
+        return [self._tornado(g) for g in range(len(self.responses))]
 
     def _tornado(self, g: int) -> Bars:
-        """Percent of goal g per percent of each key, the largest on top; keys without a number are left out."""
+        """Percent of response g per percent of each key, the largest on top; keys without a number are left out."""
         known = [k for k in self.ranked(g) if np.isfinite(self.logarithmic[g, k])]
         return Bars(
-            name=f"tornado_{file_name(self.goals[g])}",
-            title=f"{self.goals[g]}: {self.readings[g].in_words(5)}",
+            name=f"tornado_{file_name(self.responses[g])}",
+            title=f"{self.responses[g]}: {self.readings[g].in_words(5)}",
             x_label="% per % of the parameter",
             labels=tuple(self.keys[k] for k in known),
             series=(Series(values=numbers(self.logarithmic[g, known])),),
@@ -337,11 +340,11 @@ class Sensitivity(Finding):
 
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
-        for goal, reading, row in zip(self.goals, self.readings, self.entries, strict=True):
+        for response, reading, row in zip(self.responses, self.readings, self.entries, strict=True):
             if reading.remark:
-                yield f"note       {goal}: {reading.remark}"
+                yield f"note       {response}: {reading.remark}"
             for key, one in zip(self.keys, row, strict=True):
-                yield from (f"note       {goal} by {key}: {text}" for text in one.notes)
+                yield from (f"note       {response} by {key}: {text}" for text in one.notes)
         yield from failed_runs(self.failures, self.runs)
         methods = {one.method for row in self.entries for one in row}
         texts = [words for method, words in HOW.items() if method in methods]
@@ -367,11 +370,11 @@ def find_sensitivity(
     runs: Runs, of: Sequence[str], to: Sequence[str], step: float, tolerance: float | None
 ) -> Sensitivity:
     """Compute derivatives of responses: see `ffrobot.sensitivity`."""
-    goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
+    responses = tuple(parse_response(text) for text in dict.fromkeys(of))
     keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
-    if not goals or not keys:
+    if not responses or not keys:
         raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
-    designs, base = _start(runs, goals, keys, step, tolerance)
+    designs, base = _start(runs, responses, keys, step, tolerance)
     _check_steps(designs, base)
     samples = _all_samples(designs, base)
     failures = tuple(
@@ -381,7 +384,7 @@ def find_sensitivity(
     )
     return Sensitivity(
         scene=runs.path,
-        goals=tuple(goal.text for goal in goals),
+        responses=tuple(response.text for response in responses),
         readings=base.readings,
         keys=tuple(map(".".join, keys)),
         values=np.array(base.point),
@@ -394,23 +397,23 @@ def find_sensitivity(
 
 
 def _start(
-    runs: Runs, goals: tuple[Goal, ...], keys: tuple[Key, ...], step: float, tolerance: float | None
+    runs: Runs, responses: tuple[Response, ...], keys: tuple[Key, ...], step: float, tolerance: float | None
 ) -> tuple[Designs, Base]:
-    """The place where derivatives are taken, with the goals of the scene's own design, and designs beside it.
+    """The place where derivatives are taken, with the responses of the scene's own design, and designs beside it.
 
     These take its steps again where they can; else runs have a tighter tolerance.
     """
     point = tuple(number_at(runs.path, key, "--to") for key in keys)
     steps = tuple(step * (abs(value) or 1.0) for value in point)  # of keys that are 0, in their unit
     for repeats in (tolerance or TOLERANCE_REPEATED, 0.0) if may_repeat(keys) else (0.0,):
-        fixed = changes_for(runs.path, goals, repeats or tolerance or TOLERANCE, keep_steps=repeats > 0.0)
+        fixed = changes_for(runs.path, responses, repeats or tolerance or TOLERANCE, keep_steps=repeats > 0.0)
         designs = Designs(runs, keys, point, fixed)
         with designs.run_first(point).results() as results:
-            readings = tuple(goal.read(results) for goal in goals)
+            readings = tuple(response.read(results) for response in responses)
             again = repeated_steps(results) if repeats else None
         if again:
             break
-    return designs, Base(goals, readings, keys, point, steps, repeats if again else 0.0, again or {})
+    return designs, Base(responses, readings, keys, point, steps, repeats if again else 0.0, again or {})
 
 
 def _check_steps(designs: Designs, base: Base) -> None:
@@ -444,6 +447,6 @@ def _beside(
     new = [place for place in places if place not in taken]
     found = designs.run([base.moved(k, offset) for k, offset in new], base.again)
     return [
-        Sample(k, offset, design.follow(base.goals, base.readings), design.failure)
+        Sample(k, offset, design.follow(base.responses, base.readings), design.failure)
         for (k, offset), design in zip(new, found, strict=True)
     ]

@@ -87,7 +87,7 @@ def statistics(values: Array) -> SpreadStatistics:
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
     """Squared standardized regression coefficients (g, k) of outputs (n, g) by inputs (n, k), and R² (g,).
 
-    Where R² is near one, coefficients are shares of the variance; where it is not, the goals are not linear.
+    Where R² is near one, coefficients are shares of the variance; where it is not, the responses are not linear.
     """
     x = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
     size = outputs.std(axis=0)

@@ -19,8 +19,8 @@ from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
 from .designs import Design, Designs, Point, Runs, changes_for, in_words
 from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
-from .goals import parse_goal
-from .readings import Goal, History, Reading, read_column
+from .readings import History, Reading, Response, read_column
+from .responses import parse_response
 from .spreads import (
     NAMES,
     Indices,
@@ -35,7 +35,7 @@ from .spreads import (
 )
 
 LinearOrSampled = Literal["samples", "gradients"]
-ROUNDING = 1e-13  # of a goal: smaller deviations are none
+ROUNDING = 1e-13  # of a response: smaller deviations are none
 UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, a note says that shares by regression are small
 BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
@@ -61,7 +61,7 @@ class Uncertainty(Finding):
         scene: its file.
         spreads: (k,) distributions of the keys.
         method: samples or gradients.
-        goals, readings: (g,) the responses, and their values with all keys at nominal values.
+        responses, readings: (g,) the responses, and their values with all keys at nominal values.
         statistics: (g,) of the responses.
         bands: of the histories.
         shares: (g, k) shares of the variance by the linear part; `explained` (g,) is their sum, NaN by gradients.
@@ -77,7 +77,7 @@ class Uncertainty(Finding):
     scene: Path
     spreads: tuple[Spread, ...]
     method: LinearOrSampled
-    goals: tuple[str, ...]
+    responses: tuple[str, ...]
     readings: tuple[Reading, ...]
     statistics: SpreadStatistics
     bands: tuple[HistoryBand, ...]
@@ -93,16 +93,18 @@ class Uncertainty(Finding):
     def headline(self) -> str:
         """Intervals of the responses, in one line."""
         texts = []
-        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
             low, _, high = self.statistics.quantiles[:, g]
-            texts.append(f"{goal}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})")
+            texts.append(
+                f"{response}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})"
+            )
         return "; ".join([*texts, *(f"band of {band.name}" for band in self.bands)])
 
     def sections(self) -> Iterator[TextTable]:
         """Tables of each response with the influence of the keys, then the bands."""
-        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
             heading = (*self.statistics.named, "worst case")
-            nominal = f"{goal}: {reading.in_words()} with all parameters at nominal values"
+            nominal = f"{response}: {reading.in_words()} with all parameters at nominal values"
             yield TextTable(heading, [self._statistics_row(g)], line=nominal)
             yield self._parts(g)
         if self.bands:
@@ -110,14 +112,14 @@ class Uncertainty(Finding):
 
     def report_tables(self) -> Iterator[StudyTable]:
         """The statistics of all responses in one table."""
-        if self.goals:
+        if self.responses:
             rows = [
-                (goal, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
-                for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True))
+                (response, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
+                for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True))
             ]
             heading = ("response", "unit", "nominal", *self.statistics.named, "worst case")
             yield TextTable(heading, rows).for_report()
-        yield from (self._parts(g).for_report() for g in range(len(self.goals)))
+        yield from (self._parts(g).for_report() for g in range(len(self.responses)))
         if self.bands:
             yield TextTable(BAND_HEADINGS, self._band_rows()).for_report()
 
@@ -127,7 +129,7 @@ class Uncertainty(Finding):
         return (*cells, f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
 
     def _parts(self, g: int) -> TextTable:
-        """The keys' shares of the variance of goal g, the largest first; Sobol indices where known."""
+        """The keys' shares of the variance of response g, the largest first; Sobol indices where known."""
         rows = []
         for k in self.ranked(g):
             one = self.spreads[k]
@@ -137,7 +139,7 @@ class Uncertainty(Finding):
                 cells = [f"{with_error(100.0 * part[g, k], 100.0 * error[g, k])} %" for part, error in pairs]
             rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
         parts = ("alone", "with others") if self.indices else ("share of the variance",)
-        return TextTable(("key", "spread", *parts), rows, of=self.goals[g])
+        return TextTable(("key", "spread", *parts), rows, of=self.responses[g])
 
     def ranked(self, g: int) -> list[int]:
         """Key numbers by decreasing influence on response g."""
@@ -156,14 +158,14 @@ class Uncertainty(Finding):
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
         deviations = self.statistics.deviation
-        for goal, reading, explained, deviation in zip(
-            self.goals, self.readings, self.explained, deviations, strict=True
+        for response, reading, explained, deviation in zip(
+            self.responses, self.readings, self.explained, deviations, strict=True
         ):
             if deviation <= ROUNDING * abs(reading.value):
-                yield f"note       {goal}: {UNCHANGED}"
+                yield f"note       {response}: {UNCHANGED}"
             if explained < LINEAR and self.indices is None:
                 yield (
-                    f"note       {goal}: a linear function of the keys makes {100.0 * explained:.0f} % of the variance:"
+                    f"note       {response}: linear effects of keys make up {100 * explained:.0f} % of the variance:"
                     " --indices computes the effect of each, alone and with others"
                 )
         yield from (f"note       {text}" for text in self.notes)
@@ -181,30 +183,30 @@ class Uncertainty(Finding):
 
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV tables with one line for each response, and for each time of a history."""
-        if self.goals:
-            yield CsvFile("uncertainty.csv", "table of uncertainties", self._goal_columns(), self._goal_rows())
+        if self.responses:
+            yield CsvFile("uncertainty.csv", "table of uncertainties", self._response_columns(), self._response_rows())
         for band in self.bands:
             lines = ([t, band.nominal[k], *band.statistics.numbers(k)] for k, t in enumerate(band.time))
             columns = ("time", "nominal", *band.statistics.columns)
             yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", columns, lines)
 
-    def _goal_columns(self) -> list[str]:
+    def _response_columns(self) -> list[str]:
         keys = [".".join(one.key) for one in self.spreads]
         parts = [f"share {key}" for key in keys]
         if self.indices:
             parts += [f"{word} {key}" for word in ("first", "first_error", "total", "total_error") for key in keys]
-        return ["goal", "unit", "middle", *self.statistics.columns, "linear", *parts]
+        return ["response", "unit", "middle", *self.statistics.columns, "linear", *parts]
 
-    def _goal_rows(self) -> Iterator[list[object]]:
-        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+    def _response_rows(self) -> Iterator[list[object]]:
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
             parts = list(self.shares[g])
             if i := self.indices:
                 parts += [*i.first[g], *i.first_error[g], *i.total[g], *i.total_error[g]]
-            yield [goal, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
+            yield [response, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the ranking of keys for each response, and of the bands."""
-        return [*(self._ranking(g) for g in range(len(self.goals))), *map(self._band, self.bands)]
+        return [*(self._ranking(g) for g in range(len(self.responses))), *map(self._band, self.bands)]
 
     def _ranking(self, g: int) -> Bars:
         order = self.ranked(g)
@@ -217,7 +219,7 @@ class Uncertainty(Finding):
         else:
             series = [Series(values=numbers(100.0 * self.shares[g, order]))]
         return Bars(
-            name=f"ranking_{file_name(self.goals[g])}", title=self.goals[g],
+            name=f"ranking_{file_name(self.responses[g])}", title=self.responses[g],
             x_label="Sobol index (%)" if self.indices else "share of the variance (%)",
             labels=tuple(".".join(self.spreads[k].key) for k in order), series=tuple(series),
         )  # fmt: skip
@@ -245,7 +247,7 @@ FEWEST = 8  # samples for a quantile of 5 %
 
 
 @dataclass(frozen=True)
-class WholeHistory(Goal):
+class WholeHistory(Response):
     """A history as a whole."""
 
     text: str
@@ -266,12 +268,12 @@ def find_uncertainty(
     if by == "gradients" and indices:
         raise InputError("uncertainty: expected Sobol indices of samples, found --by gradients")
     names = list(dict.fromkeys(of))
-    goals = tuple(parse_goal(text) for text in names if not _is_history(text))
+    responses = tuple(parse_response(text) for text in names if not _is_history(text))
     curves = tuple(WholeHistory(text, text) for text in names if _is_history(text))
     spreads = read_spreads(runs.path, spread)
     if not names or not spreads:
         raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
-    study = _Study(runs, spreads, goals, curves, TOLERANCE if by == "gradients" else None)
+    study = _Study(runs, spreads, responses, curves, TOLERANCE if by == "gradients" else None)
     return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
 
 
@@ -286,12 +288,16 @@ class _Study:
     """
 
     def __init__(
-        self, runs: Runs, spreads: tuple[Spread, ...], goals: tuple[Goal, ...], curves: tuple[WholeHistory, ...],
+        self,
+        runs: Runs,
+        spreads: tuple[Spread, ...],
+        responses: tuple[Response, ...],
+        curves: tuple[WholeHistory, ...],
         tolerance: float | None,
-    ) -> None:  # fmt: skip
-        self._path, self._spreads, self._goals, self._curves = runs.path, spreads, goals, curves
+    ) -> None:
+        self._path, self._spreads, self._responses, self._curves = runs.path, spreads, responses, curves
         self._point: Point = tuple(one.mean for one in spreads)
-        fixed = changes_for(runs.path, (*goals, *curves), tolerance)
+        fixed = changes_for(runs.path, (*responses, *curves), tolerance)
         self._designs = Designs(runs, [one.key for one in spreads], tuple(one.own for one in spreads), fixed)
         for k, one in enumerate(spreads):
             for end in one.ends:
@@ -300,10 +306,10 @@ class _Study:
                         f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
                     )
         middle = self._designs.run_first(self._point)
-        self._readings = middle.read(goals)
+        self._readings = middle.read(responses)
         self._nominal = tuple(curve.history(middle) for curve in curves)
         self._failures: list[str] = []
-        pairs = zip(goals, self._readings, strict=True)
+        pairs = zip(responses, self._readings, strict=True)
         self._notes = {f"peak of {g.text}": f"{g.text}: {one.remark}" for g, one in pairs if one.remark}
 
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
@@ -328,7 +334,7 @@ class _Study:
         shares, explained = regression_shares(np.array(points[:n])[whole], values[:n][whole])
         complete = [design for design, is_whole in zip(designs[:n], whole, strict=True) if is_whole]
         bands = self._bands(complete, lambda nominal, of_designs: statistics(of_designs))
-        blocks = values.reshape(-1, count // 2, len(self._goals)) if indices else None
+        blocks = values.reshape(-1, count // 2, len(self._responses)) if indices else None
         return Uncertainty(
             method="samples",
             statistics=statistics(values[:n][whole]),
@@ -357,9 +363,9 @@ class _Study:
             statistics=model.statistics(),
             bands=self._bands(designs, lambda nominal, of_designs: self._linear(nominal, of_designs).statistics()),
             shares=model.shares,
-            explained=np.full(len(self._goals), np.nan),
+            explained=np.full(len(self._responses), np.nan),
             indices=None,
-            samples=np.zeros((0, len(self._goals))),
+            samples=np.zeros((0, len(self._responses))),
             runs=1 + len(sides),
             **self._common(),
         )
@@ -368,7 +374,7 @@ class _Study:
         return {
             "scene": self._path,
             "spreads": self._spreads,
-            "goals": tuple(goal.text for goal in self._goals),
+            "responses": tuple(response.text for response in self._responses),
             "readings": self._readings,
             "failures": tuple(self._failures),
             "notes": tuple(self._notes.values()),
@@ -386,20 +392,20 @@ class _Study:
         failure = design.failure
         try:
             if not failure:
-                return [one.value for one in design.read(self._goals)]
+                return [one.value for one in design.read(self._responses)]
         except InputError as error:
             failure = str(error)
         self._failures.append(f"{self._where(design)}: {failure}")
-        return [float("nan")] * len(self._goals)
+        return [float("nan")] * len(self._responses)
 
     def _follow(self, design: Design) -> list[float]:
         """The responses beside the middle, peaks at their own times."""
-        followed = design.follow(self._goals, self._readings)
-        for goal, one in zip(self._goals, followed, strict=False):
+        followed = design.follow(self._responses, self._readings)
+        for response, one in zip(self._responses, followed, strict=False):
             if one.elsewhere:
-                kink = f"{goal.text}: a kink: with {self._where(design)} the largest value is {one.elsewhere}"
-                self._notes.setdefault(goal.text, f"{kink}; samples take it into account")
-        return [one.value for one in followed] or [float("nan")] * len(self._goals)
+                kink = f"{response.text}: a kink: with {self._where(design)} the largest value is {one.elsewhere}"
+                self._notes.setdefault(response.text, f"{kink}; samples take it into account")
+        return [one.value for one in followed] or [float("nan")] * len(self._responses)
 
     def _bands(
         self, designs: Sequence[Design], of: Callable[[Array, Array], SpreadStatistics]

@@ -9,7 +9,7 @@ from tables_3d import ORIGIN, revolute, rigid, scene
 
 import ffrobot as program
 from ffrobot import InputError, Results
-from ffrobot.design.goals import parse_goal
+from ffrobot.design.responses import parse_response
 
 INERTIA, K, LENGTH, WAY = 0.3, 500.0, 0.5, 0.7
 OMEGA = np.sqrt(K / INERTIA)
@@ -122,11 +122,11 @@ stiffness = 500.0
         assert float(row["residual b.tip"]) == pytest.approx(expected, rel=1e-4)
         assert row["settling run/b.tip"].lower() in ("", "nan")
     with Results(next((tmp_path / "out").rglob("*.h5"))) as results:
-        found = parse_goal("settling b.tip").read(results)
+        found = parse_response("settling b.tip").read(results)
         assert found.value == pytest.approx(1.1, rel=1e-12)
         assert "not settled" in found.doubt
         with pytest.raises(InputError, match=r'"run/b\.tip", found "b\.top"'):
-            parse_goal("residual b.top").read(results)
+            parse_response("residual b.top").read(results)
 
 
 def soft_arm(*kinds):
@@ -184,7 +184,7 @@ def test_a_turned_beam_rings_as_the_first_mode_of_a_cantilever_whole_or_in_piece
             about = results.attributes(f"{kind}/settling/arm.tip")
             assert about["frequency"] == pytest.approx(omega / (2 * np.pi), rel=1e-4), kind
             assert about["residual"] == pytest.approx(expected, rel=2e-3), kind
-            assert parse_goal(f"residual {kind}/arm.tip").read(results).value == about["residual"]
+            assert parse_response(f"residual {kind}/arm.tip").read(results).value == about["residual"]
         whole = [results.attributes(f"{kind}/settling/arm.tip")["residual"] for kind in ("pcid", "forward")]
         assert whole[1] == pytest.approx(whole[0], rel=1e-5)
 

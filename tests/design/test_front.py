@@ -30,7 +30,7 @@ def test_mass_against_deflection_is_a_power_law(scene):
     np.testing.assert_allclose(tip, np.geomspace(deflection(0.01), deflection(0.04), 4), rtol=1e-6)
     np.testing.assert_allclose(mass, RHO * L * WIDTH * (4.0 * FORCE * L**3 / (E * WIDTH * tip)) ** (1 / 3), rtol=1e-6)
     for one in found.points[1:-1]:
-        assert one.price == pytest.approx(-one.goal / (3.0 * one.against), rel=1e-4)
+        assert one.price == pytest.approx(-one.response / (3.0 * one.against), rel=1e-4)
     assert all(one.converged and one.feasible for one in found.points)
     assert found.units == ("kg", "m")
     curve, designs = found.study().diagrams
@@ -42,6 +42,6 @@ def test_mass_against_deflection_is_a_power_law(scene):
     np.testing.assert_allclose(sorted(best), sorted(mass), rtol=1e-14)
 
 
-def test_goals_that_go_together(scene):
+def test_responses_that_go_together(scene):
     with pytest.raises(ffrobot.InputError, match="expected responses with different optima"):
         ffrobot.trade_off(scene, [HEIGHT], minimise="mass", against="mass beam", points=3)

@@ -270,10 +270,10 @@ def test_starts(write):
     del scene["trajectory"][0]["value"]
     scene["trajectory"][0] |= {"via": [0.0, 2.5], "duration": 2.0, "smoothness": 2}
     scene["analysis"][0] |= {"end": 2.0, "output_step": 0.2}
-    goal, vary = "at 1.6 joints.shoulder.moment", ["trajectory.swing.via.1=1:12"]
+    response, vary = "at 1.6 joints.shoulder.moment", ["trajectory.swing.via.1=1:12"]
     s, acceleration, weight = 0.94208, -1.44, 2.0 * 9.81 * 0.3
     tilt = np.arcsin(-J * acceleration / (weight * s))
-    found = ffrobot.optimise(write(scene), vary, minimise=goal, starts=2, seed=2)
+    found = ffrobot.optimise(write(scene), vary, minimise=response, starts=2, seed=2)
     assert found.space.point(found.searches[0].best.place)[0] == pytest.approx((np.pi + tilt) / s, rel=1e-4)
     x = (3.0 * np.pi + tilt) / s
     assert found.values[0] == pytest.approx(x, rel=1e-4)

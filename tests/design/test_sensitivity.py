@@ -14,7 +14,7 @@ PLANE = SWING | {
     "joint": [SWING["joint"][0] | {"gear_ratio": 40.0, "rotor_inertia": 2e-5, "viscous_friction": 0.2}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005}],
 }
-STEP = 2e-4  # s, of outputs that goals are read from, however far apart those of the scene are
+STEP = 2e-4  # s, of outputs that responses are read from, however far apart those of the scene are
 SPACE_LINK = TUBE | {"modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}}
 SPACE = {
     "name": "arm",
@@ -95,7 +95,7 @@ SPACE_KEYS = (
     ],
 )
 def test_against_differences_by_hand(write, scene, keys):
-    """Eleven kinds of key: 1e-6 of a percent per percent, for errors are of the goal where it hardly depends on a key.
+    """Eleven kinds of key: 1e-6 of a percent per percent, as errors are of the response where it hardly depends on it.
 
     The estimate is worth its name: it is off by no more than that either.
     """
@@ -268,7 +268,7 @@ def test_command(ffrobot, write):
         ("mass leg", 'expected a body ("arm"), found "leg"'),
     ],
 )
-def test_goals_that_are_none_are_told_by_the_first_run(write, tmp_path, of, message):
+def test_responses_that_are_none_are_told_by_the_first_run(write, tmp_path, of, message):
     with pytest.raises(ffrobot.InputError) as told:
         ffrobot.sensitivity(write(ARM), [of], ["payload.0.mass"], tmp_path / "designs")
     assert message in str(told.value)

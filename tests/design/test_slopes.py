@@ -10,7 +10,7 @@ from small_robots import SWING
 import ffrobot
 from ffrobot.design.designs import Designs, Runs, changes_for
 from ffrobot.design.evaluations import Differentiation, Evaluations
-from ffrobot.design.goals import read_problem
+from ffrobot.design.responses import read_problem
 from ffrobot.design.variables import read_space
 
 OUTER, LOAD = "links.arm.geometry.section.outer", "payload.0.mass"
@@ -23,7 +23,7 @@ def differentiation(tmp_path, scene):
     path.write_text(tomli_w.dumps(scene), encoding="utf-8")
     problem = read_problem(GOALS[0], None, [f"{GOALS[1]} <= 1"])
     space = read_space(path, [f"{OUTER}=0.018:0.03", f"{LOAD}=0.1:1:log"])
-    fixed = changes_for(path, problem.goals, 1e-7, keep_steps=True)
+    fixed = changes_for(path, problem.responses, 1e-7, keep_steps=True)
     designs = Designs(Runs(path, tmp_path / "runs", processes=2), space.keys, space.own, fixed)
     evaluations = Evaluations(designs, space, problem)
     (first,) = evaluations.at([space.start_place])
@@ -32,7 +32,7 @@ def differentiation(tmp_path, scene):
 
 
 def by_keys(found, first):
-    """∂goal/∂key from ∂goal/∂u."""
+    """∂response/∂key from ∂response/∂u."""
     variables = found.evaluations.space.variables
     return np.array([variable.slope(u) for variable, u in zip(variables, first.place, strict=True)])
 

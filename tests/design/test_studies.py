@@ -42,7 +42,7 @@ def diagrams(study):
 
 
 def test_all_designs_of_a_search(searched):
-    """Each as what it is; the line of a failed one ends where its goals would begin."""
+    """Each as what it is; the line of a failed one ends where its responses would begin."""
     study = searched.study()
     assert study.good
     parallel, progress = diagrams(study)["designs"], diagrams(study)["convergence"]

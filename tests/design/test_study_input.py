@@ -59,7 +59,7 @@ def test_uncertainty(told, of, spreads, options, message):
 
 
 @pytest.mark.parametrize("of", ["peak joints.shoulder.momentt", "joints.shoulder.momentt", "rms"])
-def test_goals_that_are_no_numbers_are_told_after_one_run(ffrobot, write, of):
+def test_responses_that_are_no_numbers_are_told_after_one_run(ffrobot, write, of):
     """Which histories there are is known then."""
     scene = write(ARM)
     done = ffrobot("uncertainty", scene, "--of", of, "--spread", GOOD)

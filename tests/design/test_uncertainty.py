@@ -99,7 +99,7 @@ def test_gradients_of_a_quadratic_tell_how_far_they_are_off():
     np.testing.assert_allclose(found.quantiles, norm.ppf(LEVELS), atol=3e-3)  # there one of 4096 is 2.4e-3
 
 
-def test_linear_goals(write, tmp_path):
+def test_linear_responses(write, tmp_path):
     """Mass and moment of a rigid arm, by samples and by gradients; the samples are the runs'."""
     path = write(ARM)
     spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]

@@ -16,7 +16,7 @@ from ffrobot.pictures.studies.study import (
     Series,
     Study,
     StudyTable,
-    axis_of_goal,
+    axis_of_response,
     read_study,
     write_study,
 )
@@ -45,7 +45,7 @@ def folder(tmp_path_factory):
     axes = (
         Axis(label="joint.1.gear_ratio", values=(10.0, 20.0, 50.0, 100.0), low=10.0, high=1000.0, logarithmic=True),
         Axis(label="link", values=(0.0, 1.0, 1.0, 0.0), low=-0.5, high=1.5, names=("<thin>", "thick")),
-        axis_of_goal("mass (kg)", MASSES, limit=2.8),
+        axis_of_response("mass (kg)", MASSES, limit=2.8),
     )
     designs = Parallel(name="designs", title="4 designs", axes=axes, states=STATES)
     progress = Progress(
@@ -114,7 +114,7 @@ def names(figure):
 
 
 def test_lines_of_designs(folder):
-    """Each by its state, the best one last and on top; the failed one ends before the goal; axes by logarithms."""
+    """Each by its state, the best one last and on top; the failed one ends before the response; axes by logarithms."""
     picture = drawn(folder, "optimum.json", "designs")
     assert names(picture) == ["failed", "beyond a limit", "within limits", "best", "limit, pointing beyond it"]
     (axes,) = picture.axes

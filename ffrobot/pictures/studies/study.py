@@ -42,7 +42,7 @@ State = Literal["best", "kept", "exceeded", "failed"]
 """Of a design: the best one or one of a front, one that keeps all limits, one that does not, one whose run failed."""
 
 ROOM = 0.05  # of an axis, beyond the least and the largest value
-DECADES = 2.0  # goals, all of one sign, that span more are drawn by their logarithms
+DECADES = 2.0  # responses, all of one sign, that span more are drawn by their logarithms
 TICKS = 5  # about so many
 
 
@@ -74,7 +74,7 @@ class Bars(Drawing):
 class Axis(Record):
     """One axis of parallel coordinates from `low` to `high`, with the value of every design.
 
-    `limit` is what a goal may not exceed (`sense` 1) or fall below (−1); `names` of a catalog's rows, whose values
+    `limit` is what a response may not exceed (`sense` 1) or fall below (−1); `names` of a catalog's rows, whose values
     are then their numbers.
     """
 
@@ -113,8 +113,8 @@ def floats(values: Numbers) -> Array:
     return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
-def axis_of_goal(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> Axis:
-    """The axis of a goal, with room for all its values and its limit."""
+def axis_of_response(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> Axis:
+    """The axis of a response, with room for all its values and its limit."""
     shown = np.array([value for value in (*values, limit) if value is not None] or [0.0])
     low, high = float(shown.min()), float(shown.max())
     logarithmic = low > 0.0 and high > low * 10.0**DECADES
@@ -128,7 +128,7 @@ def axis_of_goal(label: str, values: Numbers, limit: float | None = None, sense:
 
 
 class Parallel(Drawing):
-    """Parallel coordinates (Inselberg 1985): a line for each design over variables, goals and limits."""
+    """Parallel coordinates (Inselberg 1985): a line for each design over variables, responses and limits."""
 
     kind: Literal["parallel"] = "parallel"
     axes: tuple[Axis, ...]
@@ -137,7 +137,7 @@ class Parallel(Drawing):
 
 
 class Progress(Drawing):
-    """The goal of one design after the other; `best` is the best so far that keeps all limits."""
+    """The response of one design after the other; `best` is the best so far that keeps all limits."""
 
     kind: Literal["progress"] = "progress"
     y_label: str

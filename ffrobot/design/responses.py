@@ -18,12 +18,12 @@ from ..fe_models.modal_body import ModalBody
 from ..present.feasibility import joint_tasks
 from ..results.file import Results
 from ..sweep.files import value_of
-from .readings import MISSED, POWER, UNCERTAIN, Followed, Goal, History, Peak, Reading, read_column
+from .readings import MISSED, POWER, UNCERTAIN, Followed, History, Peak, Reading, Response, read_column
 from .variables import DesignSpace, DesignVariable
 
 
 @dataclass(frozen=True)
-class OfMotors(Goal):
+class OfMotors(Response):
     """Response of chosen motors: total "mass" (kg) or "cost", or the largest "share" of a limit.
 
     The share is that of rated torque (by the RMS), of peak torque, or of speed.
@@ -71,7 +71,7 @@ ROUNDING = 1e-9  # of a history: by so much means of nothing may differ
 
 
 @dataclass(frozen=True)
-class OfHistory(Goal):
+class OfHistory(Response):
     """A mean of some kind of a history of one column, or its value at a time."""
 
     text: str
@@ -98,7 +98,7 @@ class OfHistory(Goal):
 
 
 @dataclass(frozen=True)
-class OfSettling(Goal):
+class OfSettling(Response):
     """Residual vibration of a point, m, or the time in which it settles, s; see `mbs.quantities.settling`."""
 
     text: str
@@ -123,7 +123,7 @@ class OfSettling(Goal):
 
 
 @dataclass(frozen=True)
-class OfFrequency(Goal):
+class OfFrequency(Response):
     """Natural frequency of a link, Hz; `number` counts eigenmodes from 1 in the order of the modal body."""
 
     text: str
@@ -156,7 +156,7 @@ class OfFrequency(Goal):
 
 
 @dataclass(frozen=True)
-class OfMass(Goal):
+class OfMass(Response):
     """Mass of one body, or of all bodies, kg, without payloads and patches."""
 
     text: str
@@ -173,7 +173,7 @@ class OfMass(Goal):
 
 
 @dataclass(frozen=True)
-class OfValue(Goal):
+class OfValue(Response):
     """A number of the scene file itself, such as the duration of a path; not of link files."""
 
     text: str
@@ -190,7 +190,7 @@ class OfValue(Goal):
         return Reading(float(found))
 
 
-def parse_goal(text: str, option: str = "--of") -> Goal:
+def parse_response(text: str, option: str = "--of") -> Response:
     """Return the response that `text`, one of `FORMS`, names. Raises `InputError` if it is none of them."""
     word, *rest = text.split() or [""]
     match word, rest:
@@ -253,28 +253,28 @@ def _mass(results: Results, body: Mapping[str, object]) -> float:
     return float(rigid.get("mass", 0.0)) if isinstance(rigid, Mapping) else 0.0
 
 
-LIMIT = re.compile(r"(?P<goal>.*\S)\s*(?P<sense><=|>=)\s*(?P<bound>\S+)\s*")
+LIMIT = re.compile(r"(?P<response>.*\S)\s*(?P<sense><=|>=)\s*(?P<bound>\S+)\s*")
 
-LINEAR = 0.1  # ratios of goals to their size: logarithms above, their tangent below, for goals may be negative
+LINEAR = 0.1  # ratios of responses to their size: logarithms above, their tangent below, for responses may be negative
 KEPT = 1e-6  # of a limit: what is beyond it by no more keeps it
 
 
 @dataclass(frozen=True)
 class Limit:
-    """`sense` · (goal − bound) ≤ 0; `sense` is 1 of "<=" and −1 of ">="."""
+    """`sense` · (response − bound) ≤ 0; `sense` is 1 of "<=" and −1 of ">="."""
 
-    goal: Goal
+    response: Response
     sense: float
     bound: float
 
     @property
     def text(self) -> str:
         """The limit as text: `peak joints.elbow.moment <= 20`."""
-        return f"{self.goal.text} {'<=' if self.sense > 0 else '>='} {self.bound:g}"
+        return f"{self.response.text} {'<=' if self.sense > 0 else '>='} {self.bound:g}"
 
     @property
     def scale(self) -> float:
-        """The scale of its excess: the bound; of 0 the goal's unit."""
+        """The scale of its excess: the bound; of 0 the response's unit."""
         return abs(self.bound) or 1.0
 
 
@@ -282,15 +282,15 @@ class Limit:
 class DesignProblem:
     """Optimization problem: minimize (`sense` 1) or maximize (−1) the objective within `limits`; `scale`: its size."""
 
-    objective: Goal
+    objective: Response
     sense: float
     limits: tuple[Limit, ...]
     scale: float = 1.0
 
     @property
-    def goals(self) -> tuple[Goal, ...]:
+    def responses(self) -> tuple[Response, ...]:
         """The objective, then that of each limit."""
-        return (self.objective, *(limit.goal for limit in self.limits))
+        return (self.objective, *(limit.response for limit in self.limits))
 
     def scaled(self, values: Sequence[float]) -> Array:
         """Return (1 + m,) scaled objective F, to be minimized, and constraints g ≤ 0: logarithms of value over scale.
@@ -338,7 +338,9 @@ def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequenc
     if (minimise is None) == (maximise is None):
         found = "both" if minimise is not None else "none"
         raise InputError(f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {found}")
-    objective = parse_goal(minimise, "--minimise") if minimise is not None else parse_goal(maximise or "", "--maximise")
+    objective = (
+        parse_response(minimise, "--minimise") if minimise is not None else parse_response(maximise or "", "--maximise")
+    )
     return DesignProblem(objective, 1.0 if minimise is not None else -1.0, tuple(map(parse_limit, subject_to)))
 
 
@@ -346,11 +348,11 @@ def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:
     """Add the motors' limits as constraints where variables are motor data, unless the user gave other limits."""
     chosen = tuple(variable for variable in space.variables if variable.motors)
 
-    def bound(goal: Goal) -> Goal:
-        return replace(goal, chosen=chosen) if isinstance(goal, OfMotors) else goal
+    def bound(response: Response) -> Response:
+        return replace(response, chosen=chosen) if isinstance(response, OfMotors) else response
 
-    limits = tuple(replace(limit, goal=bound(limit.goal)) for limit in problem.limits)
-    if chosen and not any(isinstance(limit.goal, OfMotors) and limit.goal.what == "share" for limit in limits):
+    limits = tuple(replace(limit, response=bound(limit.response)) for limit in problem.limits)
+    if chosen and not any(isinstance(limit.response, OfMotors) and limit.response.what == "share" for limit in limits):
         limits += (Limit(OfMotors("motors share", "share", chosen), 1.0, 1.0),)
     return replace(problem, objective=bound(problem.objective), limits=limits)
 
@@ -367,4 +369,4 @@ def parse_limit(text: str) -> Limit:
             '--subject-to: expected "RESPONSE <= NUMBER" or "RESPONSE >= NUMBER", such as "peak joints.elbow.moment <='
             f' 20", found "{shown(text)}"'
         )
-    return Limit(parse_goal(match["goal"], "--subject-to"), 1.0 if match["sense"] == "<=" else -1.0, bound)
+    return Limit(parse_response(match["response"], "--subject-to"), 1.0 if match["sense"] == "<=" else -1.0, bound)
