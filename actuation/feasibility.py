@@ -314,7 +314,7 @@ def _count(patches: PatchArray, with_count: Callable[[int], float | None]) -> tu
     return 0, most, missing
 
 
-ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
+ROUND_OFF = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
 
 
@@ -406,7 +406,7 @@ def find_unsupplied(
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     found: list[tuple[float, float, str, str]] = []
     for name, left in find_unmet(links, patches, voltages, limited=False).items():
-        modal, counts = links[name].modal, np.abs(left).max(axis=0) > ROUNDING * largest
+        modal, counts = links[name].modal, np.abs(left).max(axis=0) > ROUND_OFF * largest
         deflection, rotation = _largest_shift(links[name], left)
         if name not in others and counts.any() and max(deflection / modal.length, rotation) > NEGLIGIBLE:
             of_modes = dict.fromkeys(family for family, one in zip(modal.family, counts, strict=True) if one)

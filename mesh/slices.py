@@ -169,7 +169,7 @@ def _onto_plane(cells: _Cells, cell: Integers, X: Array, along: Array) -> Array:
         slope = np.einsum("qi,qi->q", gradient, along)
         step = np.divide(f, slope, out=np.zeros_like(f), where=slope != 0)
         X = X - np.clip(step, -0.5, 0.5)[:, None] * along
-        if np.all(np.abs(step) < 1e-8):  # the next would be rounding
+        if np.all(np.abs(step) < 1e-8):  # the next would be round-off
             return X
     f, gradient = cells.distance(cell, X)
     if np.any(np.abs(f) > GRAZING * np.linalg.norm(gradient, axis=1)):

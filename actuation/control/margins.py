@@ -28,7 +28,7 @@ from .linear_model import LinearModel, locked_frequencies
 from .records import ControllerRecord, JointPid, ModalVelocity
 from .sampling import sampled
 
-STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to rounding
+STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to round-off
 LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times
 GRID = 60  # points of the search for the first crossing, before bisection
 RELATIVE = 1e-3  # to which margins are found
@@ -36,7 +36,7 @@ LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
 GONE = 1e-6  # eigenvalues below are commands on their way
 ALIAS = 1e-3  # of an eigenvalue: how near it is to that of a vibration that samples are too rare for, and no other
 SAMPLED = 0.99  # of half the sampling frequency, where eigenvalues are that of no motion
-RIGID = 1e-6  # of the fastest eigenvalue: slower ones are rounding of motion without stiffness
+RIGID = 1e-6  # of the fastest eigenvalue: slower ones are round-off of motion without stiffness
 
 
 @struct

@@ -11,8 +11,8 @@ from ...mbs.linear.joint_conditions import RIGID, free_directions
 from .linear_model import STILL, LinearModel, Names
 
 INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not
-MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are rounding
-ROUNDING = 1e-13  # of a pencil, relative: what its entries and QZ leave of double precision
+MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are round-off
+ROUND_OFF = 1e-13  # of a pencil, relative: what its entries and QZ leave of double precision
 RESOLVED = 1e-3  # relative error of zeros: those that round-off moves by more may as well be infinite
 
 
@@ -124,7 +124,7 @@ def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
     finite = np.abs(alpha) < largest * np.abs(beta)
     values, left, right = alpha[finite] / beta[finite], left[:, finite].conj(), right[:, finite]
     of_A, of_E = (np.abs((left * (X @ right)).sum(axis=0)) for X in (A, E))
-    chordal = ROUNDING * np.hypot(np.linalg.norm(A), np.linalg.norm(E)) / np.maximum(np.hypot(of_A, of_E), 1e-300)
+    chordal = ROUND_OFF * np.hypot(np.linalg.norm(A), np.linalg.norm(E)) / np.maximum(np.hypot(of_A, of_E), 1e-300)
     size = np.hypot(1.0, np.abs(values))
     resolved = (chordal * size < RESOLVED) | (np.abs(values) < 1.0)
     return values[resolved].astype(complex), (chordal * size**2)[resolved]

@@ -231,7 +231,7 @@ def _intervals(placed: Sequence[PlacedLayout]) -> tuple[Array, list[list[tuple[P
 
 
 def _residual(exact: Array, of_modes: Array) -> Array:
-    """R, without what rounding and the difference of nominal and finite element stiffness make negative of it."""
+    """R, without what round-off and the difference of nominal and finite element stiffness make negative of it."""
     if np.isnan(exact).any():
         return np.zeros_like(of_modes)
     scale = np.sqrt(exact)
@@ -313,7 +313,7 @@ def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSecti
     x, (starts, ends) = body.stations.position[:, 0], edges.T
     slack = np.minimum(1e-9 * body.length, 0.25 * (ends - starts))
     covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
-    if not covered.any(axis=1).all():  # rounding: it begins where it ends
+    if not covered.any(axis=1).all():  # round-off: it begins where it ends
         raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
     extents = sections.extent(layout.normal, side(layout))[:-1]
     jump = np.abs(np.diff(extents)) / np.maximum(extents[1:], extents[:-1])

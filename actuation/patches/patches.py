@@ -21,8 +21,8 @@ from ...mbs.model.masses import uncoupling
 from .composite import SLIVER, Effects, PlacedLayout, stiffness_ratios
 from .records import PztLayout
 
-SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
-MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
+SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are round-off
+MOST_CONDITION = 1e16  # what more is found of a condition number is round-off itself
 LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
 OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: more patches than modes serve them last
 ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
@@ -120,7 +120,7 @@ def check_all_served(key: str, reach: Reach) -> None:
 
 
 KEPT = 4  # links: numbers of patches are tried on one after the other
-OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
+OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is round-off
 
 
 @struct

@@ -3,7 +3,7 @@
 The families of a straight beam with principal axes y and z do not couple. Each gives its stiffness K and mass M over
 its free degrees of freedom, and what the motion is at the stations: all six fields (displacement and rotation of the
 cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. dolfinx assembles K and M.
-Strains at Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for rounding. Loads dolfinx.
+Strains at Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from ..modal_body.krylov_schur import KrylovSchur
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.
 TOLERANCE = 1e-13
 
-# How far rounding errors of K may move ω² before the modes are refused.
-ROUNDING_LIMIT = 1e-3
+# How far round-off errors of K may move ω² before the modes are refused.
+ROUND_OFF_LIMIT = 1e-3
 # Steps of refinement of a solution, each of which takes out all but that share of its error: 1e-12 is left.
 REFINEMENTS = 3
 
@@ -25,7 +25,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
     them, and tells where a mesh is too fine for double precision. K and M (m, m) are symmetric positive definite, and K
-    = strainᵀ strain but for rounding. Raises `SolveError` where rounding errors spoil the modes.
+    = strainᵀ strain but for round-off. Raises `SolveError` where round-off errors spoil the modes.
     """
     try:
         X = KrylovSchur(BeamFlexibility(K, strain), M, *K.shape, tolerance=TOLERANCE).lowest(count)
@@ -35,11 +35,11 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
             "check the units of material and geometry, and the mesh for elements of very different length"
         ) from None
     omega2 = np.einsum("ik,ik->k", strain @ X, strain @ X)
-    rounding = np.max(np.abs(np.einsum("ik,ik->k", X, K @ X) / omega2 - 1))
-    if not rounding < ROUNDING_LIMIT:
+    round_off = np.max(np.abs(np.einsum("ik,ik->k", X, K @ X) / omega2 - 1))
+    if not round_off < ROUND_OFF_LIMIT:
         raise SolveError(
-            f"eigenproblem of size {K.shape[0]}: round-off errors move ω² by {rounding:.1e}, expected less than "
-            f"{ROUNDING_LIMIT:g}; use fewer elements, or no very short ones"
+            f"eigenproblem of size {K.shape[0]}: round-off errors move ω² by {round_off:.1e}, expected less than "
+            f"{ROUND_OFF_LIMIT:g}; use fewer elements, or no very short ones"
         )
     order = np.argsort(omega2, kind="stable")
     return omega2[order], X[:, order]
@@ -48,7 +48,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
 class BeamFlexibility:
     """K⁻¹ (m, m); factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
 
-    K = strainᵀ strain but for rounding, which refinement by the strains (s, m) takes out.
+    K = strainᵀ strain but for round-off, which refinement by the strains (s, m) takes out.
     """
 
     def __init__(self, K: sp.csr_matrix, strain: sp.csr_matrix) -> None:

@@ -179,7 +179,7 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
     """The modes numbered `wanted` (ascending; 1 is the lowest of all families together).
 
     Equal frequencies (bending of a square or round section) are distinguished by the order of the families, not by
-    rounding errors: the choice is the same on every machine.
+    round-off errors: the choice is the same on every machine.
     """
     modes = []
     for family, model in models.items():
@@ -238,7 +238,7 @@ def _element_boundaries(link: BeamLink) -> Array:
         place = link.places[record.name]
         i = int(np.clip(np.searchsorted(nodes, place), 1, nodes.size - 1))
         nearest = np.min(np.abs(nodes[i - 1 : i + 1] - place))
-        # Next to a node that jump does no harm, a sliver of an element does: its stiffness is all rounding.
+        # Next to a node that jump does no harm, a sliver of an element does: its stiffness is all round-off.
         loaded = link.modes.attachment_modes or any(lump_weights(record.mass, record.inertia))
         if loaded and nearest > SLIVER * (nodes[i] - nodes[i - 1]):
             nodes = with_points(nodes, [place])

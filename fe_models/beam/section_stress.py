@@ -19,7 +19,7 @@ TERMS = 2000  # of the series for rectangles: 2e-4 of the largest stress at thei
 
 
 def contains(record: SectionRecord, y: float, z: float) -> bool:
-    """Whether the point (y, z), in m from the axis, lies in the section, to rounding."""
+    """Whether the point (y, z), in m from the axis, lies in the section, to round-off."""
     slack = 1e-9
     if isinstance(record, RectangleSection):
         return abs(y) <= record.height / 2 * (1 + slack) and abs(z) <= record.width / 2 * (1 + slack)

@@ -23,13 +23,13 @@ from .parts import Interface
 
 # Of the energy (its square root) of the static shape of a load, what a combination of residuals must have to be kept.
 TOLERANCE = 1e-3
-# Of the largest energy of a load: less is rounding, of a load that the supports carry.
+# Of the largest energy of a load: less is round-off, of a load that the supports carry.
 IMMOBILE = 1e-10
 # Times the highest eigenmode's frequency: stiffer shapes (of loads a hair's breadth apart) only spoil linear models.
 STIFFEST = 1e4
-# Coupling of families by stiffness, relative to their own: less is rounding.
+# Coupling of families by stiffness, relative to their own: less is round-off.
 COUPLED = 1e-10
-# ω² that differ by less, relative, are equal but for rounding: bending of round and square sections in both planes.
+# ω² that differ by less, relative, are equal but for round-off: bending of round and square sections in both planes.
 ALIKE = 1e-6
 # Components of a load at an interface that move a family: forces 0 … 2 along x, y, z, moments 3 … 5 about them.
 COMPONENTS: Mapping[Family, tuple[int, ...]] = {
@@ -45,11 +45,11 @@ class Inertia:
     """M and strain energy of a finite element model with m degrees of freedom, of which a process may own a part."""
 
     mass: Callable[[Array], Array]  # M U of U (m, k)
-    energy: Callable[[Array], Array]  # (k, k) UᵀKU, free of the rounding errors of an assembled K
+    energy: Callable[[Array], Array]  # (k, k) UᵀKU, free of the round-off errors of an assembled K
     total: Callable[[Array], Array]  # sum of an array over all processes
 
     def without(self, X: Array, U: Array) -> Array:
-        """U less its part in X (m, n), XᵀMX = I; twice, for orthogonality to rounding."""
+        """U less its part in X (m, n), XᵀMX = I; twice, for orthogonality to round-off."""
         for _ in range(2):
             U = U - X @ self.total(X.T @ self.mass(U))
         return U

@@ -17,7 +17,7 @@ from .unit_loads import unit_load_names
 
 # m_ff = I and the identities between invariants must hold to this.
 IDENTITY_TOLERANCE = 1e-8
-POSITIVE_TOLERANCE = 1e-6  # of matrices that rounding, or a mesh, may leave indefinite
+POSITIVE_TOLERANCE = 1e-6  # of matrices that round-off, or a mesh, may leave indefinite
 INTERFACE_TOLERANCE = 1e-6
 
 # Axes of arrays: n modes, k stations, p points of the picture, l loads of static stresses, j patches, ? any number.

@@ -60,7 +60,7 @@ class InterfaceCoordinates:
     fixed: Array  # (n, n − c) p of each fixed-interface mode, rows fixed = 0, orthonormal in M, uncoupled in K
 
 
-# Of the largest motion of its kind: less is rounding, of a coordinate that modes do not move.
+# Of the largest motion of its kind: less is round-off, of a coordinate that modes do not move.
 IMMOBILE = 1e-9
 INDEPENDENT = 1e-6  # singular values of interface coordinates, each scaled to 1
 

@@ -25,12 +25,12 @@ from ..link_records.link import Solver
 TOLERANCE = 1e-10
 # The same, of the search for what may be missing: θ is then known to 1e-4 of the distance to its neighbors.
 LOOSE = 1e-2
-# Relative distance of ω² that may be rounding.
+# Relative distance of ω² that may be round-off.
 ALIKE = 1e-8
-# Of the largest θ: less is rounding of F, of motions that the supports do not allow.
-ROUNDING = 1e-15
+# Of the largest θ: less is round-off of F, of motions that the supports do not allow.
+ROUND_OFF = 1e-15
 CYCLES = 1000  # of Krylov–Schur at most
-NOISE = 1e-14  # of the size of a block, of a direction that is rounding
+NOISE = 1e-14  # of the size of a block, of a direction that is round-off
 BLOCK = 8  # vectors of block Lanczos: of 4, 6 and 8, the last takes the least time from 110 000 unknowns on
 
 
@@ -75,7 +75,7 @@ class KrylovSchur:
         self._X, self._theta = np.empty((rows, 0)), np.empty(0)
 
     def lowest(self, count: int) -> Array:
-        """X (m, count), XᵀMX = I to rounding, ω² ascending.
+        """X (m, count), XᵀMX = I to round-off, ω² ascending.
 
         Raises `SolveError` as `candidates` does.
         """
@@ -91,7 +91,7 @@ class KrylovSchur:
         """
         if self._theta.size < min(count, self._rank):
             self._add(count - self._theta.size)
-        sound = int(np.sum(self._theta > ROUNDING * self._theta.max(initial=0.0)))
+        sound = int(np.sum(self._theta > ROUND_OFF * self._theta.max(initial=0.0)))
         if sound < count:
             raise SolveError(f"eigenproblem: {sound} of {count} modes are above round-off; request fewer modes")
         return self._X[:, :count]
@@ -114,7 +114,7 @@ class KrylovSchur:
     def _blocks(self, count: int, tolerance: float) -> tuple[Array, Array]:
         """X (m, count) and θ (count,) of the lowest modes beside those known, by block Lanczos."""
         left = self._rank - self._theta.size
-        W = V = np.empty((self._rows, 0))  # the basis, and what comes next: F M V = V H + W R but for rounding
+        W = V = np.empty((self._rows, 0))  # the basis, and what comes next: F M V = V H + W R but for round-off
         H = R = np.empty((0, 0))
         while True:
             theta, Y = (part[..., ::-1] for part in np.linalg.eigh(H))
@@ -132,7 +132,7 @@ class KrylovSchur:
             H = np.block([[H, first], [first.T, 0.5 * (last + last.T)]])
 
     def _beside(self, W: Array, V: Array) -> tuple[Array, Array, Array]:
-        """Q, R and C of W = Q R + V C beside the known modes, QᵀMQ = I, without directions that are rounding."""
+        """Q, R and C of W = Q R + V C beside the known modes, QᵀMQ = I, without directions that are round-off."""
         R = np.eye(W.shape[1])
         coefficients = []
         for _ in range(2):  # what is small against W is not orthogonal at first
@@ -185,7 +185,7 @@ class KrylovSchur:
         return X, theta
 
     def _orthonormal(self, X: Array) -> Array:
-        """X made M-orthonormal to rounding, the first changed least."""
+        """X made M-orthonormal to round-off, the first changed least."""
         for _ in range(2):  # twice is enough (Kahan; Parlett, The Symmetric Eigenvalue Problem, §6.9)
             gram = self._total(X.T @ (self._mass @ X))
             X = np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), X.T).T

@@ -61,7 +61,7 @@ def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[
     model = flexibility.model
     forces = np.stack(list(loads.values()), axis=1)
     displacements = flexibility @ forces
-    # Bending stresses cancel over a section: the rounding errors of an assembled K, small as they are, would show.
+    # Bending stresses cancel over a section: the round-off errors of an assembled K, small as they are, would show.
     displacements += flexibility @ (forces - internal_forces(model, model.with_ghosts(displacements)))
     return dict(zip(loads, displacements.T, strict=True))
 

@@ -40,7 +40,7 @@ Progress = Callable[[str], None]
 # Cubic elements of the stations: as many as there are cells along the axis, within these bounds.
 ELEMENTS = (20, 40)
 # Of the extents: by less the middle between faces is on the axis.
-ROUNDING = 1e-9
+ROUND_OFF = 1e-9
 
 # Components (translation 0 … 2, rotation 3 … 5) that each reference condition holds at root and tip.
 _CLAMPED: dict[str, tuple[int, ...]] = {"root": (0, 1, 2, 3, 4, 5), "tip": ()}
@@ -232,7 +232,7 @@ def _stations(link: SolidLink, sections: Averages, x: Array, element: Integers, 
     rigidity = None if link.region else modulus * np.stack([area, I_yy], axis=1)
     lateral = None if link.region else modulus * I_zz
     middle, extents = _onward(sections.middle), np.stack([height, width], axis=1)
-    is_off = np.any(np.abs(middle) > ROUNDING * extents)
+    is_off = np.any(np.abs(middle) > ROUND_OFF * extents)
     return Stations(
         centroid,
         u,

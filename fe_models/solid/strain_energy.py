@@ -1,7 +1,7 @@
 """What needs the displacement gradients of many fields at once: strain energies and geometric stiffness of modes.
 
 Both are integrals of products of gradients over the cells, done a few hundred cells at a time, with dense products in
-place of sparse matrices. Strain energies come out free of the rounding errors of an assembled stiffness matrix, whose
+place of sparse matrices. Strain energies come out free of the round-off errors of an assembled stiffness matrix, whose
 entries are up to (length / element size)⁴ as large as the lowest ω².
 """
 

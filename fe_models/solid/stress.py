@@ -102,7 +102,7 @@ def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
     return X
 
 
-# Fractions of a cell's size: rounding, and how far a point on a curved face may be off the mesh of that face.
+# Fractions of a cell's size: round-off, and how far a point on a curved face may be off the mesh of that face.
 INSIDE, ON_CURVED_FACE = 1e-6, 0.02
 
 

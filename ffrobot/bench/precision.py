@@ -33,7 +33,7 @@ _KIND_OF = {
 }
 _WITHOUT_DEFLECTION = {("points", "position"): "displacement"}  # of scenes in which nothing bends
 
-# Histories whose peak is below this part of the largest of their kind are rounding: deflections at supports.
+# Histories whose peak is below this part of the largest of their kind are round-off: deflections at supports.
 NEGLIGIBLE_PEAK = 1e-6
 
 

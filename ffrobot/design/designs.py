@@ -34,7 +34,7 @@ from .readings import Followed, Reading, Response
 
 OUTPUTS = 1000  # at least, where responses are peaks or means over time: they do not depend on those of the scene
 ALGEBRAIC = ("static", "pcid")
-"""Kinds of analysis that, where they take no steps, solve equations to rounding at every time."""
+"""Kinds of analysis that, where they take no steps, solve equations to round-off at every time."""
 
 
 def changes_for(

@@ -8,7 +8,7 @@ chapter 23). One unit more room in g_i lowers F by λ_i.
 Gradients are from few runs: one design beside for each variable, or a central pair. The step follows from the noise ε
 of the runs: with h = 2 √ε of a number, noise and curvature of a one-sided difference are alike (Gill, Murray & Wright,
 Practical Optimization, 1981, section 8.6). Where designs beside take the steps of the base again
-(`mbs/fields/steps.py`), ε is rounding, and one-sided differences are all that is wanted. One more run has all numbers
+(`mbs/fields/steps.py`), ε is round-off, and one-sided differences are all that is wanted. One more run has all numbers
 changed at once, to the other sides: what it leaves of the sum of the differences tells their error.
 
 Runs that choose their own steps differ by their tolerance. There the first gradient of a search takes pairs; their
@@ -141,7 +141,7 @@ def write_designs(found: Evaluations, path: Path) -> None:
 Beside = dict[float, Sequence[Followed]]
 """Responses beside a design by the offset of one coordinate."""
 
-ROUNDING = 1e-11  # of responses: differs between runs with the same steps
+ROUND_OFF = 1e-11  # of responses: differs between runs with the same steps
 DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 
 
@@ -188,13 +188,13 @@ class Differentiation:
 
     def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], *, judged: bool) -> Slopes:
         """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
-        offsets = {j: self._offsets(base, j, ROUNDING, pairs=False) for j in wanted}
+        offsets = {j: self._offsets(base, j, ROUND_OFF, pairs=False) for j in wanted}
         samples = self._samples(base, offsets, base.again)
-        found = self._slopes(base, samples, ROUNDING, np.zeros_like(self.curvature))
+        found = self._slopes(base, samples, ROUND_OFF, np.zeros_like(self.curvature))
         if judged and all(samples.values()):
             left = self._left_of_sum(base, samples)
             moved = sum(np.abs(found.gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
-            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(base.values)))
+            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUND_OFF * np.abs(base.values)))
             for j, beside in samples.items():
                 found.error[:, j] += left / abs(next(iter(beside)))
         return found

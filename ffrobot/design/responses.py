@@ -67,7 +67,7 @@ FORMS = (
 )  # fmt: skip
 
 
-ROUNDING = 1e-9  # of a history: by so much means of nothing may differ
+ROUND_OFF = 1e-9  # of a history: by so much means of nothing may differ
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class OfHistory(Response):
         joined = "·".join(part for part in (history.unit, self.times) if part) if history.unit else ""
         unit = {"W·s": "J"}.get(joined, joined)
         value, by_all = self.reduce(history, False), self.reduce(history, True)
-        if abs(by_all - value) > MISSED * max(abs(by_all), abs(value)) + ROUNDING * history.rms:
+        if abs(by_all - value) > MISSED * max(abs(by_all), abs(value)) + ROUND_OFF * history.rms:
             return Reading(by_all, unit, missed_by=value)
         return Reading(value, unit, doubt=UNCERTAIN if history.is_in_doubt else "")
 

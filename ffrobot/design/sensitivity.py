@@ -34,7 +34,7 @@ from .responses import parse_response
 
 LEVELS = 3  # sizes of steps that one extrapolation takes at most
 NOISE = 3.0  # times what one divided difference says of it: with luck it says little
-ROUNDING = float(np.finfo(np.float64).eps)
+ROUND_OFF = float(np.finfo(np.float64).eps)
 
 
 class Derivative(NamedTuple):
@@ -83,10 +83,10 @@ def _of_window(offsets: Array, values: Array, sizes: Array) -> Derivative | None
     taken = np.isin(np.abs(offsets), [0.0, *sizes])
     x, f = offsets[taken], values[taken]
     inner = np.abs(x) < sizes[0]
-    f = f - f[np.argmin(np.abs(x))]  # rounding of differences, not of values
+    f = f - f[np.argmin(np.abs(x))]  # round-off of differences, not of values
     w, u = weights(x), _highest(x)
     whole, truncation = float(w @ f), abs(float(w @ f - weights(x[inner]) @ f[inner]))
-    noise = NOISE * abs(float(u @ f)) / float(np.abs(u).sum()) + ROUNDING * float(np.abs(values[taken]).max())
+    noise = NOISE * abs(float(u @ f)) / float(np.abs(u).sum()) + ROUND_OFF * float(np.abs(values[taken]).max())
     return Derivative(whole, truncation + noise * float(np.abs(w).sum()), float(sizes[0]))
 
 
@@ -362,7 +362,7 @@ THREE = (-1e-3, 1e-3, 2e-3)  # of the largest step: where runs take the same ste
 OTHERS = ((1e-4, -1e-4, 4e-3, -4e-3), (1e-2, -1e-2))  # likewise, that follow where these are not good enough
 BOTH_SIDES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25)  # likewise, where runs choose their own
 FINER = ((0.125, -0.125, 0.0625, -0.0625), (0.03125, -0.03125, 0.015625, -0.015625))  # where these are too large
-TOLERANCE = 1e-9  # of the runs: below, rounding in forces of stiff links is not far
+TOLERANCE = 1e-9  # of the runs: below, round-off in forces of stiff links is not far
 TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is none of its
 
 

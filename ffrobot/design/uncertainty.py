@@ -35,7 +35,7 @@ from .spreads import (
 )
 
 LinearOrSampled = Literal["samples", "gradients"]
-ROUNDING = 1e-13  # of a response: smaller deviations are none
+ROUND_OFF = 1e-13  # of a response: smaller deviations are none
 UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, a note says that shares by regression are small
 BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
@@ -161,7 +161,7 @@ class Uncertainty(Finding):
         for response, reading, explained, deviation in zip(
             self.responses, self.readings, self.explained, deviations, strict=True
         ):
-            if deviation <= ROUNDING * abs(reading.value):
+            if deviation <= ROUND_OFF * abs(reading.value):
                 yield f"note       {response}: {UNCHANGED}"
             if explained < LINEAR and self.indices is None:
                 yield (

@@ -68,7 +68,7 @@ class DesignVariable:
             return self.rows[round(u)]
         a, b = self.low, self.high
         value = a * (b / a) ** u if self.logarithmic else a + u * (b - a)
-        return (float(np.clip(value, a, b)),) * len(self.keys)  # rounding goes past no bound
+        return (float(np.clip(value, a, b)),) * len(self.keys)  # round-off goes past no bound
 
     def coordinate(self, values: tuple[Any, ...]) -> float | None:
         """Return u of given values; None if they are out of bounds, differ, or are no row of the catalog."""

@@ -145,7 +145,7 @@ def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
 
 FREQUENCIES = 5  # that are listed, and damping ratios
 TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with the slowest to the right
-UNDAMPED = 1e-9  # ratios below are rounding
+UNDAMPED = 1e-9  # ratios below are round-off
 
 
 def _control_tables(details: Mapping[str, Details]) -> Iterator[Table]:

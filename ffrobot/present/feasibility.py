@@ -165,7 +165,7 @@ def _number(value: float) -> str:
 
 
 SHOWN = 3  # motors of each joint
-NOTHING = 1e-9  # of what a motor can do: less is rounding
+NOTHING = 1e-9  # of what a motor can do: less is round-off
 COLUMNS = ("motor of", "choice", "ratio", "RMS (N·m)", "of rated", "peak (N·m)", "of peak", "speed (rad/s)", "of max")
 
 

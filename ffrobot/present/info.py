@@ -78,7 +78,7 @@ def _interface(body: ModalBody, name: str, interface: Interface) -> str:
 
 
 def _place(body: ModalBody, position: Array) -> str:
-    """Coordinates (3,) as text, rounding errors of solids as what they are: 0."""
+    """Coordinates (3,) as text, round-off errors of solids as what they are: 0."""
     x, y, z = np.where(np.abs(position) < 1e-12 * body.length, 0.0, position)
     return f"({x:.6g}, {y:.6g}, {z:.6g}) m"
 

@@ -24,7 +24,7 @@ from ..run.solution import AnalysisResult, Solution
 if TYPE_CHECKING:
     pass
 
-SAME = 1e-9  # of a time: what differs by less is rounding
+SAME = 1e-9  # of a time: what differs by less is round-off
 
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:

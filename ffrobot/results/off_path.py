@@ -16,7 +16,7 @@ from .kinds import own_results
 from .verdict import ToolError
 
 AXES = "xyz"
-SAME = 1e-9  # of a time: what differs by less is rounding
+SAME = 1e-9  # of a time: what differs by less is round-off
 SAME_TIME = 9  # digits of output times (s) that count
 
 

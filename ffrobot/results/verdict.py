@@ -12,7 +12,7 @@ from ..common.structs import struct
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
 
-ROUND_OFF = 1e-9  # m, N·m, rad/s, W: numbers below it are rounding
+ROUND_OFF = 1e-9  # m, N·m, rad/s, W: numbers below it are round-off
 
 
 def number(value: float) -> str:

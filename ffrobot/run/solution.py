@@ -318,7 +318,7 @@ class Solution:
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 
 OFF_AXIS = 0.01  # of the extent: less is that of a mesh
-RIGID = 1e-9  # of the motion across: less along the axis is rounding
+RIGID = 1e-9  # of the motion across: less along the axis is round-off
 
 _TERMS = {
     "D_ff": "damping",

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..common.errors import InputError
 from ..fe_models.remarks import LONGEST, is_beam, remarks_on_length, remarks_on_link
-from ..mbs.scene.bodies import ROUNDING, RigidBody, tensor
+from ..mbs.scene.bodies import ROUND_OFF, RigidBody, tensor
 
 if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links
     from ..actuation.patches.records import PztLayout
@@ -108,7 +108,7 @@ def _inertias(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             yield f"{label}: its radius of gyration is {radius:.3g} m: units are SI; is its inertia in kg cm² or g mm²?"
     for body, link in links.items() if scene.space == "spatial" else ():
         for record in link.interface:
-            if max(record.inertia) > (1.0 + ROUNDING) * sum(record.inertia) / 2:
+            if max(record.inertia) > (1.0 + ROUND_OFF) * sum(record.inertia) / 2:
                 moments = ", ".join(f"{moment:g}" for moment in record.inertia)
                 yield (
                     f'link "{body}": interface "{record.name}": no body has the moments of inertia {moments} kg m²: one'
@@ -172,7 +172,7 @@ def _thickness_and_face(layout: PztLayout, link: BeamLink) -> tuple[float, float
 def _shared(first: Array, second: Array) -> tuple[float, float]:
     """Begin and end, m, of the longest part that patches with these edges (k, 2) share; of none the end comes first."""
     begins = np.maximum(first[:, None, 0], second[None, :, 0])
-    ends = np.minimum(first[:, None, 1], second[None, :, 1]) - ROUNDING
+    ends = np.minimum(first[:, None, 1], second[None, :, 1]) - ROUND_OFF
     k = np.unravel_index(int(np.argmax(ends - begins)), ends.shape)
     return float(begins[k]), float(ends[k])
 
@@ -189,7 +189,7 @@ def _voltages(scene: Scene) -> Iterator[str]:
         for number, (function, (lowest, highest)) in enumerate(zip(functions, limits, strict=False), 1):
             voltage = np.nan_to_num(function.sample(np.linspace(0.0, last, SAMPLES))[0])
             most, limit = max((voltage.max(), highest), (-voltage.min(), -lowest), key=lambda one: one[0] / one[1])
-            if most > limit * (1.0 + ROUNDING):
+            if most > limit * (1.0 + ROUND_OFF):
                 yield f"load no. {k}: patch {number} gets {most:.4g} V, beyond its limit of {limit:g} V"
 
 
@@ -258,14 +258,14 @@ def _times(scene: Scene) -> Iterator[str]:
             if (path := one.path) is None:
                 continue
             label, last = f'analysis "{analysis.name}": trajectory "{one.name}"', analysis.last_time
-            rounding = 1e-9 * max(abs(path.begin), abs(path.end), last)
+            round_off = 1e-9 * max(abs(path.begin), abs(path.end), last)
             if path.begin >= last:
                 yield f"{label} begins at {path.begin:g} s, when the run is over ({last:g} s): none of it is followed"
-            elif path.end > last + rounding:
+            elif path.end > last + round_off:
                 yield f"{label} ends at {path.end:g} s, the run at {last:g} s: the rest of it is not followed"
             elif path.end <= 0.0:
                 yield f"{label} is over at {path.end:g} s, before the run begins: it rests where it ends"
-            elif path.begin < -rounding:
+            elif path.begin < -round_off:
                 yield f"{label} begins at {path.begin:g} s, before the run: what is before 0 s is not followed"
             elif last > RESTING * path.end:
                 yield f"{label} ends at {path.end:g} s, and rests for the other {last - path.end:g} s of the run"

@@ -33,7 +33,7 @@ RUN = "motion"
 TOLERANCE = 1e-7  # of the integration
 PER_PERIOD = 40  # outputs, of the lowest vibration
 LAST, LONGEST = 20.0, 2.0  # periods of the lowest vibration after the motion, and s at most
-ROUNDING = 1e-9  # of the number of outputs
+ROUND_OFF = 1e-9  # of the number of outputs
 SLACK = 1e-9  # of the largest stiffness: less is none
 UNKNOWN = 5.0  # Hz, where nothing vibrates
 FIRST = 1e-3  # s, of a run that finds the posture at the start
@@ -187,7 +187,7 @@ class Robot:
     def _solved(
         self, path: Piecewise, subject: Literal["motor", "joint"], end: float, output_step: float
     ) -> AnalysisResult:
-        end = np.ceil(end / output_step * (1 - ROUNDING)) * output_step
+        end = np.ceil(end / output_step * (1 - ROUND_OFF)) * output_step
         analysis = Pcid(name=RUN, kind="pcid", end=end, output_step=output_step, tolerance=TOLERANCE)
         scene = self._following(path, subject).model_copy(update={"analysis": (analysis,)})
         found = run_analyses(with_scene(self._prepared, scene), self._watcher).analyses[RUN]

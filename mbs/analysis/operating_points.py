@@ -55,7 +55,7 @@ def run_static(context: Context, analysis: Analysis) -> Run:
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
 INSTANTS = 9  # of a run, at which it is linearized for its growth
-NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be for rounding
+NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be for round-off
 
 
 class InstantAnalysis(Analysis):

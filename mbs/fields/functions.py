@@ -91,7 +91,7 @@ INSTANTS = 13  # at which is looked
 STEPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of differences, relative to the time that the function is needed for
 AGREED = 1e-5  # two differences that differ by less know the derivative; relative to its largest value
 WRONG = 1e-3  # what a derivative may be off by, likewise
-ROUNDING = 1e-8  # of the largest value over the time: differences of less are round-off
+ROUND_OFF = 1e-8  # of the largest value over the time: differences of less are round-off
 GOLDEN = 0.6180339887498949  # its multiples fall on no grid, so on no instant at which accelerations jump
 
 
@@ -108,7 +108,8 @@ def check_derivatives(function: TimeFunction, end: float, describe: str) -> None
         once, twice = (np.stack([_differences(function, times, h * part * end) for h in STEPS]) for part in (1.0, 0.5))
     for order, quantity in ((1, "rate"), (2, "acceleration")):
         slope = twice[:, order - 1]
-        known, wrong = _judged(once[:, order - 1], slope, given[order], ROUNDING * np.abs(given[order - 1]).max() / end)
+        least = ROUND_OFF * np.abs(given[order - 1]).max() / end
+        known, wrong = _judged(once[:, order - 1], slope, given[order], least)
         if wrong.any():
             k = int(np.flatnonzero(wrong)[0])
             said = slope[np.flatnonzero(known[:, k])[0], k]
@@ -125,12 +126,12 @@ def _differences(function: TimeFunction, times: Array, h: float) -> Array:
     return as_floats((before2 - 8 * before + 8 * after - after2) / (12 * h))
 
 
-def _judged(once: Array, twice: Array, given: Array, rounding: float) -> tuple[Booleans, Booleans]:
+def _judged(once: Array, twice: Array, given: Array, round_off: float) -> tuple[Booleans, Booleans]:
     """Which differences (steps, T), with h and h/2, know the derivative, and where (T,) all of these contradict it."""
     with np.errstate(all="ignore"):
-        size = max(np.abs(given).max(), np.abs(twice).min(axis=0).max()) + rounding
+        size = max(np.abs(given).max(), np.abs(twice).min(axis=0).max()) + round_off
         known = np.abs(once - twice) <= AGREED * size
-        wrong = known.any(axis=0) & np.all(~known | (np.abs(twice - given) > WRONG * size + rounding), axis=0)
+        wrong = known.any(axis=0) & np.all(~known | (np.abs(twice - given) > WRONG * size + round_off), axis=0)
     return known, wrong
 
 

@@ -104,7 +104,7 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
 
 
 def merged(instants: Array) -> Array:
-    """The instants, s, in their order and each once: those that differ by rounding are one."""
+    """The instants, s, in their order and each once: those that differ by round-off are one."""
     every = np.unique(instants)
     return as_floats(every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))])
 
@@ -113,7 +113,7 @@ Profile = Literal["rest-to-rest", "s-curve", "trapezoid"]
 
 SMOOTHNESS: dict[Profile, int] = {"rest-to-rest": 4, "s-curve": 2, "trapezoid": 1}
 """Number of continuous derivatives where the scene gives none."""
-SHORTEST = 1e-9  # of a motion's duration: what is shorter would be lost by rounding
+SHORTEST = 1e-9  # of a motion's duration: what is shorter would be lost by round-off
 HALF = 0.5  # of each time of averaging to the one before, where no limit says otherwise
 
 
@@ -201,7 +201,7 @@ def averaged_step(times: Array) -> Piecewise:
 def polynomial_law(smoothness: int) -> Piecewise:
     """∝ ∫ t^m (1 − t)^m dt on [0, 1] with m = `smoothness`: as many derivatives vanish at both ends.
 
-    In two pieces: at the end of one, rounding would be that of its large coefficients.
+    In two pieces: at the end of one, round-off would be that of its large coefficients.
     """
     whole = _polynomial(smoothness)[:, None]
     return Piecewise(np.array([0.0, 0.5, 1.0]), np.array([whole, shifted(whole, 0.5)]))

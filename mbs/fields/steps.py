@@ -2,7 +2,7 @@
 
 Runs that choose their own steps differ by as much as these err, however small a change of the scene. With the same
 steps the discrete motion is a smooth function of every number in the scene, and differences of runs have no noise but
-rounding: internal numerical differentiation (H. G. Bock, Springer Series in Chemical Physics 18, 1981, p. 102).
+round-off: internal numerical differentiation (H. G. Bock, Springer Series in Chemical Physics 18, 1981, p. 102).
 """
 
 from __future__ import annotations

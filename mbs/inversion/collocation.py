@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 STAGES = 4
 MOST_ITERATIONS = 25
 TOLERANCE = 1e-12  # of the last Newton step, relative to the peak of its quantity
-ROUNDING = 1e-8  # below which a step that no longer shrinks is rounding
+ROUND_OFF = 1e-8  # below which a step that no longer shrinks is round-off
 
 
 class Boundary(NamedTuple):
@@ -127,7 +127,7 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
         peak = max(np.abs(problem.scale * p).max(), np.abs(v).max(), problem.size)
         steps = np.maximum(np.abs(problem.scale * p_step), np.abs(v_step)).max(axis=1) / peak
         size, worst = float(steps.max()), float(breaks[steps.argmax()])
-        converged = size <= TOLERANCE or (size <= ROUNDING and size > 0.3 * previous)
+        converged = size <= TOLERANCE or (size <= ROUND_OFF and size > 0.3 * previous)
         if not np.isfinite(size):
             break
         previous = size

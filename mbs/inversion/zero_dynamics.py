@@ -99,7 +99,7 @@ def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
 
 
 def is_unstable(s: ComplexArray) -> Booleans:
-    """Zeros in the right half plane, beyond rounding."""
+    """Zeros in the right half plane, beyond round-off."""
     return s.real > CENTRE * np.abs(s)
 
 

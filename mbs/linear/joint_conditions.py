@@ -31,7 +31,7 @@ class RobotModes:
     # largest entry real
     shape: ComplexArray
     motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
-    rounding: float  # 1/s, by which a double pole at 0 may be off: `RIGID` √‖K̂‖
+    round_off: float  # 1/s, by which a double pole at 0 may be off: `RIGID` √‖K̂‖
 
     @property
     def frequency(self) -> Array:
@@ -43,7 +43,7 @@ class RobotModes:
     def growth(self) -> float:
         """The largest real part of a pole, 1/s; 0 where it is round-off: the robot falls or is driven to vibrate."""
         largest = float(self.poles.real.max(initial=0.0))
-        return largest if largest > self.rounding else 0.0
+        return largest if largest > self.round_off else 0.0
 
     @property
     def damping_ratio(self) -> Array:
@@ -73,8 +73,8 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     Z = Z * (np.abs(largest) / largest) / np.linalg.norm(Z, axis=0)
     shape = (back @ Z).T
     motion = shape @ transformation.T
-    rounding = RIGID * float(np.sqrt(np.linalg.norm(K, 2))) if len(K) else 0.0
-    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), rounding)
+    round_off = RIGID * float(np.sqrt(np.linalg.norm(K, 2))) if len(K) else 0.0
+    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), round_off)
 
 
 def _pairs(poles: ComplexArray) -> Indices:
@@ -182,8 +182,8 @@ def free_directions(R: Array) -> Array:
 def _moved(J: Array, N: Array) -> Array:
     """J N, (k, m); 0 where its terms cancel or N is zero but for round-off, as before the joints that are free."""
     moved, zero = J @ N, 64.0 * np.finfo(float).eps * np.abs(N).max(axis=0, initial=0.0)
-    rounding = np.maximum(RIGID**2 * (np.abs(J) @ np.abs(N)), np.abs(J).sum(axis=1, keepdims=True) * zero)
-    return np.where(np.abs(moved) > rounding, moved, 0.0)
+    round_off = np.maximum(RIGID**2 * (np.abs(J) @ np.abs(N)), np.abs(J).sum(axis=1, keepdims=True) * zero)
+    return np.where(np.abs(moved) > round_off, moved, 0.0)
 
 
 def _compliance(K: Array, J: Array) -> Array:

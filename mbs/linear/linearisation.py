@@ -113,7 +113,7 @@ class LinearEquations:
         moments = {joint: along_s[self.model.motors[joint][0]] for joint in shares}
         points, tool_axes = self._points(state, H)
         on_modes = sum((moments[joint] * shares[joint].direction for joint in shares), np.zeros(tree.n_v))
-        # Not by way of M⁻¹, whose rounding is that of the stiffest modes
+        # Not by way of M⁻¹, whose round-off is that of the stiffest modes
         K_more, D_more = gear_matrices(tree, q)
         K_more -= sum((moments[joint] * shares[joint].slope for joint in shares), np.zeros_like(K_more))
         return LinearMechanism(

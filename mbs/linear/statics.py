@@ -30,7 +30,7 @@ MOST_ITERATIONS = 60
 FEW_ITERATIONS = 12  # from a posture next to it
 LEAST_PART = 1 / 64  # of the loads, by which they grow
 TOLERANCE = 1e-12  # residual forces relative to the largest that meet, positions to the size of the robot
-ROUNDING = 4 * np.finfo(float).eps  # of coordinates, which stiff springs turn into forces
+ROUND_OFF = 4 * np.finfo(float).eps  # of coordinates, which stiff springs turn into forces
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
 SLACK = 1e-3  # of the largest force over its natural size: less stiffness is none
 SINGULAR = 1e-12  # of the largest singular value of scaled equations: below it nothing resists
@@ -171,8 +171,8 @@ class Statics:
                 step[:] = np.nan
                 return Correction(step, np.zeros(1, dtype=bool))
             K = self.stiffness(states[0], at)
-            rounding = ROUNDING * (np.abs(K) @ self._natural(states[0]))
-            excess = (np.abs(at.left) / (TOLERANCE * at.size + rounding + TINY))[free]
+            round_off = ROUND_OFF * (np.abs(K) @ self._natural(states[0]))
+            excess = (np.abs(at.left) / (TOLERANCE * at.size + round_off + TINY))[free]
             is_met = excess.max(initial=0.0) <= 1.0 and np.abs(at.missed).max(initial=0.0) <= TOLERANCE
             if not is_met:
                 step[0, free] = _step(at, K, free)

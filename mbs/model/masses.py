@@ -39,7 +39,7 @@ def welded_payloads(scene: MechanismKeys) -> Iterator[tuple[Body, WeldJoint]]:
             yield body, WeldJoint.model_construct(name=name, type="weld", between=(payload.point, name))
 
 
-UNCOUPLED = 1e-12  # of the geometric mean of two modes' own terms: what couples them less is rounding
+UNCOUPLED = 1e-12  # of the geometric mean of two modes' own terms: what couples them less is round-off
 
 
 def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Array) -> Body:

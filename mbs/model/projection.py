@@ -79,7 +79,7 @@ def _keeping_shapes(I: Array) -> Array:  # noqa: E741
     return as_floats(np.multiply.outer(PLANE, stretch) + np.multiply.outer(TURN, turn))
 
 
-EXACT = 1e-12  # of unit vectors, and of shapes relative to the largest: what rounding leaves of axes that are the same
+EXACT = 1e-12  # of unit vectors, and of shapes relative to the largest: what round-off leaves of axes that are the same
 UPRIGHT = 0.437  # of the normal along z of a triad: below it z is nearer to the plane (an angle that nobody draws)
 
 

@@ -20,7 +20,7 @@ from .masses import coupled_blocks
 if TYPE_CHECKING:
     from ..scene.mechanism import MechanismKeys
 
-IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
+IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is round-off
 DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energy, say nothing new
 
 

@@ -19,7 +19,7 @@ from ..model.model import Model
 from ..model.nodes import Node
 from ..model.tree import KinematicTree
 
-ROUNDING = 1e-12  # of the largest value of a coordinate
+ROUND_OFF = 1e-12  # of the largest value of a coordinate
 
 Seen = tuple[float, float, float | None]
 """Least and largest value, and when the range was left first, s."""
@@ -73,8 +73,8 @@ def left_ranges(model: Model, found: Sequence[Seen] | None, times: Array, q: Arr
     of_core = zip(watched(model.tree), found, strict=True) if found is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
     for joint, number, values in limited_coordinates(model, times, q, v, every=found is None):
-        (lowest, highest), rounding = joint.position_limits[number], ROUNDING * np.abs(values).max()
-        outside = times[(values < lowest - rounding) | (values > highest + rounding)]
+        (lowest, highest), round_off = joint.position_limits[number], ROUND_OFF * np.abs(values).max()
+        outside = times[(values < lowest - round_off) | (values > highest + round_off)]
         seen.append((joint, number, (values.min(), values.max(), outside[0] if outside.size else None)))
     for joint, number, (least, largest, left_at) in seen:
         (lowest, highest), unit = joint.position_limits[number], joint.units[number]

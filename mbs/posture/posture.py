@@ -301,7 +301,7 @@ LOOKED_INTO = 5  # intervals between samples, the roughest ones
 HALVINGS = 25
 JUMP = 1e-4  # in terms of the largest value or velocity: less is rounded numbers in an expression
 SMOOTH = 0.1  # of that: what misses less in one of those intervals has no jump
-RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is rounding
+RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is round-off
 
 
 def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: float) -> None:

@@ -22,7 +22,7 @@ TURNING = ("revolute", "universal", "spherical", "weld")
 TRIES = 60
 REACH_CHECKS = 1001
 REGULAR = 1e-3  # ratio of singular values of the rows: less is next to a singular posture
-BEYOND = 1e-6  # of the reach: less is rounding
+BEYOND = 1e-6  # of the reach: less is round-off
 
 
 class _Chain(NamedTuple):

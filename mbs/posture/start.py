@@ -11,7 +11,7 @@ from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model, constraint_values, turned_over
-from ..scene.bodies import ROUNDING, tensor
+from ..scene.bodies import ROUND_OFF, tensor
 from .posture import (
     MET,
     joint_scales,
@@ -82,7 +82,7 @@ def check_turning(model: Model) -> None:
     Such bodies, point masses and rods, turn by what their mass has about a joint that is away from them.
     """
     rigid = ((body.name, tensor(body.rigid.inertia)) for body in model.scene.body if body.rigid is not None)
-    slim = [name for name, J in rigid if np.linalg.eigvalsh(J)[0] <= ROUNDING * np.abs(J).max()]
+    slim = [name for name, J in rigid if np.linalg.eigvalsh(J)[0] <= ROUND_OFF * np.abs(J).max()]
     if not slim:
         return
     natural = natural_sizes(model)

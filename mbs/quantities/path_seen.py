@@ -32,10 +32,10 @@ def _outside(path: Trajectory, analysis: TimedAnalysis) -> Iterator[str]:
     if path.path is None:
         return
     begin, over, end = path.path.begin, path.path.end, analysis.end
-    where, by_rounding = f'trajectory "{path.name}"', 1e-9 * end
-    if begin < -by_rounding:
+    where, by_round_off = f'trajectory "{path.name}"', 1e-9 * end
+    if begin < -by_round_off:
         yield f"{where}: begins at t = {begin:g} s, and the run at 0: what is before is left out"
-    if over > end + by_rounding:
+    if over > end + by_round_off:
         share = f"{max(0.0, 100 * end / over):.3g} % of its time"
         yield f'{where}: is over at t = {over:g} s, beyond the end of "{analysis.name}" at {end:g} s, which has {share}'
     elif path.waypoints is not None and over < STILL * end:

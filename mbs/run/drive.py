@@ -33,7 +33,7 @@ from ..posture.start import rank_of_redundant_loops
 from ..scene.analysis import IntegratedAnalysis
 from .diagnosis import find_cause
 from .integrator_choice import choose_integrator
-from .integrators import Choice, beyond_rounding, integration_controls, with_steps_of
+from .integrators import Choice, beyond_round_off, integration_controls, with_steps_of
 from .record import Continuation, Run, Statistics
 from .samples import (
     ALL_LOOKED_AT,
@@ -202,7 +202,7 @@ class _Integration:
             status, cause = "diverged", f"{posture}: {advice}"
         elif status not in ("completed", "interrupted"):
             cause = find_cause(self.system, self.analysis, self.integrator, run)
-        texts = [posture, beyond_rounding(self.analysis.tolerance, run.rounding)]
+        texts = [posture, beyond_round_off(self.analysis.tolerance, run.rounding)]
         texts += left_ranges(motion.model, run.ranges, motion.time, motion.q, motion.v)
         if (samples := self.continuation.samples) is not None and samples.every > 1:
             texts.append(f"peaks and means are of one in {samples.every} steps: memory holds no more; shorten the run")

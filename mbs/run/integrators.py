@@ -160,15 +160,15 @@ def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     )
 
 
-def beyond_rounding(tolerance: float, rounding: float) -> str:
-    """A sentence where round-off, which may add errors of `rounding` in all, needs a larger tolerance; else ""."""
-    if not rounding > tolerance:
+def beyond_round_off(tolerance: float, round_off: float) -> str:
+    """A sentence where round-off, which may add errors of `round_off` in all, needs a larger tolerance; else ""."""
+    if not round_off > tolerance:
         return ""
-    digit = 10.0 ** np.floor(np.log10(rounding))
+    digit = 10.0 ** np.floor(np.log10(round_off))
     return (
         f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as parts with next to"
-        f" no inertia amplify round-off of forces; errors may reach {rounding:.1g} of the peaks, within tolerance ="
-        f" {np.ceil(rounding / digit) * digit:.1g}"
+        f" no inertia amplify round-off of forces; errors may reach {round_off:.1g} of the peaks, within tolerance ="
+        f" {np.ceil(round_off / digit) * digit:.1g}"
     )
 
 

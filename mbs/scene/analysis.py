@@ -16,7 +16,7 @@ from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import KeptSteps, Name, Positive, Referring
 
-TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
+TIGHTEST_TOLERANCE = 1e-10  # round-off in the forces of stiff links is not far below
 
 
 class Need(NamedTuple):
@@ -274,7 +274,7 @@ def check_steps(end: float, step: float) -> None:
     if ratio > MOST_OUTPUTS:
         raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}")
     count = round(ratio)
-    # 0.1/0.001 is not whole in binary; anything beyond rounding is meant otherwise.
+    # 0.1/0.001 is not whole in binary; anything beyond round-off is meant otherwise.
     if count < 1 or abs(ratio - count) > 1e-9 * ratio:
         near = end / max(1, count)
         raise ValueError(

@@ -25,7 +25,7 @@ from ..fields.field_types import (
 from ..fields.spelling import IN_PLANE, IN_SPACE, Spelled, Vector, inertia_about_z
 
 Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]
-ROUNDING = 1e-9  # of the largest entry of an inertia tensor
+ROUND_OFF = 1e-9  # of the largest entry of an inertia tensor
 
 
 def tensor(inertia: Inertia) -> Array:
@@ -40,7 +40,7 @@ def check_inertia(inertia: Inertia) -> Inertia:
     Moments may be zero: those of a point mass, and of a rod about its axis.
     """
     J = tensor(inertia)
-    slack = ROUNDING * np.abs(J).max()
+    slack = ROUND_OFF * np.abs(J).max()
     if np.abs(J - J.T).max() > slack:
         raise ValueError(f"expected a symmetric inertia, found {J.tolist()}")
     moments = np.linalg.eigvalsh(J)

@@ -28,7 +28,7 @@ from ...fe_models.modal_body.craig_bampton import constraint_modes
 from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mbs.model.body import from_modal_body
 
-POSITIVE = 1e-9  # of the largest entry: less is rounding
+POSITIVE = 1e-9  # of the largest entry: less is round-off
 EXACT = 1e-12  # of the largest entry: modal masses are those of the shapes
 ROUNDED = 1e-3  # likewise, in files of few digits
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))

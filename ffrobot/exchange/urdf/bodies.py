@@ -10,7 +10,7 @@ import numpy as np
 from ...common.arrays import Array, as_rows
 from ...common.errors import InputError, quoted
 from ...common.tables import shown
-from ...mbs.scene.bodies import ROUNDING, check_inertia
+from ...mbs.scene.bodies import ROUND_OFF, check_inertia
 from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint
 
 
@@ -178,7 +178,7 @@ def _fixed(bodies: list[MergedLinks]) -> list[str]:
 def is_possible(inertia: Array) -> bool:
     """Whether no principal moment is larger than the sum of the others, but for round-off."""
     moments = np.linalg.eigvalsh(inertia)
-    return bool(moments[2] <= moments[0] + moments[1] + ROUNDING * np.abs(inertia).max())
+    return bool(moments[2] <= moments[0] + moments[1] + ROUND_OFF * np.abs(inertia).max())
 
 
 def _check_inertias(bodies: list[MergedLinks]) -> None:
@@ -191,7 +191,7 @@ def _check_inertias(bodies: list[MergedLinks]) -> None:
             check_inertia((xx, yy, zz))
         except ValueError as error:
             least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
-            is_mended = not is_possible(body.inertial.inertia) and least >= -ROUNDING * largest
+            is_mended = not is_possible(body.inertial.inertia) and least >= -ROUND_OFF * largest
             way = ": --fix-inertia makes the least change" if is_mended else ""
             errors.append(f"{body.label}: <inertia>: {error}{way}")
     if errors:

@@ -73,7 +73,7 @@ def steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array
     """
     steps, sign = STEPS[joint.type], -1.0 if backwards else 1.0
     triad = sign * joint.triads()[0 if backwards else 1]
-    triad = np.where(np.abs(triad) < np.finfo(float).eps, 0.0, triad)  # axes of the scene without rounding
+    triad = np.where(np.abs(triad) < np.finfo(float).eps, 0.0, triad)  # axes of the scene without round-off
     return [(step, triad[:, step.axis]) for step in (reversed(steps) if backwards else steps)]
 
 
