@@ -78,12 +78,12 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Shift (T, 3), m, global axes, of points under modal forces r (T, n) by body, motors held in place.
+    """Shift (T, 3), m, global axes, of points under modal forces r (T, n) by body, motors locked.
 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
     twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
     """
-    shift, _ = _held(run, modal)
+    shift, _ = _locked(run, modal)
     places = run.model.tree.places(run.q, shift)
     return {point: places.at(run.model.tree.section(point)).velocity for point in points}
 
@@ -91,10 +91,10 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
     """Return the shift (T, 3), m, of a point at these rows if motors keep their torques: the robot recoils by γ.
 
-    δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still, and no momentum
-    comes from within.
+    δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still,
+    and no momentum comes from within.
     """
-    shift, R = _held(run, modal, rows)
+    shift, R = _locked(run, modal, rows)
     MR = mass_matrices(run.model, run.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])
     tree, freed = run.model.tree, shift - (R @ gamma)[:, :, 0]
@@ -120,7 +120,7 @@ def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], poin
     )
 
 
-def _held(run: Run, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> tuple[Array, Array]:
+def _locked(run: Run, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> tuple[Array, Array]:
     """δq (T, n_v) by −K⁻¹ r of modes where motors stand still, and R = ∂q/∂γ (T, n_v, motors) where they turn by γ.
 
     By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own.

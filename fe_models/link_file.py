@@ -225,8 +225,8 @@ def _check_solid_interfaces(link: SolidLink, path: Path) -> None:
                 _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
             if interface.coupling == "rigid":
                 _reject(path, key.format("coupling"), '"mean" for a cross section inside the part', '"rigid"')
-        is_held = interface.name == "root" or (interface.name == "tip" and not link.reference.holds_root)
-        if is_held and interface.coupling == "mean" and link.coupling == "rigid":
+        is_supported = interface.name == "root" or (interface.name == "tip" and not link.reference.holds_root)
+        if is_supported and interface.coupling == "mean" and link.coupling == "rigid":
             expected = '"rigid", or coupling = "mean" in [reference], which holds this face'
             _reject(path, key.format("coupling"), expected, '"mean"')
         if interface.group is None and interface.position is None and interface.name not in ("root", "tip"):

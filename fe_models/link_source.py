@@ -13,7 +13,7 @@ from ..common.toml_files import load_toml
 
 @dataclass(frozen=True)
 class LinkTable:
-    """Content of a link file held in memory; files that its `keys` name are in the folder of `path`."""
+    """Content of a link file in memory; files that its `keys` name are in the folder of `path`."""
 
     keys: Mapping[str, Any]
     path: Path  # messages call it so; files that the keys name are in its folder

@@ -1,6 +1,6 @@
 """A beam link cut into pieces of equal length, each a link of its own: for deflections too large for one frame.
 
-Deflections within a piece are 1/N² of those within the link. Pieces are held simply supported, with one eigenmode (in
+Deflections within a piece are 1/N² of those within the link. Pieces are simply supported, with one eigenmode (in
 space one of each plane of bending) and the static shapes of what their neighbors do to them: a frame between the ends
 of a piece turns with it, and leaves small deflections and few steps (docs/theory.md, Links in pieces).
 """

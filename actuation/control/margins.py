@@ -7,7 +7,7 @@ controllers, or the delay, may grow until it is 1.
 
 Gains for joint PD controllers to start with, and why a loop is not stable: by the linear model.
 
-The rule is that of flexible structures in general: a bandwidth well below the lowest vibration with held motors, at
+The rule is that of flexible structures in general: a bandwidth well below the lowest vibration with locked motors, at
 most half of it by Craig (Introduction to Robotics, sec. 9.9), and critical damping of what the motor then moves, the
 rigid robot. The sampled model has the last word (see `margins`).
 """
@@ -126,8 +126,8 @@ def lowest_frequency(
 ) -> float:
     """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
-    The lowest with all motors held and, where joints have PID controllers alone, of the sampled loop: its eigenvalues
-    e^{sT} that are damped by less than `LIGHTLY`. With others half of the lowest with motors held.
+    The lowest with all motors locked and, where joints have PID controllers alone, of the sampled loop: its eigenvalues
+    e^{sT} that are damped by less than `LIGHTLY`. With others half of the lowest with motors locked.
     """
     locked = min((float(locked_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
     pids = [record for record in controllers if isinstance(record, JointPid)]
@@ -218,7 +218,7 @@ def _last_before(changed: Callable[[float], bool], values: Array, missing: float
     return missing
 
 
-FRACTION = 1 / 3  # of the lowest frequency with held motors
+FRACTION = 1 / 3  # of the lowest frequency with locked motors
 SAMPLES = 30  # a period of the bandwidth, at least
 SPARE = 2.0  # by which suggested gains may grow
 NARROW = 1.5  # gain margin below which a loop that is stable at some places of the path may well not be at others
@@ -264,8 +264,8 @@ def suggested_gains(
 ) -> Suggestion | None:
     """PD gains for all motors to start with; None where none are found.
 
-    P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and the other joints held,
-    the largest of the `models`. ω is a third of the lowest frequency with held motors, with 30 samples a period at
+    P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and other joints locked,
+    the largest of the `models`. ω is a third of the lowest frequency with locked motors, with 30 samples a period at
     least, and is made smaller until the sampled loops of all models stay stable with twice the gains.
     """
     inertias = [joint_inertia(model) for model in models]
@@ -289,7 +289,7 @@ def suggested_gains(
 
 
 def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] | None:
-    """Gains for the whole third of the lowest frequency with held motors, and the longest sample time (s) for them.
+    """Gains for the whole third of the lowest frequency with locked motors, and the longest sample time (s) for them.
 
     Of a 1-2-5 series from 10 ms down to 10 µs, without delay; None of a robot that does not bend, or without such one.
     """

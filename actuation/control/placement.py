@@ -106,7 +106,7 @@ class ModalReach:
 
 
 def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalReach:
-    """The lowest modes of the robot with its motors held in which the link bends."""
+    """The lowest modes of the robot with its motors locked in which the link bends."""
     from scipy.linalg import eigh
 
     f = model.freedom

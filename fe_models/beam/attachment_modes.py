@@ -58,7 +58,7 @@ def _of_family(
 
 
 def fixed_interfaces(model: FamilyModel, family: Family, places: Sequence[int]) -> tuple[FamilyModel, sp.csr_matrix]:
-    """The eigenproblem of a family held at the stations `places`, and Z (m, free): x = Z y, C Z = 0.
+    """The eigenproblem of a family fixed at the stations `places`, and Z (m, free): x = Z y, C Z = 0.
 
     Of each interface coordinate, a row of C, the degree of freedom that it depends on most follows from the others.
     """
@@ -70,14 +70,14 @@ def fixed_interfaces(model: FamilyModel, family: Family, places: Sequence[int]) 
     follow = sp.csr_matrix(-np.linalg.solve(C[:, pivots], C[:, free]))
     Z = sp.csr_matrix((np.ones(free.size), (free, np.arange(free.size))), shape=(C.shape[1], free.size))
     Z += sp.csr_matrix((np.ones(len(C)), (pivots, np.arange(len(C)))), shape=(C.shape[1], len(C))) @ follow
-    held = replace(
+    fixed = replace(
         model,
         K=(Z.T @ model.K @ Z).tocsr(),
         M=(Z.T @ model.M @ Z).tocsr(),
         strain=model.strain @ Z,
         fields={row: values @ Z for row, values in model.fields.items()},
     )
-    return held, Z.tocsr()
+    return fixed, Z.tocsr()
 
 
 def ritz_modes(

@@ -40,19 +40,19 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
         V = lagrange(forms.nodes, 3)  # K = ∫EA u' v' dx, M = ∫ρA u v dx
         EA, rhoA = (cellwise(link, forms.nodes, each) for each in rod_properties(link, family))
         K, M, strain = forms.matrix(EA, V, 1), forms.matrix(rhoA, V), V.root(EA, 1)
-        fields, held = {U_X if family == "axial" else R_X: V.at(stations)}, [0]
+        fields, fixed = {U_X if family == "axial" else R_X: V.at(stations)}, [0]
     else:
         bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
-        K, M, strain, deflection, slope, held = bending(link, forms, stations, second_moment(family))
+        K, M, strain, deflection, slope, fixed = bending(link, forms, stations, second_moment(family))
         # Out of plane, w' is a rotation about −y.
         in_plane = family == "in-plane-bending"
         fields = {U_Y: deflection, R_Z: slope} if in_plane else {U_Z: deflection, R_Y: -slope}
-    free = np.setdiff1d(np.arange(strain.shape[1]), held)
+    free = np.setdiff1d(np.arange(strain.shape[1]), fixed)
     K, M = (A[free][:, free] for A in (K, M))
     return FamilyModel(K, M, strain[:, free], {row: values[:, free] for row, values in fields.items()})
 
 
-# K, M, strains, deflection and rotation at the stations, held degrees of freedom.
+# K, M, strains, deflection and rotation at the stations, fixed degrees of freedom.
 Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
 
 
@@ -61,9 +61,9 @@ def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_m
     V, E, rho = hermite(forms.nodes), link.material.youngs_modulus, link.material.density
     EI = cellwise(link, forms.nodes, lambda s: E * second_moment(s))
     rhoA = cellwise(link, forms.nodes, lambda s: rho * s.area)
-    held = [0, 1] if link.reference.holds_root else [0, V.x.size - 2]
+    fixed = [0, 1] if link.reference.holds_root else [0, V.x.size - 2]
     read = V.at(stations), V.at(stations, derivative=1)
-    return forms.matrix(EI, V, 2), forms.matrix(rhoA, V), V.root(EI, 2), *read, held
+    return forms.matrix(EI, V, 2), forms.matrix(rhoA, V), V.root(EI, 2), *read, fixed
 
 
 def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment: Property) -> Bending:
@@ -86,12 +86,12 @@ def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment
     strain = sp.bmat([[None, T.root(EI, derivative=1)], [W.root(kGA, derivative=1), -T.root(kGA)]], format="csr")
     deflection, rotation = W.at(stations), T.at(stations)
     nothing_w, nothing_t = sp.csr_matrix(deflection.shape), sp.csr_matrix(rotation.shape)
-    held = [0, W.x.size if link.reference.holds_root else W.x.size - 1]
+    fixed = [0, W.x.size if link.reference.holds_root else W.x.size - 1]
     return (
         K,
         M,
         strain,
         sp.hstack([deflection, nothing_t], format="csr"),
         sp.hstack([nothing_w, rotation], format="csr"),
-        held,
+        fixed,
     )

@@ -121,7 +121,7 @@ def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
 def _of_inertia(
     link: BeamLink, x: Array, rotary: Sequence[tuple[Property, Sequence[float]]]
 ) -> dict[str, tuple[Array, Array]]:
-    """(6, g) of d'Alembert's loads on the link held at its root, and their sums about the root (6, 1).
+    """(6, g) of d'Alembert's loads on the link fixed at its root, and their sums about the root (6, 1).
 
     Sections at s bear forces ρA (a + b s), of small bodies at 0 and 1 m, and, with rotary inertia, moments.
     """

@@ -137,11 +137,11 @@ def _modes(
 ) -> tuple[list[Mode], list[Mode]]:
     """Eigenmodes, or what stands for them, and attachment modes; interfaces are at the stations `places`."""
     is_fixed = link.reference.condition == "craig-bampton"
-    held, Z = dict(models), dict[Family, sp.csr_matrix]()
+    fixed, Z = dict(models), dict[Family, sp.csr_matrix]()
     if is_fixed:
         for family, model in models.items():
-            held[family], Z[family] = fixed_interfaces(model, family, places)
-    modes = select_default(held) if link.modes.are_default else select(held, _wanted(link, held, path))
+            fixed[family], Z[family] = fixed_interfaces(model, family, places)
+    modes = select_default(fixed) if link.modes.are_default else select(fixed, _wanted(link, fixed, path))
     if is_fixed:
         modes = [mode._replace(x=Z[mode.family] @ mode.x) for mode in modes]
     if not link.modes.attachment_modes:

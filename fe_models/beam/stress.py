@@ -4,7 +4,7 @@ The part of the beam beyond a section is in equilibrium under its inertia, the l
 section carries. In mode k the inertia is ω_k² ρA u per unit of length, so the section forces follow by integration of
 the mode itself and are as accurate as displacements; derivatives of the finite element functions lose two orders. In
 attachment modes it is that of eigenmodes, beside the loads at interfaces that they are the residual of. A unit load's
-section forces are those of statics: the link, held isostatically, has no others.
+section forces are those of statics: the link, supported isostatically, has no others.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Craig–Bampton: a link by the motion of its interfaces and by modes of the link held at all of them. NumPy only.
+"""Craig–Bampton: a link by the motion of its interfaces and by modes of the link fixed at all of them. NumPy only.
 
     u = Σ ψ_c q_c + Σ φ_k η_k
 
 with constraint modes ψ, the static shapes of unit motions of one interface coordinate q while the others rest, and
-eigenmodes φ of the link held at all interfaces (R. R. Craig and M. C. C. Bampton, Coupling of substructures for dynamic
-analyses, AIAA J. 6, 1968, 1313–1319). With the frame on the root's section its motion r is that of the frame; the
-others move by d = q − R r beside it, R being their rigid motion. In this frame the link has the modes of the floating
-frame, all p with XᵀMX = I and K = diag(ω²), that span ψ and φ: as many as there are d and η, their highest in place of
-attachment modes. The way back, p = T (d, η), follows from what they do at interfaces.
+eigenmodes φ of the link fixed at all interfaces (R. R. Craig and M. C. C. Bampton, Coupling of substructures for
+dynamic analyses, AIAA J. 6, 1968, 1313–1319). With the frame on the root's section its motion r is that of the frame.
+The others move by d = q − R r beside it, R being their rigid motion. In this frame the link has the modes of the
+floating frame, all p with XᵀMX = I and K = diag(ω²), that span ψ and φ: as many as there are d and η, their highest in
+place of attachment modes. The way back, p = T (d, η), follows from what they do at interfaces.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def interface_loads(
 ) -> tuple[Array, dict[str, Array]]:
     """The loads that bend a link into each of its n modes, as `attachment_modes.interface_loads` has them.
 
-    K φ = ω² M φ + B c of a fixed-interface mode, held by loads c; K ψ = B c of a constraint mode. So in all modes the
+    K φ = ω² M φ + B c of a fixed-interface mode with reactions c; K ψ = B c of a constraint mode. So in all modes the
     inertia is that of fixed-interface modes N: KX = M X N Nᵀ Ω² + B c, and Xᵀ of it gives c.
     """
     coordinates = interface_coordinates(omega2, families, static, interfaces)

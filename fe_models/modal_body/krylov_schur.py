@@ -1,4 +1,4 @@
-"""The lowest modes of a held link by SLEPc's Krylov–Schur: shift-and-invert at zero. Loads PETSc and SLEPc.
+"""The lowest modes of a supported link by SLEPc's Krylov–Schur: shift-and-invert at zero. Loads PETSc and SLEPc.
 
 The flexibility F is the inverse of the stiffness under the supports. PETSc sees it as the preconditioner of an exact
 solve, and the mass as a matrix that only multiplies. Modes found before are deflated: a search goes on where it ended,

@@ -128,7 +128,7 @@ class StressPoint(Frozen):
     stress: Array  # (6, n) in Pa per unit of modal coordinate
     # (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain
     strain: Array
-    # (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link held by its reference condition; None
+    # (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link under its reference condition; None
     # where not known
     static: Array | None = None
 

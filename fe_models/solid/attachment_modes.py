@@ -1,8 +1,8 @@
 """Modes of a solid by loads on its interfaces, and those with fixed interfaces (Craig-Bampton).
 
-A solid held at all its interfaces besides its supports, for the modes that Craig and Bampton put beside others.
+A solid fixed at all its interfaces, beyond its supports, for the modes that Craig and Bampton put beside others.
 
-With rows B of what is held besides and the flexibility F of the supports, the flexibility under both is
+With rows B that are fixed, too, and the flexibility F of the supports, the flexibility under both is
 
     F − F Bᵀ (B F Bᵀ)⁻¹ B F
 """
@@ -60,7 +60,7 @@ def attachment_modes(
 class FixedInterfaceFlexibility:
     """`Flexibility` of a body with fixed interfaces; vectors contain this rank's own degrees of freedom.
 
-    `flexibility` is that under the supports of the root, B (c, 3 owned) are the `rows` of what is held besides.
+    `flexibility` is that under the supports of the root, B (c, 3 owned) are the `rows` that are fixed, too.
     """
 
     def __init__(self, flexibility: Flexibility, rows: Array) -> None:

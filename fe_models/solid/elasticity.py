@@ -64,7 +64,7 @@ class ScalarMass:
 
 @struct
 class SolidModel:
-    """Nodes, materials and matrices of a solid, before it is held anywhere."""
+    """Nodes, materials and matrices of a solid, before it is fixed anywhere."""
 
     mesh: Mesh  # distributed over `comm`
     order: int  # polynomial order of the displacements
@@ -183,8 +183,8 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     )
 
 
-def stiffness_matrix(model: SolidModel, held: Sequence[Any] = ()) -> PETSc.Mat:
-    """K, upper triangle in 3 × 3 blocks; rows and columns of the boundary conditions `held` are those of identity."""
+def stiffness_matrix(model: SolidModel, fixed: Sequence[Any] = ()) -> PETSc.Mat:
+    """K, upper triangle in 3 × 3 blocks; rows and columns of the boundary conditions `fixed` are those of identity."""
     K = PETSc.Mat().create(model.comm)
     size = (3 * model.owned, 3 * model.V.dofmap.index_map.size_global)
     K.setSizes((size, size), 3)
@@ -193,7 +193,7 @@ def stiffness_matrix(model: SolidModel, held: Sequence[Any] = ()) -> PETSc.Mat:
     K.setOption(PETSc.Mat.Option.IGNORE_LOWER_TRIANGULAR, True)
     blocks = PETSc.LGMap().create(model.local_to_global.indices, bsize=3, comm=model.comm)
     K.setLGMap(blocks, blocks)
-    fem_petsc.assemble_matrix(K, model.stiffness_form, list(held))
+    fem_petsc.assemble_matrix(K, model.stiffness_form, list(fixed))
     K.assemble()
     K.setOption(PETSc.Mat.Option.SPD, True)
     return K

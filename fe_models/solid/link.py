@@ -189,8 +189,8 @@ def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Interfaces:
 
 
 def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Interfaces, path: Path) -> Flexibility:
-    """The body held by its reference condition, faces with rigid coupling made plates."""
-    held = SUPPORTS[link.reference.condition]
+    """The body supported as its reference condition says, faces with rigid coupling made plates."""
+    supports = SUPPORTS[link.reference.condition]
     plates = sorted(name for name, coupling in link.couplings.items() if coupling == "rigid")
     faces, taken = [], np.zeros(model.owned, dtype=bool)
     for name in plates:
@@ -202,12 +202,12 @@ def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Int
                 f'({", ".join(plates)}), found nodes that two of them share: coupling = "mean" lets a face deform'
             )
         taken[own] = True
-        supported = held.get(name, ()) if link.coupling == "rigid" else ()
+        supported = supports.get(name, ()) if link.coupling == "rigid" else ()
         free = [component for component in range(6) if component not in supported]
         faces.append(RigidFace(name, own, places.averages[name].centroid[0], free))
     if link.coupling == "rigid":
         return Flexibility(model, faces, None)
-    rows = [places.rows[name][list(components)] for name, components in held.items()]
+    rows = [places.rows[name][list(components)] for name, components in supports.items()]
     return Flexibility(model, faces, np.concatenate(rows))
 
 

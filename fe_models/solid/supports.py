@@ -1,4 +1,4 @@
-"""How a solid is held, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
+"""How a solid is fixed, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
 
 Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorized matrix K_0
 and q comes back by static condensation (Craig and Bampton, 1968): with W the displacements under unit q and S = WᵀKW,
@@ -63,8 +63,8 @@ class Flexibility:
     def _supported(self, faces: Sequence[RigidFace]) -> PETSc.Mat:
         """K_0."""
         if faces:
-            held = np.flatnonzero(self.model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0])
-            return stiffness_matrix(self.model, [fem.dirichletbc(np.zeros(3), held.astype(np.int32), self.model.V)])
+            fixed = np.flatnonzero(self.model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0])
+            return stiffness_matrix(self.model, [fem.dirichletbc(np.zeros(3), fixed.astype(np.int32), self.model.V)])
         K = stiffness_matrix(self.model)
         _add_springs(self.model, K, self.R)
         return K

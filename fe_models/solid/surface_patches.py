@@ -1,7 +1,7 @@
 """Modal forces of piezoelectric patches outlined in the mesh of a solid. Importing this loads dolfinx.
 
 A patch that strains along the link loads the face beneath it by a membrane force N (N/m) along t = e_x: virtual work
-∫ N t·δε t ds. One that is held across does the same along e_z, which bends the link back by ν: its N is 1/(1 − ν)
+∫ N t·δε t ds. One whose width is fixed does the same along e_z, which bends the link back by ν: its N is 1/(1 − ν)
 times as large.
 """
 

@@ -36,7 +36,7 @@ def without_their_turn(
 
     The given K has what the mean motion of interfaces reads. `loads` and `shapes` (3 owned,) are nodal forces and
     displacements by unit load, `rows` B (6, 3 owned) the mean motion of each interface, which spreads loads on it.
-    `supports`: components of the mean motion that are held, in the order of `flexibility.B`; none of rigid faces.
+    `supports`: components of the mean motion that are fixed, in the order of `flexibility.B`; none of rigid faces.
     """
     names = list(K)
     f = np.stack([loads[name] for name in names], axis=1)

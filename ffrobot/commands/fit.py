@@ -15,7 +15,9 @@ from .options import output_option, protect
 @click.argument("file", metavar="LINK.toml|SCENE.toml", type=FILE)
 @click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table with mode, frequency (Hz), …")
 @click.option("--vary", metavar="KEY,KEY …", multiple=True, required=True, help="Keys to fit; repeatable.")
-@click.option("--motors", type=click.Choice(["free", "held"]), help="Motors of a robot during the measurement [free].")
+@click.option(
+    "--motors", type=click.Choice(["free", "locked"]), help="Motors of a robot during the measurement [free]."
+)
 @output_option("FILE.toml", "Output file [FILE.fitted.toml].")
 @click.option("--force", is_flag=True, help="Replacement of files of an earlier fit.")
 @python_option
@@ -24,7 +26,7 @@ def fit(
     file: Path,
     measured: Path,
     vary: tuple[str, ...],
-    motors: Literal["free", "held"] | None,
+    motors: Literal["free", "locked"] | None,
     output: Path | None,
     force: bool,
 ) -> None:

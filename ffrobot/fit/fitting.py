@@ -103,7 +103,7 @@ ANALYSIS = {"name": "fit", "kind": "linear"}
 
 
 class RobotTarget:
-    """The scene at `path`: vibrations about the equilibrium at t = 0, with `motors` "free" or "held"."""
+    """The scene at `path`: vibrations about the equilibrium at t = 0, with `motors` "free" or "locked"."""
 
     families: tuple[str, ...] = ()
 
@@ -135,7 +135,7 @@ class RobotTarget:
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
         free = robot_modes(model := details.models[0]).frequency
-        frequency = locked_frequencies(model) if self._motors == "held" else as_floats(free[free > 0.0])
+        frequency = locked_frequencies(model) if self._motors == "locked" else as_floats(free[free > 0.0])
         return ("",) * len(frequency), frequency
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
@@ -162,7 +162,7 @@ class RobotTarget:
 
 DIGITS = 8  # of fitted values in files: more than measured ones have
 
-Motors = Literal["free", "held"]
+Motors = Literal["free", "locked"]
 
 
 def fit_measured(
@@ -181,7 +181,7 @@ def fit_measured(
         measured: table with mode, frequency (Hz), and optionally uncertainty (Hz).
         vary: keys with dots; "KEY=KEY" have a common factor.
         output: new file; None: next to the old one, with a name that ends in `.fitted.toml`.
-        motors: state of a robot's motors during the measurement, `free` (the default) or `held`.
+        motors: state of a robot's motors during the measurement, `free` (the default) or `locked`.
         force: whether to replace existing files.
 
     Returns:

@@ -181,12 +181,12 @@ def _lowest(frequency: Array) -> str:
 
 def _conditions(name: str, found: LinearModels | RobotAtRest) -> Rows:
     for t, at in zip(found.times, found.conditions, strict=True):
-        for condition, held in at.items():
-            stiffness = [(point, *_stiffness(C)) for point, C in held.compliance.items()] or [("", "", "")]
+        for condition, state in at.items():
+            stiffness = [(point, *_stiffness(C)) for point, C in state.compliance.items()] or [("", "", "")]
             for k, (point, along, least) in enumerate(stiffness):
                 cells = {
                     "t (s)": "" if k else f"{t:g}",
-                    "natural frequencies (Hz)": "" if k else _lowest(held.modes.frequency) or "none",
+                    "natural frequencies (Hz)": "" if k else _lowest(state.modes.frequency) or "none",
                     "at": point,
                     "stiffness along axes\n(N/mm)": along,
                     "least, along": least,

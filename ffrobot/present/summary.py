@@ -123,7 +123,7 @@ def _texts(verdict: Verdict, remarks: Sequence[str]) -> Iterator[str]:
     settled = ((one.name, one.settled.in_words) for one in verdict.analyses if one.settled is not None)
     yield from _labelled(VIBRATION, alike(settled))
     yield from remarks
-    yield from _labelled("at rest", alike((one.name, one.held) for one in verdict.analyses if one.held))
+    yield from _labelled("at rest", alike((one.name, one.at_rest) for one in verdict.analyses if one.at_rest))
     yield from _labelled("note", alike((one.name, text) for one in verdict.analyses for text in one.notes))
 
 

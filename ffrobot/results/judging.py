@@ -13,7 +13,7 @@ from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .kinds import own_results
-from .linear import held_in_words
+from .linear import at_rest_in_words
 from .off_path import off_path, tool_error
 from .peaks import POWER, peak_of
 from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, Verdict, millimeters, vibrates
@@ -58,7 +58,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         stress=None if _ended_early(group) else _stress(group),
         margins=own.margins(own.about(group)),
         settled=_settled(group),
-        held=held_in_words(group),
+        at_rest=at_rest_in_words(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
         notes=tuple(map(str, about.get("notes", ()))),
         advice=tuple(_advice(group, motors, units, patches)),

@@ -52,15 +52,15 @@ def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
 def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | RobotAtRest) -> None:
     """Write joints_locked/ and joints_compliant/ of an analysis: frequencies, modes, compliance."""
     for condition in details.conditions[0]:
-        held, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
-        own["frequency"] = np.array([one.modes.frequency for one in held])
-        own["damping_ratio"] = np.array([one.modes.damping_ratio for one in held])
-        _write_shapes(own, _shapes(run, np.array([one.modes.motion.real for one in held])))
-        for point in held[0].compliance:
-            own[f"compliance/{point}"] = np.array([one.compliance[point] for one in held])
+        states, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
+        own["frequency"] = np.array([one.modes.frequency for one in states])
+        own["damping_ratio"] = np.array([one.modes.damping_ratio for one in states])
+        _write_shapes(own, _shapes(run, np.array([one.modes.motion.real for one in states])))
+        for point in states[0].compliance:
+            own[f"compliance/{point}"] = np.array([one.compliance[point] for one in states])
 
 
-def held_in_words(group: h5py.Group) -> str:
+def at_rest_in_words(group: h5py.Group) -> str:
     """Natural frequencies with motors at rest, and the least stiffness of a point, at the first time of an analysis."""
     if not any(key.startswith("joints_") for key in group):
         return ""
@@ -68,13 +68,13 @@ def held_in_words(group: h5py.Group) -> str:
 
     texts = []
     for condition, name in ((LOCKED, "joints locked"), (COMPLIANT, "compliant gears")):
-        if (held := group.get(f"joints_{condition}")) is None:
+        if (state := group.get(f"joints_{condition}")) is None:
             continue
-        frequency = held["frequency"][0]
+        frequency = state["frequency"][0]
         lowest = ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:LISTED])
         least = [
             (stiffness.least, point)
-            for point, C in held.get("compliance", {}).items()
+            for point, C in state.get("compliance", {}).items()
             if (stiffness := translational_stiffness(C[0])) is not None and np.isfinite(stiffness.least)
         ]
         of_point = f"; least stiffness {min(least)[0] / 1e3:.4g} N/mm at {min(least)[1]}" if least else ""

@@ -99,7 +99,7 @@ class AnalysisVerdict:
         stress: largest von Mises stress, Pa, its body and time; None if not requested.
         margins: gain and delay margins of closed-loop runs by their linear model, in words; empty where not known.
         settled: of the point that vibrates most after the paths; None where these move to the end.
-        held: natural frequencies and least stiffness with motors at rest, in words; empty if not requested.
+        at_rest: natural frequencies and least stiffness with motors at rest, in words; empty if not requested.
         warnings: reasons why results may be wrong or misleading.
         notes: properties of correct results.
         advice: remedies to try.
@@ -120,7 +120,7 @@ class AnalysisVerdict:
     stress: Place | None
     margins: str
     settled: Settled | None
-    held: str
+    at_rest: str
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     advice: tuple[str, ...]
@@ -139,7 +139,7 @@ class AnalysisVerdict:
             yield f"  largest stress {_place(f'{self.stress[0] / 1e6:.4g} MPa', *self.stress[1:])} (von Mises)"
         if self.settled is not None:
             yield f"  residual vibration: {self.settled.in_words}"
-        for text in filter(None, (self.margins, self.held)):
+        for text in filter(None, (self.margins, self.at_rest)):
             yield f"  {text}"
         yield from (f"  to try: {text}" for text in self.advice)
 

@@ -222,54 +222,54 @@ def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) 
     condition more or less: intervals far longer than it lets it neither grow nor decay.
     Raises `SolveError` where zeros change sides otherwise.
     """
-    held = [~linear.is_future[0], linear.is_future[-1].copy()]
-    excess = int(sum(of.sum() for of in held)) - linear.zeros.shape[1]
+    enforced = [~linear.is_future[0], linear.is_future[-1].copy()]
+    excess = int(sum(of.sum() for of in enforced)) - linear.zeros.shape[1]
     if excess and not linear.singular_after:
         raise SolveError(
             f"{servo.where}: stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
-            f" {linear.times[-1]:g} s, found {np.count_nonzero(~held[0])} and {np.count_nonzero(held[1])}. Change the"
-            " number of modes in the link files, end the path in a posture more like the first, or use output ="
-            ' "redefined"'
+            f" {linear.times[-1]:g} s, found {np.count_nonzero(~enforced[0])} and {np.count_nonzero(enforced[1])}."
+            " Change the number of modes in the link files, end the path in a posture more like the first, or use"
+            ' output = "redefined"'
         )
     zeros = linear.zeros[[0, -1]]
-    speeds = np.where([of if excess > 0 else ~of for of in held], np.abs(zeros), 0.0).max(axis=1)
-    rows = [int(of.sum()) for of in held]
+    speeds = np.where([of if excess > 0 else ~of for of in enforced], np.abs(zeros), 0.0).max(axis=1)
+    rows = [int(of.sum()) for of in enforced]
     rows[int(speeds.argmax())] -= excess
-    both = [_boundary(servo, t, zeros[k], held[k], rows[k]) for k, t in enumerate((first, last))]
+    both = [_boundary(servo, t, zeros[k], enforced[k], rows[k]) for k, t in enumerate((first, last))]
     return both[0], both[1]
 
 
-def _boundary(servo: Servo, t: float, s: ComplexArray, is_held: Booleans, count: int) -> Boundary:
-    """No part of y − y_rest in the subspace of the zeros s (2n,) that are held, of the equilibrium at time t.
+def _boundary(servo: Servo, t: float, s: ComplexArray, is_enforced: Booleans, count: int) -> Boundary:
+    """No part of y − y_rest in the subspace of the zeros s (2n,) that are enforced, of the equilibrium at time t.
 
     An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ with eigenvalues near s;
-    `count` of them, without some of the fastest that are held, or with some of the fastest others.
+    `count` of them, without some of the fastest that are enforced, or with some of the fastest others.
     """
     p, rest = equilibrium(servo, t), np.zeros((1, len(servo.scale)))
     A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), 0, servo.scale)
-    others = [is_held]  # sets of zeros, each within the next one, up to one with at least `count`
+    others = [is_enforced]  # sets of zeros, each within the next one, up to one with at least `count`
     while not min(x.sum() for x in others) <= count <= max(x.sum() for x in others):
-        others.append(_with_fastest(s, others[-1], held=bool(is_held.sum() < count)))
+        others.append(_with_fastest(s, others[-1], enforced=bool(is_enforced.sum() < count)))
     basis = np.zeros((2 * len(p), 0))
-    for held in sorted(others, key=lambda x: int(x.sum())):
-        more = _invariant(A, s, held)
+    for enforced in sorted(others, key=lambda x: int(x.sum())):
+        more = _invariant(A, s, enforced)
         more -= basis @ (basis.T @ more)
-        basis = np.hstack([basis, np.linalg.svd(more, full_matrices=False)[0][:, : held.sum() - basis.shape[1]]])
+        basis = np.hstack([basis, np.linalg.svd(more, full_matrices=False)[0][:, : enforced.sum() - basis.shape[1]]])
     rows = basis[:, :count].T * np.concatenate([servo.scale, np.ones_like(servo.scale)])
     return Boundary(rows, np.concatenate([p, rest[0]]))
 
 
-def _with_fastest(s: ComplexArray, is_held: Booleans, *, held: bool) -> Booleans:
-    """The same but for the fastest zero of those that are not `held`, or are: with it and its conjugate."""
-    fastest = s[np.where(is_held != held, np.abs(s), -1.0).argmax()]
+def _with_fastest(s: ComplexArray, is_enforced: Booleans, *, enforced: bool) -> Booleans:
+    """The same but for the fastest zero of those that are not `enforced`, or are: with it and its conjugate."""
+    fastest = s[np.where(is_enforced != enforced, np.abs(s), -1.0).argmax()]
     chosen = np.abs(s.real + 1j * np.abs(s.imag) - fastest.real - 1j * abs(fastest.imag)) <= 1e-9 * abs(fastest)
-    return np.where(chosen, held, is_held)
+    return np.where(chosen, enforced, is_enforced)
 
 
-def _invariant(A: Array, s: ComplexArray, is_held: Booleans) -> Array:
+def _invariant(A: Array, s: ComplexArray, is_enforced: Booleans) -> Array:
     from scipy.linalg import schur
 
-    _, U, count = schur(A.T, sort=lambda re, im: bool(is_held[np.abs(s - complex(re, abs(im))).argmin()]))
+    _, U, count = schur(A.T, sort=lambda re, im: bool(is_enforced[np.abs(s - complex(re, abs(im))).argmin()]))
     return U[:, :count]
 
 

@@ -139,13 +139,13 @@ class Statics:
         self.model, self.t, self.system = model, t, MultibodySystem(model)
         self.sizes, self.row_sizes, self.length = natural_sizes(model), row_sizes(model), robot_size(model)
 
-    def equilibrium(self, q: Array, held: Indices | None = None) -> Array:
-        """The equilibrium (n_q,) that Newton's method reaches from q (n_q,), with the coordinates v[`held`] kept.
+    def equilibrium(self, q: Array, locked: Indices | None = None) -> Array:
+        """The equilibrium (n_q,) that Newton's method reaches from q (n_q,), with the coordinates v[`locked`] kept.
 
         Raises `SolveError` that says what is left where it reaches none.
         """
         tree = self.model.tree
-        free = np.delete(np.arange(tree.n_v), [] if held is None else held)
+        free = np.delete(np.arange(tree.n_v), [] if locked is None else locked)
         rest, is_met, cause = self._newton(q, free, FULL_LOADS, MOST_ITERATIONS)
         if not is_met:
             rest, is_met = self._loaded(q, free)

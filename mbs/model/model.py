@@ -256,10 +256,10 @@ def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
     return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
 
 
-def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
-    """Return path errors (T, m), m or rad, by trajectory of `held`, at `times` (T,), s, and q (T, n_q)."""
-    C, owners = constraint_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
-    return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
+def path_errors(model: Model, times: Array, q: Array) -> dict[str, Array]:
+    """Return path errors (T, m), m or rad, by trajectory of `model`, at `times` (T,), s, and q (T, n_q)."""
+    C, owners = constraint_values(model, q, times)[0], [row.owner if row.is_trajectory else "" for row in model.rows]
+    return {path.name: C[:, [owner == path.name for owner in owners]] for path in model.scene.trajectory}
 
 
 def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:

@@ -150,8 +150,10 @@ class _Reduction:
         """Rows of a loop that hold one way in several directions, k among them, where the plane is oblique to these."""
         rows, ends = self._parts.rows, _ends(self._parts.rows[k])
         ways = (_core.ConstraintKind.point, _core.ConstraintKind.slide)
-        held = [i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0]  # none that rotors follow
-        same = [i for i in held if rows[i].kind == rows[k].kind and _ends(rows[i]) == ends]
+        enforced = [
+            i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0
+        ]  # none that rotors follow
+        same = [i for i in enforced if rows[i].kind == rows[k].kind and _ends(rows[i]) == ends]
         return same if k in same and any(_is_mixed(self._direction(rows[i])) for i in same) else []
 
     def _together(self, group: Sequence[int]) -> Iterator[tuple[_core.ConstraintModel, Array]]:
@@ -160,9 +162,9 @@ class _Reduction:
         F = np.array([self._direction(rows[i]) for i in group])
         if abs(float(F[:, 2] @ F[:, 2]) - 1.0) > EXACT:
             raise AcrossError
-        held, directions = np.linalg.eigh(F[:, :2].T @ F[:, :2])
-        for size, direction in zip(held, directions.T, strict=True):
-            if size > 0.5:  # 1: held, 0: left free
+        enforced, directions = np.linalg.eigh(F[:, :2].T @ F[:, :2])
+        for size, direction in zip(enforced, directions.T, strict=True):
+            if size > 0.5:  # 1: enforced, 0: left free
                 column = np.zeros(len(rows))
                 column[list(group)] = F[:, :2] @ direction
                 yield _like(rows[group[0]], np.array([*direction, 0.0])), column

@@ -45,9 +45,9 @@ def row_sizes(model: Model) -> Array:
     return np.array([length if model.measures_way(row) else 1.0 for row in model.rows])
 
 
-def solve_posture(model: Model, t: float, q: Array, held: Booleans | None = None) -> Array | None:
-    """Q (n_q,) moved onto C(q, t) = 0 by least steps of joints not `held` (n_v,); None where it does not converge."""
-    solved, is_met = solve_postures(model, np.array([t]), q[None], held)
+def solve_posture(model: Model, t: float, q: Array, locked: Booleans | None = None) -> Array | None:
+    """Q (n_q,) moved onto C(q, t) = 0 by least steps of joints not `locked` (n_v,); None where it does not converge."""
+    solved, is_met = solve_postures(model, np.array([t]), q[None], locked)
     return solved[0] if is_met[0] else None
 
 
@@ -58,7 +58,7 @@ def posture_search(model: Model) -> PostureSearch:
     return PostureSearch(joint_scales(model), row_sizes(model), farthest)
 
 
-def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None = None) -> tuple[Array, Booleans]:
+def solve_postures(model: Model, times: Array, q: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
     """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s, as `solve_posture`; with flags (T,) of convergence.
 
     Where C = 0 with a joint or a tool turned over it did not.
@@ -66,8 +66,8 @@ def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None =
     if not model.rows:
         return np.array(q), np.ones(len(q), dtype=bool)
     search = posture_search(model)
-    if held is not None:
-        search.scales[held] = 0.0
+    if locked is not None:
+        search.scales[locked] = 0.0
     moved, left = model.constraints.postures(q, times, search)
     is_met = left <= MET
     for is_turned_over in turned_over(model, moved, times).values():
@@ -75,13 +75,13 @@ def solve_postures(model: Model, times: Array, q: Array, held: Booleans | None =
     return moved, is_met
 
 
-def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: Booleans | None = None) -> State:
-    """The state at q, rates of joints not `held` (n_v,) moved onto Ċ = 0 at time t by the least change, ṗ kept."""
+def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, locked: Booleans | None = None) -> State:
+    """The state at q, rates of joints not `locked` (n_v,) moved onto Ċ = 0 at time t by the least change, ṗ kept."""
     if not model.rows:
         return State(q, v)
     scales, now = joint_scales(model), np.array([t])
-    if held is not None:
-        scales[held] = 0.0
+    if locked is not None:
+        scales[locked] = 0.0
     (C_v,) = natural_gradients(model, q[None], now, scales)
     left = -constraint_rates(model, q[None], v[None], now)[0] / row_sizes(model)
     return State(q, v + scales * np.linalg.lstsq(C_v, left, rcond=1e-10)[0])
@@ -121,7 +121,7 @@ class Mobility:
     followed: int  # how many of these the trajectories take
     # smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot
     ratio: float
-    left: tuple[str, ...]  # joints that still move with all trajectories held
+    left: tuple[str, ...]  # joints that still move with all trajectories prescribed
     loop_rank: int  # how many rows of the loops are independent with rigid links
 
 

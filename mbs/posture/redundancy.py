@@ -144,10 +144,10 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
         return best
 
     def moments(c: Array) -> Array:
-        held = _with_prescribed_joints(model, nodes, times, moved(c, 0))
+        driven = _with_prescribed_joints(model, nodes, times, moved(c, 0))
         try:
-            mechanism = _core.SpatialPrescribedMotion(driven_mechanism(held, has_motors=False), start[0])
-            motion = prescribed_motion(held, mechanism, still, times[::STRIDE], moved(c, 1))
+            mechanism = _core.SpatialPrescribedMotion(driven_mechanism(driven, has_motors=False), start[0])
+            motion = prescribed_motion(driven, mechanism, still, times[::STRIDE], moved(c, 1))
         except SolveError:  # out of reach: worse than anything within it
             return np.full(weights.size, OUT_OF_REACH)
         return (weights * motion.required).ravel() / size

@@ -60,7 +60,7 @@ def undeformed_posture(model: Model) -> State:
     v, named = _guessed_rates(model), _named(model, "joint_rates")
     start = with_rates(model, q, v)
     if named.any():
-        kept = with_rates(model, q, with_rates(model, q, v, held=named).v)
+        kept = with_rates(model, q, with_rates(model, q, v, locked=named).v)
         start = kept if np.allclose(kept.v[named], v[named], atol=SAME * np.abs(v[named]).max()) else start
     return _twisted_gears(model, start, relaxed_gears(model, start))
 
@@ -183,10 +183,10 @@ def _with_slides(model: Model, q: Array) -> Array:
 def relaxed_gears(model: Model, state: State) -> State:
     """The state with motors where their gears are not strained; joints where motors follow a trajectory."""
     q, v = state.q.copy(), state.v.copy()
-    held = {row.coordinate for row in model.rows if row.kind == "coordinate"}
+    locked = {row.coordinate for row in model.rows if row.kind == "coordinate"}
     for gear in model.tree.gears:
         way, rate = gear.twist(q, v)
-        if gear.motor.v.start in held:
+        if gear.motor.v.start in locked:
             q[gear.joint.q.start] += gear.sign * way
             v[gear.joint.v.start] += gear.sign * rate
         else:

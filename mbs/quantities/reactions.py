@@ -2,7 +2,7 @@
 
 How joints share loads where constraints of loops are redundant: what that leaves open, and a split.
 
-Constraints of loops depend on each other where rigid links hold what is held already, as parallel axes do. With C_v by
+Constraints of loops depend on each other where rigid links constrain a motion twice, as parallel axes do. With C_v by
 joints and modes, multipliers λ0 with C_vᵀ λ0 = 0 change reactions without changing the motion.
 """
 

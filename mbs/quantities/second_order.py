@@ -49,14 +49,14 @@ class LoadedPoint(NamedTuple):
 class ModalLoads:
     """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,).
 
-    `held`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
+    `support`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
     """
 
     f: Array
     K: Array
     stiffness: Array
     points: tuple[LoadedPoint, ...] = ()
-    held: LoadedPoint | None = None
+    support: LoadedPoint | None = None
 
     @cached_property
     def relative(self) -> Array:
@@ -150,19 +150,19 @@ def missing_to_first_order(
     at = _worst_outputs(loads, p)
     S = np.tensordot(loads.f[at], loads.K, axes=1)
     stiffness = np.diag(loads.stiffness) + S
-    if loads.held is not None:
-        stations = stations - _carried(loads.held, loads.held.by_modes, places)
+    if loads.support is not None:
+        stations = stations - _carried(loads.support, loads.support.by_modes, places)
     whole = _largest(p, stations)
     if np.linalg.eigvalsh(stiffness)[:, 0].min() <= 0.0:  # buckles for good, or for a moment
         return Missing(np.inf, np.inf) if is_at_rest else Missing(whole / length, 1.0)
     change = -np.linalg.solve(stiffness, np.einsum("tmn,tn->tm", S, p[at])[:, :, None])[:, :, 0]
     change *= 1.0 if is_at_rest else IN_MOTION
     missed = _largest(change, stations)
-    of_held = None if loads.held is None else _moved(loads.held, p[at], change)
+    of_support = None if loads.support is None else _moved(loads.support, p[at], change)
     for point in loads.points:
         moved = _moved(point, p[at], change)[:3]
-        if loads.held is not None and of_held is not None:
-            moved = moved - _carried(loads.held, of_held, point.position[None])[0]
+        if loads.support is not None and of_support is not None:
+            moved = moved - _carried(loads.support, of_support, point.position[None])[0]
         missed = max(missed, float(np.linalg.norm(moved, axis=0).max()))
     return Missing(missed / length, min(1.0, missed / whole) if whole else 0.0)
 
@@ -173,9 +173,9 @@ def _moved(point: LoadedPoint, p: Array, change: Array) -> Array:
     return moved
 
 
-def _carried(held: LoadedPoint, moved: Array, places: Array) -> Array:
+def _carried(support: LoadedPoint, moved: Array, places: Array) -> Array:
     """What a section that is `moved` (6, m) does to points at `places` (k, 3) that it carries: (k, 3, m)."""
-    arms = places - held.position
+    arms = places - support.position
     carried: Array = moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
     return carried
 

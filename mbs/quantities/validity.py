@@ -152,13 +152,13 @@ def _on_modes(link: ModalBody, run: Run, name: str, sizes: Mapping[str, Array]) 
         for point, at in link.interfaces.items()
         if all(f"force/{point}/{axis}" in K for axis in "xyz")
     }
-    held = points.get(node.outer.point)
-    if held is not None:
+    support = points.get(node.outer.point)
+    if support is not None:
         counts = np.eye(6)
         counts[3:, 3:] = _turns_that_count(run, node)
-        held = LoadedPoint(held.position, counts @ held.by_modes, np.tensordot(counts, held.K, axes=1))
+        support = LoadedPoint(support.position, counts @ support.by_modes, np.tensordot(counts, support.K, axes=1))
     K_known = np.array([K[load] for load in known]).reshape(-1, n, n)
-    return ModalLoads(f, K_known, node.body.stiffness, tuple(points.values()), held)
+    return ModalLoads(f, K_known, node.body.stiffness, tuple(points.values()), support)
 
 
 def _turns_that_count(run: Run, node: Node) -> Array:

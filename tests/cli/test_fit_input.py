@@ -12,7 +12,7 @@ WRONG = {
         "arm.toml: --vary: expected a number above 0 at material.dnsity, found none"
     ),
     ("fit", "arm.toml", "--measured", "modes.csv", "--vary", "name"): "a number above 0 at name, found 'arm'",
-    ("fit", "arm.toml", "--measured", "modes.csv", "--vary", "material.density", "--motors", "held"): (
+    ("fit", "arm.toml", "--measured", "modes.csv", "--vary", "material.density", "--motors", "locked"): (
         "--motors: expected a scene file"
     ),
     ("fit", "arm.toml", "--measured", "many.csv", "--vary", "material.density"): (

@@ -102,7 +102,7 @@ def test_stiffness_of_a_joint_from_the_closed_form(write, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(ROBOT, encoding="utf-8")
     measured = table(tmp_path / "robot.csv", spring_beam(820.0, 3), uncertainty=1e-3)
-    fit = ffrobot.fit_measured(scene, measured, ["joint.shoulder.stiffness"], motors="held")
+    fit = ffrobot.fit_measured(scene, measured, ["joint.shoulder.stiffness"], motors="locked")
     assert fit.value[0] == pytest.approx(820.0, rel=1e-4)  # elements and modes leave 1e-5 of the frequencies
     (joint,) = tomllib.loads((tmp_path / "scene.fitted.toml").read_text())["joint"]
     assert joint["stiffness"] == pytest.approx(fit.value[0], rel=1e-7)
@@ -113,7 +113,7 @@ def test_frequencies_of_held_and_free_motors(write, tmp_path):
     write()
     scene = tmp_path / "scene.toml"
     scene.write_text(ROBOT.partition("gear_ratio")[0], encoding="utf-8")
-    held = RobotTarget(scene, "held").modes({})[1]
+    held = RobotTarget(scene, "locked").modes({})[1]
     free = RobotTarget(scene, "free").modes({})[1]
     # twenty cubic elements: (βh)⁴/1440 = 1.7e-5 of the third frequency
     np.testing.assert_allclose(held[:3], spring_beam(1e12, 3), rtol=2e-5)
@@ -126,16 +126,16 @@ def test_links_of_a_scene_get_files_of_their_own(write, tmp_path):
     write()
     scene = tmp_path / "scene.toml"
     scene.write_text(ROBOT, encoding="utf-8")
-    truth = RobotTarget(scene, "held").modes({("links", "arm", "material", "youngs_modulus"): 60e9})[1]
+    truth = RobotTarget(scene, "locked").modes({("links", "arm", "material", "youngs_modulus"): 60e9})[1]
     measured = table(tmp_path / "robot.csv", truth[:3])
     vary = ["links.arm.material.youngs_modulus"]
-    fit = ffrobot.fit_measured(scene, measured, vary, motors="held")
+    fit = ffrobot.fit_measured(scene, measured, vary, motors="locked")
     assert fit.value[0] == pytest.approx(60e9, rel=1e-6)
     assert tomllib.loads((tmp_path / "scene.fitted.toml").read_text())["body"][0]["link"] == "arm.arm.fitted.toml"
     assert ffrobot.load_scene(tmp_path / "scene.fitted.toml").body[0].link == tmp_path / "arm.arm.fitted.toml"
     with pytest.raises(InputError, match="output: expected a new name, or --force to replace it"):
-        ffrobot.fit_measured(scene, measured, vary, motors="held")
-    ffrobot.fit_measured(scene, measured, vary, motors="held", force=True)
+        ffrobot.fit_measured(scene, measured, vary, motors="locked")
+    ffrobot.fit_measured(scene, measured, vary, motors="locked", force=True)
 
 
 def test_values_are_replaced_where_they_stand():
