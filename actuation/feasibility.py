@@ -103,7 +103,7 @@ def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices)
 
 def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> Unsupplied:
     """Add the shift (m) of points by unmet modal forces r (T, n), N/√kg; `point`: the one with the largest error."""
-    shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(run, modal, points).items()}
+    shift = {name: np.linalg.norm(shifts, axis=1) for name, shifts in quasi_static_shift(run, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
     kept, step = shift[point], max(1, len(run.time) // ROWS)
     parts = np.array_split(np.arange(len(kept)), min(ROWS, len(kept)))
@@ -330,11 +330,11 @@ class LinkInMotion:
 
 def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
     """The links of a motion by name; `bodies` are their modal bodies and equations."""
-    forces, found = actuator_forces(run), {}
+    forces, links = actuator_forces(run), {}
     assert forces is not None
     for name, (modal, spatial) in bodies.items():
-        found[name] = LinkInMotion(modal, spatial, modal_coordinates(run, name), forces.modal[name])
-    return found
+        links[name] = LinkInMotion(modal, spatial, modal_coordinates(run, name), forces.modal[name])
+    return links
 
 
 def judge_actuators(
@@ -369,12 +369,12 @@ def _largest_voltage(path: Path, run: Run, link: LinkInMotion, layout: PztLayout
     from .patches.link_patches import on_kept_modes, with_count
     from .patches.patches import voltage_gain
 
-    found = with_count(path, layout, link.modal, link.spatial, count)
-    if found is None:
+    patches = with_count(path, layout, link.modal, link.spatial, count)
+    if patches is None:
         return None
     if link.spatial.name in run.model.tree.index:  # else in pieces, with all modes
-        found = on_kept_modes(found, node_of(run, link.spatial.name).body)
-    return float(np.abs(found.reached.forces(link.F_p) @ voltage_gain(found.reach).T).max())
+        patches = on_kept_modes(patches, node_of(run, link.spatial.name).body)
+    return float(np.abs(patches.reached.forces(link.F_p) @ voltage_gain(patches.reach).T).max())
 
 
 def find_unmet(
@@ -385,14 +385,14 @@ def find_unmet(
     limited: bool,
 ) -> dict[str, Array]:
     """Return unmet modal forces (T, n), N/√kg, by link, at required voltages or at those within limits."""
-    found = {}
+    unmet = {}
     for name, link in links.items():
-        found[name] = link.F_p
+        unmet[name] = link.F_p
         if (of_link := patches.get(name)) is not None:
             of = [voltages[layout] for layout in of_link.arrays]
             applied = np.concatenate([one.within_limit if limited else one.required for one in of], axis=1)
-            found[name] = of_link.unmet(link.F_p, applied)
-    return found
+            unmet[name] = of_link.unmet(link.F_p, applied)
+    return unmet
 
 
 def find_unsupplied(
@@ -404,17 +404,17 @@ def find_unsupplied(
 ) -> Unsupplied | None:
     """Return what no voltages supply, except on links in `others`; None if no link bends by it."""
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
-    found: list[tuple[float, float, str, str]] = []
+    unsupplied: list[tuple[float, float, str, str]] = []
     for name, left in find_unmet(links, patches, voltages, limited=False).items():
         modal, counts = links[name].modal, np.abs(left).max(axis=0) > ROUND_OFF * largest
         deflection, rotation = _largest_shift(links[name], left)
         if name not in others and counts.any() and max(deflection / modal.length, rotation) > NEGLIGIBLE:
             of_modes = dict.fromkeys(family for family, one in zip(modal.family, counts, strict=True) if one)
-            found.append((deflection, rotation, name, ", ".join(of_modes)))
-    if not found:
+            unsupplied.append((deflection, rotation, name, ", ".join(of_modes)))
+    if not unsupplied:
         return None
-    found.sort(reverse=True)
-    deflections, rotations, bodies, families = zip(*found, strict=True)
+    unsupplied.sort(reverse=True)
+    deflections, rotations, bodies, families = zip(*unsupplied, strict=True)
     about = Unsupplied(bodies, bool(patches))
     if not run.space.is_plane:
         about = replace(about, families=families, deflection=deflections, rotation=rotations)

@@ -118,8 +118,8 @@ def _numbers(text: Any) -> Any:
 
 def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoice]:
     """Every motor with each of its gears: those that fit first, of these the lightest (or smallest) first."""
-    found = [choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio]
-    return sorted(found, key=lambda one: (not one.fits, _size(one.motor) if one.fits else max(one.shares)))
+    rated = [choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio]
+    return sorted(rated, key=lambda one: (not one.fits, _size(one.motor) if one.fits else max(one.shares)))
 
 
 def _size(motor: CatalogMotor) -> tuple[float, ...]:

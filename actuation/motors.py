@@ -87,7 +87,7 @@ def judge_motors(run: Run, analysis: Analysis) -> dict[str, MotorFeasibility]:
 
     Behind a compliant gear the motor turns otherwise than its joint.
     """
-    forces, found = actuator_forces(run), {}
+    forces, verdicts = actuator_forces(run), {}
     assert forces is not None
     inertias = _load_inertias(run)
     at_rest: Mapping[str, Array] = {}
@@ -100,12 +100,14 @@ def judge_motors(run: Run, analysis: Analysis) -> dict[str, MotorFeasibility]:
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
             judged = judge_motion(run.time, moments[:, k], rates[:, k], limits, analysis.last_time)
             jump = path_jump(run, analysis, judged.moment_time) if judged.has_spike else ""
-            found[name] = replace(judged, jump=jump, load_inertia=inertias.get(joint.name, (np.nan,) * (k + 1))[k])
+            verdicts[name] = replace(judged, jump=jump, load_inertia=inertias.get(joint.name, (np.nan,) * (k + 1))[k])
             if judged.moment > judged.moment_limit:
                 at_rest = at_rest or static_moments(run, analysis.last_time)
                 if joint.name in at_rest:
-                    found[name] = replace(found[name], static_moment=float(np.abs(at_rest[joint.name][:, k]).max()))
-    return found
+                    verdicts[name] = replace(
+                        verdicts[name], static_moment=float(np.abs(at_rest[joint.name][:, k]).max())
+                    )
+    return verdicts
 
 
 def static_moments(run: Run, end: float) -> Mapping[str, Array]:
@@ -138,12 +140,12 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
     rows = np.unique(np.linspace(0, len(run.time) - 1, ROWS).astype(int))
     inertia = mass_matrices(model, run.q[rows])
     most = inertia.diagonal(axis1=1, axis2=2).max(axis=0)
-    found, behind = {}, {gear.joint.joint.name: gear.joint.v for gear in model.tree.gears}
+    inertias, behind = {}, {gear.joint.joint.name: gear.joint.v for gear in model.tree.gears}
     for joint, columns in model.motors.items():
         node = model.tree.nodes[model.tree.carried[joint]]
         J, N = rotor(node)  # 0 of a compliant gear, whose rotor has a coordinate of its own
-        found[joint] = tuple(float(one) - J * N**2 for one in most[behind.get(joint, columns)])
-    return found
+        inertias[joint] = tuple(float(one) - J * N**2 for one in most[behind.get(joint, columns)])
+    return inertias
 
 
 def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:

@@ -243,7 +243,7 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Arra
 
     Raises `InputError` where a body without points has driving forces.
     """
-    tree, found = run.model.tree, {}
+    tree, at_points = run.model.tree, {}
     driven = find_driving_forces(run)
     largest = max(float(np.abs(Q_a).max(initial=0.0)) for Q_a in driven.values())
     for body, Q_a in driven.items():
@@ -257,16 +257,16 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Arra
         F = places.frame(tree.index[body]).F
         force = solve_points(points, run).force
         for k, name in enumerate(points.names):
-            found[f"{body}.{name}"] = force[:, k : k + 1] * (F @ points.direction[:, k])
-    return found
+            at_points[f"{body}.{name}"] = force[:, k : k + 1] * (F @ points.direction[:, k])
+    return at_points
 
 
 def find_driving_forces(run: Run) -> dict[str, Array]:
     """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
     model = run.model
-    found = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
+    by_body = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
     if run.required is not None:  # a shape is held besides, by forces on the modes alone
         held = run.required - path_forces(model, run.time, run.q, run.multipliers)
         for node in model.tree.nodes:
-            found[node.body.name][:, 6:] += held[:, node.p_v]
-    return found
+            by_body[node.body.name][:, 6:] += held[:, node.p_v]
+    return by_body

@@ -79,11 +79,11 @@ def solve(
     return Results(path)
 
 
-def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:
+def write_study(study: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:
     """Write the result of a design function as files for `write_report`, and as figures.
 
     Args:
-        found: result of `sensitivity`, `optimise`, `trade_off` or `uncertainty`.
+        study: result of `sensitivity`, `optimise`, `trade_off` or `uncertainty`.
         folder: where to write.
         figures: whether to draw figures.
 
@@ -91,13 +91,13 @@ def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> lis
         The written files.
 
     Example:
-        ffrobot.write_study(found, "study")
+        ffrobot.write_study(study, "study")
         ffrobot.write_report("study", "study.html")
     """
     from .common.extras import extras
 
     with extras():
-        return list(found.write_study(Path(folder), figures=figures))
+        return list(study.write_study(Path(folder), figures=figures))
 
 
 def plot_results(

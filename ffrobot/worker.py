@@ -50,10 +50,10 @@ def main() -> None:
             for stream in (requests, answers):  # of a worker that dies nothing may stay open
                 stream.close()
             _run(json.loads(line)["arguments"], report)
-        code, found = _wait(child), _report(report)
-        answers.write(json.dumps({"code": code, "imported": found.get("imported", {})}).encode() + b"\n")
+        code, reported = _wait(child), _report(report)
+        answers.write(json.dumps({"code": code, "imported": reported.get("imported", {})}).encode() + b"\n")
         answers.flush()
-        _load(found.get("loaded", []))
+        _load(reported.get("loaded", []))
 
 
 def _report(report: BinaryIO) -> dict[str, Any]:

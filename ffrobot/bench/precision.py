@@ -39,21 +39,21 @@ NEGLIGIBLE_PEAK = 1e-6
 
 def histories(results: Results, analysis: str) -> dict[str, dict[str, Array]]:
     """Return the histories whose errors are measured, by kind and dataset: arrays (T,) or (T, columns), SI units."""
-    found = _datasets(results, analysis, _KIND_OF)
-    if "displacement" not in found:
-        found |= _datasets(results, analysis, _WITHOUT_DEFLECTION)
-    return found
+    named = _datasets(results, analysis, _KIND_OF)
+    if "displacement" not in named:
+        named |= _datasets(results, analysis, _WITHOUT_DEFLECTION)
+    return named
 
 
 def _datasets(results: Results, analysis: str, kinds: Mapping[tuple[str, str], str]) -> dict[str, dict[str, Array]]:
-    found: dict[str, dict[str, Array]] = {}
+    named: dict[str, dict[str, Array]] = {}
     for (group, dataset), kind in kinds.items():
         for member in results.names(f"{analysis}/{group}"):
             name = f"{group}/{member}/{dataset}"
             if results.has(f"{analysis}/{name}"):
-                found.setdefault(kind, {})[name] = results[f"{analysis}/{name}"]
+                named.setdefault(kind, {})[name] = results[f"{analysis}/{name}"]
     notable: dict[str, dict[str, Array]] = {}
-    for kind, datasets in found.items():
+    for kind, datasets in named.items():
         peaks = {name: float(np.abs(values).max(initial=0.0)) for name, values in datasets.items()}
         least = NEGLIGIBLE_PEAK * max(peaks.values())
         if kept := {name: values for name, values in datasets.items() if peaks[name] > least}:
@@ -61,16 +61,18 @@ def _datasets(results: Results, analysis: str, kinds: Mapping[tuple[str, str], s
     return notable
 
 
-def errors(found: Mapping[str, Mapping[str, Array]], reference: Mapping[str, Mapping[str, Array]]) -> dict[str, float]:
+def errors(
+    measured: Mapping[str, Mapping[str, Array]], reference: Mapping[str, Mapping[str, Array]]
+) -> dict[str, float]:
     """Return, by kind, the largest difference at any output, relative to the peak of the same dataset in `reference`.
 
     Kinds that the reference does not have are left out, and datasets that only one of them has.
     """
     result = {}
     for kind, datasets in reference.items():
-        common = datasets.keys() & found.get(kind, {}).keys()
+        common = datasets.keys() & measured.get(kind, {}).keys()
         if common:
-            result[kind] = max(relative(found[kind][name], datasets[name]) for name in common)
+            result[kind] = max(relative(measured[kind][name], datasets[name]) for name in common)
     return result
 
 
@@ -174,10 +176,10 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
         if not deadline.passed:
             raise KeyboardInterrupt
         status = "over budget"
-    found: dict[str, dict[str, Array]] = {}
+    datasets: dict[str, dict[str, Array]] = {}
     if keep and status == "completed":
         with Results.from_image(results_image(solution), scene.path) as results:
-            found = histories(results, name)
+            datasets = histories(results, name)
     return TimedRun(
         integrator=last.statistics.integrator.name,
         status=status,
@@ -185,7 +187,7 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
         steps=sum(each.steps for each in runs),
         rejected=sum(each.rejected for each in runs),
         evaluations=sum(each.evaluations for each in runs),
-        histories=found,
+        histories=datasets,
         bodies={name: body.file_hash for name, body in solution.bodies.items() if body.path},
     )
 
@@ -444,22 +446,22 @@ class _Trials:
         return self.done[key]
 
     def row(self, axis: str, elements: float, modes: float, tolerance: float, best: TimedRun | str | None) -> Row:
-        found, scene = self(elements, modes, tolerance), self._scene(elements, modes)
+        timed, scene = self(elements, modes, tolerance), self._scene(elements, modes)
         assert scene is not None
-        completed = isinstance(found, TimedRun) and found.completed
+        completed = isinstance(timed, TimedRun) and timed.completed
         error: dict[str, float] = {}
-        if completed and isinstance(best, TimedRun) and isinstance(found, TimedRun):
-            error = errors(found.histories, best.histories)
+        if completed and isinstance(best, TimedRun) and isinstance(timed, TimedRun):
+            error = errors(timed.histories, best.histories)
         return {
             "axis": axis,
             "times": modes if axis == "modes" else elements,
             **sizes_of(scene),
             "tolerance": tolerance,
-            "status": found.status if isinstance(found, TimedRun) else "refused",
+            "status": timed.status if isinstance(timed, TimedRun) else "refused",
             "against": best.status if isinstance(best, TimedRun) else "refused",
-            "why": found if isinstance(found, str) else best if isinstance(best, str) else None,
-            "integrator": found.integrator if isinstance(found, TimedRun) else None,
-            "seconds": found.seconds if isinstance(found, TimedRun) else None,
+            "why": timed if isinstance(timed, str) else best if isinstance(best, str) else None,
+            "integrator": timed.integrator if isinstance(timed, TimedRun) else None,
+            "seconds": timed.seconds if isinstance(timed, TimedRun) else None,
             **{f"error_{kind}": error.get(kind) for kind in KINDS},
         }
 

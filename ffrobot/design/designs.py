@@ -84,13 +84,13 @@ def _needed(scene: Scene, responses: Sequence[Response]) -> set[str]:
     names = [one.name for one in scene.analysis]
     moving = next((one.name for one in scene.analysis if isinstance(one, TimedAnalysis)), names[0])
     default = {False: names[0], True: moving}
-    found = {
+    named = {
         response.analysis if response.analysis in names else default[response.is_of_rest] for response in responses
     } or {names[0]}
     for one in reversed(scene.analysis):  # each rests on earlier ones only
-        if one.name in found and one.source is not None:
-            found.add(one.source)
-    return {str(name) for name in found}
+        if one.name in named and one.source is not None:
+            named.add(one.source)
+    return {str(name) for name in named}
 
 
 Point = tuple[float, ...]
@@ -214,15 +214,15 @@ class Designs:
 
     def problem(self, *points: Point) -> str:
         """Return the error of the scene or a link file if it exists at all of `points`, before any run; else ""."""
-        found = ""
+        text = ""
         for point in points:
             try:
                 check_point(self._sweep, point)
             except InputError as error:
-                found = str(error)
+                text = str(error)
             else:
                 return ""
-        return found
+        return text
 
     def run_first(self, point: Point) -> Design:
         """The design at `point`. Raises `InputError` or `SolveError` where it does not complete."""

@@ -107,14 +107,14 @@ class Evaluations:
         try:
             with design.results() as results:
                 readings = tuple(response.read(results) for response in self.problem.responses)
-                found = Evaluated(place, design, readings, again=repeated_steps(results))
+                evaluated = Evaluated(place, design, readings, again=repeated_steps(results))
         except InputError as error:
             if first:  # a response that means nothing
                 raise
             return Evaluated(place, design, (), str(error))
         if first:
-            self.problem = replace(self.problem, scale=found.values[0] or 1.0)
-        return found
+            self.problem = replace(self.problem, scale=evaluated.values[0] or 1.0)
+        return evaluated
 
     def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:
         known = base.place, design.folder
@@ -123,13 +123,13 @@ class Evaluations:
         return self._followed[known]
 
 
-def write_designs(found: Evaluations, path: Path) -> None:
+def write_designs(tried: Evaluations, path: Path) -> None:
     """One line for each design of a search: values of keys and responses, the largest excess of a limit, its folder."""
-    problem = found.problem
+    problem = tried.problem
     responses = [problem.objective.text, *(limit.text for limit in problem.limits)]
-    columns = ["design", *map(".".join, found.space.keys), "status", *responses, "violation", "folder", "message"]
+    columns = ["design", *map(".".join, tried.space.keys), "status", *responses, "violation", "folder", "message"]
     rows: list[list[object]] = []
-    for k, one in enumerate(found.searched):
+    for k, one in enumerate(tried.searched):
         row = one.design.row
         values = one.values if one.completed else ("",) * len(responses)
         violation = problem.violation(one.readings) if one.completed else ""
@@ -180,24 +180,24 @@ class Differentiation:
         """Return gradients at a completed design; `judged`: with an error estimate from further runs."""
         wanted = [j for j, variable in enumerate(self.evaluations.space.variables) if not variable.is_catalogue]
         if self.repeats and base.again is not None and wanted:
-            found = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
+            slopes = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
             self._tried = True
             if self.repeats:
-                return found
+                return slopes
         return self._by_own_steps(base, wanted, pairs=judged or bool(np.isnan(self.curvature[:, wanted]).any()))
 
     def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], *, judged: bool) -> Slopes:
         """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
         offsets = {j: self._offsets(base, j, ROUND_OFF, pairs=False) for j in wanted}
         samples = self._samples(base, offsets, base.again)
-        found = self._slopes(base, samples, ROUND_OFF, np.zeros_like(self.curvature))
+        slopes = self._slopes(base, samples, ROUND_OFF, np.zeros_like(self.curvature))
         if judged and all(samples.values()):
             left = self._left_of_sum(base, samples)
-            moved = sum(np.abs(found.gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
+            moved = sum(np.abs(slopes.gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
             self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUND_OFF * np.abs(base.values)))
             for j, beside in samples.items():
-                found.error[:, j] += left / abs(next(iter(beside)))
-        return found
+                slopes.error[:, j] += left / abs(next(iter(beside)))
+        return slopes
 
     def _left_of_sum(self, base: Evaluated, samples: Mapping[int, Beside]) -> Array:
         """(r) |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h; 0 if there is no run."""
@@ -222,16 +222,16 @@ class Differentiation:
         self, base: Evaluated, offsets: Mapping[int, list[float]], again: Mapping[Key, Any] | None
     ) -> dict[int, Beside]:
         """By variable: the responses beside the base by offset; other offsets where a design there has failed."""
-        found: dict[int, Beside] = {j: {} for j in offsets}
+        beside: dict[int, Beside] = {j: {} for j in offsets}
         for _ in range(2):
             moved = [(j, offset) for j in offsets for offset in offsets[j]]
             responses = self.evaluations.beside(base, [_moved(base.place, j, offset) for j, offset in moved], again)
             for (j, offset), values in zip(moved, responses, strict=True):
                 if values and all(np.isfinite(one.value) for one in values):
-                    found[j][offset] = values
-            left = {j: [-x for x in tried if -x not in tried] for j, tried in offsets.items() if not found[j]}
+                    beside[j][offset] = values
+            left = {j: [-x for x in tried if -x not in tried] for j, tried in offsets.items() if not beside[j]}
             offsets = {j: [x for x in others if 0.0 <= base.place[j] + x <= 1.0] for j, others in left.items()}
-        return found
+        return beside
 
     def _offsets(self, base: Evaluated, j: int, noise: float, *, pairs: bool) -> list[float]:
         """Within the bounds: forward where there is room, with the other of a pair on the far side or twice as far."""
@@ -321,12 +321,12 @@ def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> O
     reached = np.flatnonzero(excess > -ACTIVE)
     low, high = (np.intersect1d(free, np.flatnonzero(near)) for near in (place < ACTIVE, place > 1.0 - ACTIVE))
     gradients = np.vstack([scaled[1 + reached], -unit[low], unit[high]])[:, free]
-    found = nnls(gradients.T, -scaled[0, free])[0] if len(gradients) and free.size else np.zeros(len(gradients))
-    of_limits, of_low, of_high = np.split(found, np.cumsum([reached.size, low.size]))
+    multipliers = nnls(gradients.T, -scaled[0, free])[0] if len(gradients) and free.size else np.zeros(len(gradients))
+    of_limits, of_low, of_high = np.split(multipliers, np.cumsum([reached.size, low.size]))
     limits, bounds = np.full(len(problem.limits), np.nan), np.full(place.size, np.nan)
     limits[reached], bounds[low], bounds[high] = of_limits, -of_low, of_high
     return Optimality(
-        limits, bounds, _largest(scaled[0, free] + found @ gradients),
+        limits, bounds, _largest(scaled[0, free] + multipliers @ gradients),
         gap=float(of_limits @ np.maximum(-excess[reached], 0.0)),
         gradient_error=_largest((slopes.error * np.abs(factors))[0, free]),
         violation=problem.violation(design.readings), kinks=slopes.kinks,

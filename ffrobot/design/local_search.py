@@ -249,25 +249,25 @@ def search_from(
     (first,) = evaluations.at([start])
     if not first.completed:
         return Local(first, first, None, first.failure)
-    best, found, message = first, None, ""
+    best, optimum, message = first, None, ""
     try:
         for optimizer, judged in ((method, False), (method, True), ("trust-constr", True)):
             best, message = _pass(optimizer, differentiation, best, tell, judged=judged)
-            found = _stands(differentiation, best)
-            if found.reached(AIM):
-                return Local(first, best, found)
-            if found.violation > KEPT:
+            optimum = _stands(differentiation, best)
+            if optimum.reached(AIM):
+                return Local(first, best, optimum)
+            if optimum.violation > KEPT:
                 best, _ = _pass("slsqp", differentiation, best, tell, judged=judged, excess=True)
-                found = _stands(differentiation, best)
-                if judged and found.violation > KEPT:
-                    return Local(first, best, found, BEYOND)
-        message = KINK if found is not None and found.kinks else message
+                optimum = _stands(differentiation, best)
+                if judged and optimum.violation > KEPT:
+                    return Local(first, best, optimum, BEYOND)
+        message = KINK if optimum is not None and optimum.kinks else message
     except (SpentError, StuckError) as error:
         spent = isinstance(error, SpentError)
         message = f"ended after {evaluations.designs.count} runs, as many as were allowed" if spent else str(error)
         last = best_of(evaluations, [best, *evaluations.searched[begun:]])
-        return Local(first, last, found if last is best else None, message, spent=spent)
-    return Local(first, best, found, message)
+        return Local(first, last, optimum if last is best else None, message, spent=spent)
+    return Local(first, best, optimum, message)
 
 
 def _pass(

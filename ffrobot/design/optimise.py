@@ -106,11 +106,11 @@ def _designs(runner: Runs, space: DesignSpace, responses: Sequence[Response], to
 
 def _starts(space: DesignSpace, count: int, seed: int) -> list[Place]:
     """The scene itself, where it is in all bounds and catalogs, and places of a Latin hypercube."""
-    found = [] if space.start_place is None else [space.start_place]
+    places = [] if space.start_place is None else [space.start_place]
     if count > 1:
         sample = LatinHypercube(len(space.variables), seed=seed).random(count - 1)
-        found += [tuple(map(float, row)) for row in sample]
-    return found
+        places += [tuple(map(float, row)) for row in sample]
+    return places
 
 
 def _search(
@@ -128,20 +128,20 @@ def _search(
     first, best = evaluations.searched[0], best_of(evaluations, evaluations.searched)
     if not best.completed or all(variable.is_catalogue for variable in evaluations.space.variables):
         return [Local(first, best, None, message)]
-    found = search_from(best.place, "slsqp", differentiation, watcher)
-    words = "; ".join(text for text in (message, found.message) if text)
-    return [Local(first, found.best, found.optimality, words)]
+    local = search_from(best.place, "slsqp", differentiation, watcher)
+    words = "; ".join(text for text in (message, local.message) if text)
+    return [Local(first, local.best, local.optimality, words)]
 
 
 def _from_starts(
     method: str, differentiation: Differentiation, starts: Sequence[Place], watcher: Watcher
 ) -> list[Local]:
-    found: list[Local] = []
+    optima: list[Local] = []
     for k, place in enumerate(starts):
         title = f"start {k + 1} of {len(starts)}: " if len(starts) > 1 else ""
         with suppress(SpentError):
-            found.append(search_from(place, method, differentiation, watcher, title))
-    return found
+            optima.append(search_from(place, method, differentiation, watcher, title))
+    return optima
 
 
 def _optimum(
@@ -324,17 +324,17 @@ class _Searches:
                 f'--against: expected responses with different optima: where "{self.problem.objective.text}" is'
                 f' least, "{self.against.text}" is too'
             )
-        found = [first]
+        points = [first]
         for k, bound in enumerate(_between(high, low, count), start=2):
             limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
-            found.append(self._least(replace(self.problem, limits=limits), found[-1].design.place, f"{k} of {count}"))
+            points.append(self._least(replace(self.problem, limits=limits), points[-1].design.place, f"{k} of {count}"))
         unit, other = (one.unit for one in self._both(first.design))
         return Front(
             scene=self.runner.path,
             responses=(self.problem.objective.text, self.against.text),
             units=(unit, other),
             keys=tuple(map(".".join, self.space.keys)),
-            points=(*found, last),
+            points=(*points, last),
             runs=self.designs.count,
             tolerance=self.tolerance,
             space=self.space,
@@ -344,33 +344,33 @@ class _Searches:
 
     def _least(self, problem: DesignProblem, start: Place, title: str) -> FrontPoint:
         evaluations, runner = Evaluations(self.designs, self.space, problem), self.runner
-        differentiation, found = Differentiation(evaluations, self.tolerance), None
+        differentiation, local = Differentiation(evaluations, self.tolerance), None
         with suppress(SpentError):
-            found = search_from(start, "slsqp", differentiation, runner.watcher, f"{title}: ")
-        if found is None or found.spent:
+            local = search_from(start, "slsqp", differentiation, runner.watcher, f"{title}: ")
+        if local is None or local.spent:
             most = self.designs.most
             raise SolveError(f"{runner.path}: ended before {title} points after {most} runs, as many as allowed")
         self.tried |= {one.design.folder: one for one in evaluations.searched}
-        if not found.best.completed:
-            raise SolveError(f"{runner.path}: no design could be run to its end: {found.message}")
-        response, against = (one.value for one in self._both(found.best))
+        if not local.best.completed:
+            raise SolveError(f"{runner.path}: no design could be run to its end: {local.message}")
+        response, against = (one.value for one in self._both(local.best))
         return FrontPoint(
-            point=self.space.point(found.best.place),
+            point=self.space.point(local.best.place),
             response=response,
             against=against,
-            price=self._price(found, evaluations.problem),
-            converged=found.optimality is not None and found.optimality.reached(AIM),
-            feasible=evaluations.problem.violation(found.best.readings) <= KEPT,
-            message=found.message,
-            design=found.best,
+            price=self._price(local, evaluations.problem),
+            converged=local.optimality is not None and local.optimality.reached(AIM),
+            feasible=evaluations.problem.violation(local.best.readings) <= KEPT,
+            message=local.message,
+            design=local.best,
         )
 
-    def _price(self, found: Local, problem: DesignProblem) -> float:
+    def _price(self, local: Local, problem: DesignProblem) -> float:
         """Return ∂response/∂limit of the second response, the first limit: 0 if inactive, NaN at the ends."""
-        if found.optimality is None or not problem.limits or problem.limits[0].response is not self.against:
+        if local.optimality is None or not problem.limits or problem.limits[0].response is not self.against:
             return np.nan
-        scale = problem.limits[0].scale * problem.factors(found.best.values)[0]
-        return float(-np.nan_to_num(found.optimality.limits[0]) / scale)
+        scale = problem.limits[0].scale * problem.factors(local.best.values)[0]
+        return float(-np.nan_to_num(local.optimality.limits[0]) / scale)
 
     def _with_both(self, one: Evaluated) -> Evaluated:
         """With readings of all responses, those of the limits, and the second one."""

@@ -180,9 +180,9 @@ class Optimum(Finding):
         """Shadow prices (n,) ∂response/∂bound, SI units; NaN for inactive bounds."""
         if self.optimality is None:
             return np.full(len(self.space.variables), np.nan)
-        found = -self.optimality.bounds / self.problem.factors(self.best.values)[0]
+        prices = -self.optimality.bounds / self.problem.factors(self.best.values)[0]
         pairs = zip(self.space.variables, self.best.place, strict=True)
-        return np.array(found / [np.nan if variable.is_catalogue else variable.slope(u) for variable, u in pairs])
+        return np.array(prices / [np.nan if variable.is_catalogue else variable.slope(u) for variable, u in pairs])
 
     @property
     def shortfall(self) -> str:

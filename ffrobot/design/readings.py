@@ -66,8 +66,8 @@ class Reading:
         """Note on a value between outputs, or on its uncertainty; empty without either."""
         if not self.is_between:
             return self.doubt
-        found = f"found {self.missed_by:.6g} near outputs, {self.value:.6g} between them, which counts"
-        return f"{found}: with a smaller output_step histories have it, too"
+        values = f"found {self.missed_by:.6g} near outputs, {self.value:.6g} between them, which counts"
+        return f"{values}: with a smaller output_step histories have it, too"
 
 
 @dataclass(frozen=True)
@@ -161,19 +161,19 @@ def read_history(results: Results, name: str, option: str) -> History:
     """
     match = COLUMN.fullmatch(name)
     wanted = match["dataset"] if match else name
-    found = _known(results).get(wanted.replace("/", "."))
-    if found is None:
+    dataset = _known(results).get(wanted.replace("/", "."))
+    if dataset is None:
         known = sorted((key for key in _known(results) if "." in key), key=lambda key: not key.startswith("joints."))
         raise InputError(
             f'{option}: expected the name of a history, such as "{next(iter(known), "tip_error")}", found'
             f' "{wanted}"{did_you_mean(wanted.replace("/", "."), known)}'
         )
-    is_power = found.endswith(f"/{POWER}")
-    values = _power(results, found) if is_power else results.data(found)
-    about = results.attributes(found.removesuffix(f"/{POWER}"))
+    is_power = dataset.endswith(f"/{POWER}")
+    values = _power(results, dataset) if is_power else results.data(dataset)
+    about = results.attributes(dataset.removesuffix(f"/{POWER}"))
     names = (PEAK_POWER, RMS_POWER, MEAN_POWER) if is_power else ("peak", "rms", "mean")
     sizes = [np.atleast_1d(about.get(key, np.nan)) for key in names]
-    time, in_doubt = results.time(found), False
+    time, in_doubt = results.time(dataset), False
     if match:
         k = int(match["column"])
         if k >= values.shape[1]:
@@ -185,10 +185,12 @@ def read_history(results: Results, name: str, option: str) -> History:
         else:
             sizes = [one[k : k + 1] if len(one) == values.shape[1] else np.array([np.nan]) for one in sizes]
         values = values[:, k : k + 1]
-    elif is_vector(results, found, values):
+    elif is_vector(results, dataset, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
     largest, rms, mean = (float(one.max()) for one in sizes)
-    return History(name, _unit(results, found).replace(" ", "·"), time, as_floats(values), largest, rms, mean, in_doubt)
+    return History(
+        name, _unit(results, dataset).replace(" ", "·"), time, as_floats(values), largest, rms, mean, in_doubt
+    )
 
 
 def read_column(results: Results, name: str, option: str) -> History:
@@ -201,9 +203,9 @@ def read_column(results: Results, name: str, option: str) -> History:
 
 def _known(results: Results) -> dict[str, str]:
     """Datasets over time by the names they go by."""
-    found = [f"{analysis}/{name}" for analysis in results.analyses for name in _histories(results, analysis)]
-    found += [f"{m[0]}/{POWER}" for m in map(JOINT.match, found) if m and f"{m[0]}/moment" in results]
-    return by_dots(results, found)
+    names = [f"{analysis}/{name}" for analysis in results.analyses for name in _histories(results, analysis)]
+    names += [f"{m[0]}/{POWER}" for m in map(JOINT.match, names) if m and f"{m[0]}/moment" in results]
+    return by_dots(results, names)
 
 
 def _histories(results: Results, analysis: str) -> list[str]:

@@ -183,11 +183,11 @@ class OfValue(Response):
     def read(self, results: Results) -> Reading:
         """Return the number in the scene of the results."""
         parts = tuple(self.key.split("."))
-        found = value_of(results.scene, parts, option=f'"{self.text}"')
-        if isinstance(found, bool) or not isinstance(found, int | float):
-            what = "none" if found is None else repr(found)
+        value = value_of(results.scene, parts, option=f'"{self.text}"')
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            what = "none" if value is None else repr(value)
             raise InputError(f'"{self.text}": expected a number of the scene file at {self.key}, found {what}')
-        return Reading(float(found))
+        return Reading(float(value))
 
 
 def parse_response(text: str, option: str = "--of") -> Response:
@@ -336,8 +336,10 @@ class DesignProblem:
 def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> DesignProblem:
     """Return the problem of the command line's objective and limits. Raises `InputError` without one objective."""
     if (minimise is None) == (maximise is None):
-        found = "both" if minimise is not None else "none"
-        raise InputError(f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {found}")
+        objectives = "both" if minimise is not None else "none"
+        raise InputError(
+            f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {objectives}"
+        )
     objective = (
         parse_response(minimise, "--minimise") if minimise is not None else parse_response(maximise or "", "--maximise")
     )

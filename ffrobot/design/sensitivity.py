@@ -65,9 +65,9 @@ def derivative(offsets: Array, values: Array) -> Derivative:
     sizes = np.unique(np.abs(offsets[offsets != 0.0]))[::-1]
     best = Derivative(np.nan, np.nan, np.nan)
     for first, last in combinations(range(sizes.size + 1), 2):
-        found = _of_window(offsets, values, sizes[first:last]) if last - first <= LEVELS else None
-        if found is not None and not found.error >= best.error:
-            best = found
+        estimate = _of_window(offsets, values, sizes[first:last]) if last - first <= LEVELS else None
+        if estimate is not None and not estimate.error >= best.error:
+            best = estimate
     return best
 
 
@@ -176,18 +176,18 @@ def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
     whole = [one for one in samples if one.responses and np.isfinite(one.responses[g].value)]
     offsets = np.array([0.0, *(one.offset for one in whole)])
     nominal, beside = base.readings[g], [one.responses[g] for one in whole]
-    found = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
+    slope = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
     by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
-    unresolved = abs(by_coarse - found.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
+    unresolved = abs(by_coarse - slope.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
     size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
-    found = found._replace(error=found.error + unresolved + base.repeats * max(abs(found.value), size))
+    slope = slope._replace(error=slope.error + unresolved + base.repeats * max(abs(slope.value), size))
     notes = [*_notes(base, g, k, samples)]
-    if _is_rough(base, g, k, found.error - unresolved, found.value):
+    if _is_rough(base, g, k, slope.error - unresolved, slope.value):
         notes.append("not smooth, or noisy: half of the step yields another derivative")
-    if _is_rough(base, g, k, unresolved, found.value):
+    if _is_rough(base, g, k, unresolved, slope.value):
         notes.append("the peak lies between outputs that are too far apart: take a smaller output_step")
-    return Entry(*found, _method(base, offsets, found.value), tuple(notes), unresolved)
+    return Entry(*slope, _method(base, offsets, slope.value), tuple(notes), unresolved)
 
 
 def _method(base: Base, offsets: Array, value: float) -> Method:
@@ -445,8 +445,8 @@ def _beside(
     taken = {(one.k, one.offset) for one in samples}
     places = [(k, part * base.steps[k]) for k in which for part in parts]
     new = [place for place in places if place not in taken]
-    found = designs.run([base.moved(k, offset) for k, offset in new], base.again)
+    ran = designs.run([base.moved(k, offset) for k, offset in new], base.again)
     return [
         Sample(k, offset, design.follow(base.responses, base.readings), design.failure)
-        for (k, offset), design in zip(new, found, strict=True)
+        for (k, offset), design in zip(new, ran, strict=True)
     ]

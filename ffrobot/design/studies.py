@@ -32,10 +32,10 @@ class FiniteRange(FloatRange):
 
     def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> Any:
         """Return the number within the range; other input fails."""
-        found = super().convert(value, param, ctx)
-        if not isfinite(found):
-            self.fail(f"{found} is not a finite number.", param, ctx)
-        return found
+        converted = super().convert(value, param, ctx)
+        if not isfinite(converted):
+            self.fail(f"{converted} is not a finite number.", param, ctx)
+        return converted
 
     def _describe_range(self) -> str:
         return "" if self.min is None and self.max is None else super()._describe_range()

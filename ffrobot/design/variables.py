@@ -113,11 +113,11 @@ class DesignSpace:
 
     def start(self) -> tuple[float | None, ...]:
         """Coordinates of the scene itself; None where it is out of bounds or in no catalog."""
-        first, found = 0, []
+        first, indices = 0, []
         for variable in self.variables:
-            found.append(variable.coordinate(self.own[first : first + len(variable.keys)]))
+            indices.append(variable.coordinate(self.own[first : first + len(variable.keys)]))
             first += len(variable.keys)
-        return tuple(found)
+        return tuple(indices)
 
     @property
     def start_place(self) -> Place | None:

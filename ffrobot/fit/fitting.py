@@ -150,14 +150,14 @@ class RobotTarget:
                 of_links.setdefault(key[1], {})[key[2:]] = value
             else:
                 of_scene["body", key[1], "link", *key[2:]] = value
-        found = {}
+        texts = {}
         for body, values in of_links.items():
             old = self._links[body]
             new = _fitted_name(old, f".{body}")
-            found[new] = with_values(read_text(old, "link file"), values)
+            texts[new] = with_values(read_text(old, "link file"), values)
             link = next(entry["link"] for entry in self._scene["body"] if entry["name"] == body)
             of_scene["body", body, "link"] = Path(link).with_name(new.name).as_posix()
-        return found | {path: with_values(read_text(self._path, "scene file"), of_scene)}
+        return texts | {path: with_values(read_text(self._path, "scene file"), of_scene)}
 
 
 DIGITS = 8  # of fitted values in files: more than measured ones have
@@ -208,24 +208,22 @@ def fit_measured(
 
     def frequencies(values: Array) -> Array:
         try:
-            family, found = target.modes(changes(values))
+            family, fit = target.modes(changes(values))
         except FfrobotError as error:
             at = ", ".join(f"{'.'.join(key)} = {value:.6g}" for key, value in changes(values).items())
             raise type(error)(f"with {at}:\n{error}") from None
-        return _of_rows(table, rows, family, found)
+        return _of_rows(table, rows, family, fit)
 
     for new in target.files(starts, place):  # before any work is done
         check_new_file(new, replace=force)
     keys = ["=".join(".".join(key) for key in group) for group in groups]
     start = np.array([starts[group[0]] for group in groups])
     measured_at = np.array([row.frequency for row in rows], dtype=np.float64)
-    found = fit_frequencies(
-        frequencies, keys, start, [row.label for row in rows], measured_at, _uncertainty(table, rows)
-    )
-    texts = target.files({key: float(f"{value:.{DIGITS}g}") for key, value in changes(found.value).items()}, place)
+    fit = fit_frequencies(frequencies, keys, start, [row.label for row in rows], measured_at, _uncertainty(table, rows))
+    texts = target.files({key: float(f"{value:.{DIGITS}g}") for key, value in changes(fit.value).items()}, place)
     for new, text in texts.items():
         write_atomically(new, text.encode(), "fitted file")
-    return replace(found, files=tuple(map(str, texts)))
+    return replace(fit, files=tuple(map(str, texts)))
 
 
 def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
@@ -240,8 +238,8 @@ def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
 def _start(path: Path, target: LinkTarget | RobotTarget, key: Key) -> float:
     value = target.start(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
-        found = "none" if value is None else repr(value)
-        raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}, found {found}")
+        text = "none" if value is None else repr(value)
+        raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}, found {text}")
     return float(value)
 
 

@@ -119,17 +119,17 @@ def fit_frequencies(
 
     origin = np.zeros(len(keys))
     check_distinguishable(jacobian(origin), keys)
-    found = least_squares(residuals, origin, jac=jacobian, max_nfev=MOST_EVALUATIONS, xtol=1e-10, ftol=1e-14)
-    if not found.success:
+    optimum = least_squares(residuals, origin, jac=jacobian, max_nfev=MOST_EVALUATIONS, xtol=1e-10, ftol=1e-14)
+    if not optimum.success:
         raise SolveError(f"fit: no convergence within {MOST_EVALUATIONS} steps: start nearer to the measured values")
-    J, r = jacobian(found.x), found.fun
+    J, r = jacobian(optimum.x), optimum.fun
     check_distinguishable(J, keys)
     deviation, correlation = _uncertainty(J, r, known=uncertainty is not None)
-    before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, found.x))
+    before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, optimum.x))
     return Fit(
         keys=tuple(keys),
         start=as_floats(start),
-        value=as_floats(start * np.exp(found.x)),
+        value=as_floats(start * np.exp(optimum.x)),
         relative_deviation=deviation,
         correlation=correlation,
         labels=tuple(labels),

@@ -198,8 +198,8 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     numbers = np.flatnonzero(good)
     parts = [numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART)]
     named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
-    found = _judged(plan, evaluator, postures, named, processes, watcher)
-    return _assembled(plan, solution, evaluator, postures, [(part, found[name]) for name, part in named.items()])
+    judged = _judged(plan, evaluator, postures, named, processes, watcher)
+    return _assembled(plan, solution, evaluator, postures, [(part, judged[name]) for name, part in named.items()])
 
 
 def check_point(solution: Solution, point: str) -> None:
@@ -218,7 +218,7 @@ def _judged(
 ) -> Mapping[str, Mapping[str, Array]]:
     """Findings by name of the part, from files or by processes of their own."""
     files = {name: plan.folder / PARTS / f"{name}.npz" for name in parts}
-    known = {name: found for name, file in files.items() if (found := _read(file)) is not None}
+    known = {name: columns for name, file in files.items() if (columns := _read(file)) is not None}
     left = {name: part for name, part in parts.items() if name not in known}
     watcher.stage(f"{sum(map(len, left.values()))} poses")
     global _evaluator
@@ -228,9 +228,9 @@ def _judged(
         futures = {pool.submit(_judge, postures.q[part]): name for name, part in left.items()}
         try:
             for future in as_completed(futures):
-                name, found = futures[future], future.result()
-                _write(files[name], found)
-                known[name] = found
+                name, columns = futures[future], future.result()
+                _write(files[name], columns)
+                known[name] = columns
                 watcher.advance(len(known), len(parts))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -252,16 +252,16 @@ def _serve(parent: int) -> None:
 
 def _judge(q: Array) -> dict[str, Array]:
     """Findings of the poses q (N, n_q) by name, (N, …); nan where there is no equilibrium."""
-    found: list[dict[str, Array] | None] = []
+    poses: list[dict[str, Array] | None] = []
     for each in q:
         try:
-            found.append(_evaluator.at(each))
+            poses.append(_evaluator.at(each))
         except SolveError:
-            found.append(None)
-    judged = next((one for one in found if one is not None), {})
+            poses.append(None)
+    judged = next((one for one in poses if one is not None), {})
     none = {name: np.full_like(value, np.nan) for name, value in judged.items()}
-    table = {name: np.array([(one or none)[name] for one in found]) for name in judged}
-    return {"stands": np.array([one is not None for one in found]), **table}
+    table = {name: np.array([(one or none)[name] for one in poses]) for name in judged}
+    return {"stands": np.array([one is not None for one in poses]), **table}
 
 
 def _read(path: Path) -> dict[str, Array] | None:
@@ -270,9 +270,9 @@ def _read(path: Path) -> dict[str, Array] | None:
     return None
 
 
-def _write(path: Path, found: Mapping[str, Array]) -> None:
+def _write(path: Path, columns: Mapping[str, Array]) -> None:
     content = io.BytesIO()
-    np.savez(content, **found)
+    np.savez(content, **columns)
     write_atomically(path, content.getvalue(), "part of the map", make_folder=True, ours=True)
 
 
@@ -298,10 +298,10 @@ def _kept_postures(plan: MapPlan, request: Mapping[str, Any]) -> Postures | None
         raise InputError(f"{plan.folder}: output: expected a new folder or one of a map, found one with other files")
     if before.get("asked") != request["asked"] or changed(before.get("inputs", {}), request["inputs"]):
         return None
-    found = _read(plan.folder / POSTURES) or {}
-    if found.keys() != set(Postures._fields):
+    stored = _read(plan.folder / POSTURES) or {}
+    if stored.keys() != set(Postures._fields):
         return None
-    return Postures(found["q"], found["reached"].astype(bool), found["within"].astype(bool))
+    return Postures(stored["q"], stored["reached"].astype(bool), stored["within"].astype(bool))
 
 
 def _claim(plan: MapPlan, request: Mapping[str, Any], postures: Postures) -> None:
@@ -321,10 +321,10 @@ def _assembled(
 ) -> PoseMap:
     status = np.where(postures.reached, np.where(postures.within, 0, OUTSIDE_LIMITS), OUT_OF_REACH).astype(np.intp)
     values: dict[str, Array] = {}
-    for part, found in parts:
-        stands: Booleans = found["stands"].astype(bool)
+    for part, columns in parts:
+        stands: Booleans = columns["stands"].astype(bool)
         status[part[~stands]] = NO_EQUILIBRIUM
-        for name, value in found.items():
+        for name, value in columns.items():
             if name != "stands":
                 whole = values.setdefault(name, np.full((len(status), *value.shape[1:]), np.nan))
                 whole[part] = value

@@ -125,8 +125,8 @@ def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
     lines = ["; ".join(kept)]
     for name, errors in choice.errors.items():
         if any(errors.values()):
-            found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
-            lines.append(f"{name}: error of leaving out the others, estimated: {found}")
+            largest = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
+            lines.append(f"{name}: error of leaving out the others, estimated: {largest}")
         else:
             lines.append(
                 f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
@@ -149,7 +149,7 @@ UNDAMPED = 1e-9  # ratios below are round-off
 
 
 def _control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
-    loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
+    loops = {name: record.metrics for name, record in details.items() if isinstance(record, LoopRecord)}
     yield from named_tables("closed loop", ((name, loop_cells(metrics)) for name, metrics in loops.items()))
     kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {
         "linear model": (LinearModels, _linear),
@@ -157,15 +157,15 @@ def _control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
         "placement": (Placed, _placement),
     }
     for first, (kind, rows_of) in kinds.items():
-        mine = ((name, found) for name, found in details.items() if isinstance(found, kind))
-        yield from named_tables(first, (row for name, found in mine for row in rows_of(name, found)))
+        mine = ((name, record) for name, record in details.items() if isinstance(record, kind))
+        yield from named_tables(first, (row for name, record in mine for row in rows_of(name, record)))
 
 
 Rows = Iterator[tuple[str, Cells]]
 
 
-def _linear(name: str, found: LinearModels) -> Rows:
-    for model, modes in zip(found.models, found.modes, strict=True):
+def _linear(name: str, linear: LinearModels) -> Rows:
+    for model, modes in zip(linear.models, linear.modes, strict=True):
         cells = {
             "t (s)": f"{model.time:g}",
             "DOF": f"{model.freedom}",
@@ -179,8 +179,8 @@ def _lowest(frequency: Array) -> str:
     return ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES])
 
 
-def _conditions(name: str, found: LinearModels | RobotAtRest) -> Rows:
-    for t, at in zip(found.times, found.conditions, strict=True):
+def _conditions(name: str, at_rest: LinearModels | RobotAtRest) -> Rows:
+    for t, at in zip(at_rest.times, at_rest.conditions, strict=True):
         for condition, state in at.items():
             stiffness = [(point, *_stiffness(C)) for point, C in state.compliance.items()] or [("", "", "")]
             for k, (point, along, least) in enumerate(stiffness):
@@ -227,18 +227,18 @@ def _placement(name: str, placed: Placed) -> Rows:
 
 def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
     """Explain closed loops, a line each: columns, damping ratios, zeros, unreached modes, places of patches."""
-    loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
+    loops = {name: record.metrics for name, record in details.items() if isinstance(record, LoopRecord)}
     if loops:
         yield f"closed-loop control: {DEFINITIONS}"
     for name, metrics in loops.items():
         if np.isfinite(metrics.lowest_frequency):
             yield f"{name}: vibration at {metrics.lowest_frequency:.3g} Hz and above"
-    for name, found in details.items():
-        if isinstance(found, LinearModels):
-            yield from _of_linear(name, found)
-    for name, found in details.items():
-        if isinstance(found, Placed):
-            yield f"{name}: centers at {', '.join(f'{x:.4g}' for x in found.best.centers)} m"
+    for name, record in details.items():
+        if isinstance(record, LinearModels):
+            yield from _of_linear(name, record)
+    for name, record in details.items():
+        if isinstance(record, Placed):
+            yield f"{name}: centers at {', '.join(f'{x:.4g}' for x in record.best.centers)} m"
 
 
 def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:
@@ -249,8 +249,8 @@ def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:
         listed = ", ".join(f"{ratio:.3g}" for ratio in ratios)
         yield f"{name}, t = {linear.models[0].time:g} s: damping ratios {listed}"
     worst = {
-        pair: next((zeros for zeros in found if not zeros.minimum_phase), found[0])
-        for pair, found in linear.zeros.items()
+        pair: next((zeros for zeros in known if not zeros.minimum_phase), known[0])
+        for pair, known in linear.zeros.items()
     }
     alone = sorted((pair for pair in worst if len(pair) == 2), key=lambda pair: worst[pair].slowest)
     shown = [pair for pair in worst if len(pair) > 2 or pair in alone[:TRANSFERS]]

@@ -177,7 +177,7 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
     motors = read_catalog(catalog)
     with Results(path) as results:
         tasks = {name: dict(joint_tasks(results, name)) for name in results.analyses}
-    judged = [name for name, found in tasks.items() if found]
+    judged = [name for name, task in tasks.items() if task]
     wanted = judged if analysis is None else [analysis]
     if not wanted or not set(wanted) <= set(judged):
         raise InputError(f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}, found {analysis}")
@@ -188,9 +188,9 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
     console.print("at the motor, with its own rotor; solve again with its gear_ratio and rotor_inertia to confirm")
 
 
-def _rows(joint: str, found: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]:
-    fitting = [choice for choice in found if choice.fits]
-    for k, choice in enumerate(fitting[:SHOWN] or found[:1]):
+def _rows(joint: str, rated: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]:
+    fitting = [choice for choice in rated if choice.fits]
+    for k, choice in enumerate(fitting[:SHOWN] or rated[:1]):
         name = choice.motor.name if choice.fits else f"none; nearest: {choice.motor.name}"
         values = (choice.rms, choice.peak, choice.speed)
         used = [value if share > NOTHING else 0.0 for value, share in zip(values, choice.shares, strict=True)]

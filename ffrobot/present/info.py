@@ -128,8 +128,8 @@ def _results(file: h5py.File) -> str:
 def _add_datasets(table: Table, group: h5py.Group, meanings: Mapping[str, Meaning]) -> None:
     def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
-            found = meaning(name, meanings) or Meaning("", "")
-            table.add_row(item.name, str(item.shape), found.unit, found.what)
+            known = meaning(name, meanings) or Meaning("", "")
+            table.add_row(item.name, str(item.shape), known.unit, known.what)
 
     group.visititems(add)
 

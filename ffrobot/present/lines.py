@@ -49,10 +49,10 @@ def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mappin
 
 def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
     """Describe the largest deflection of links and its effect on results, in the worst analysis."""
-    found = [worst for links in bending if (worst := largest(links)) is not None]
-    if not found:
+    of_analyses = [worst for links in bending if (worst := largest(links)) is not None]
+    if not of_analyses:
         return "links are rigid"
-    name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
+    name, link = max(of_analyses, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
     return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
 
 

@@ -87,15 +87,15 @@ def chosen_posture(results: Results, model: Model) -> str:
     if named or not any("point" in one for one in scene.get("trajectory", ())):
         return ""
     for analysis in results.analyses:
-        found = [
+        others = [
             f"{joint['name']} {round(results[name].ravel()[0] * factor, 6) + 0.0:.4g}{unit}"
             for joint in scene.get("joint", ())
             if results.has(name := f"{analysis}/joints/{joint['name']}/coordinate") and len(results[name])
             for unit, factor in [UNITS.get(joint["type"], (None, 1.0))]
             if unit is not None
         ]
-        if found:
+        if others:
             branch = branch_names(model, undeformed_posture(model).q)
             as_line = f" ({in_words(branch)})" if branch else ""
-            return f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}"
+            return f"no guess in [initial]: {analysis} starts at {', '.join(others)}{as_line}"
     return ""

@@ -74,13 +74,13 @@ class AnalysisAccess(Datasets):
         The name is the dataset's inside the analysis, with the column where it has several:
         `points/link2.tip/position[0]`.
         """
-        found: dict[str, Array] = {}
+        by_label: dict[str, Array] = {}
         for name in self.histories(analysis):
             values = self[f"{analysis}/{name}"]
             columns = values.reshape(len(values), -1)
             labels = [name] if values.ndim == 1 else [f"{name}[{k}]" for k in range(columns.shape[1])]
-            found.update(zip(labels, columns.T, strict=True))
-        return found
+            by_label.update(zip(labels, columns.T, strict=True))
+        return by_label
 
     def frame(self, analysis: str) -> DataFrame:
         """Histories of an analysis as a pandas DataFrame, indexed by time (s)."""

@@ -126,9 +126,9 @@ class Datasets:
         for of in groups:
             if f"{of}/{name}" in known:
                 return of, self.attributes(f"{of}/settling/{name}")
-        found = quoted(known) if known else "none: paths move to the end of their analyses"
+        points = quoted(known) if known else "none: paths move to the end of their analyses"
         raise InputError(
-            f'{option}: expected "BODY.POINT" or "ANALYSIS/BODY.POINT" with residual vibration, {found}, found'
+            f'{option}: expected "BODY.POINT" or "ANALYSIS/BODY.POINT" with residual vibration, {points}, found'
             f' "{point}"{did_you_mean(point, known)}'
         )
 

@@ -61,8 +61,8 @@ class LinkAccess(Datasets):
         for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
             if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
                 return path
-        found = "another" if file.path.is_file() else "none"
-        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {found}')
+        now = "another" if file.path.is_file() else "none"
+        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {now}')
 
     def modal(self, analysis: str, body: str) -> Array:
         """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""

@@ -123,16 +123,16 @@ def validated_scene(
     return Scene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated
 
 
-def _raise(found: Iterable[str], path: Path) -> None:
-    lines = [f"{path}: {problem}" for problem in found]
+def _raise(texts: Iterable[str], path: Path) -> None:
+    lines = [f"{path}: {problem}" for problem in texts]
     if lines:
         raise InputError("\n".join(lines))
 
 
 def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
     for table, keys in UNAVAILABLE.items():
-        found = data.get(table, [])
-        for entry in found if isinstance(found, list) else [found]:
+        tables = data.get(table, [])
+        for entry in tables if isinstance(tables, list) else [tables]:
             for key, instead in keys.items():
                 if isinstance(entry, dict) and key in entry:
                     yield f'{table}: {key}: expected no such key in space = "spatial", found it: {instead}'
@@ -312,10 +312,10 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
                 yield f'analysis "{analysis.name}": sensor: pzt: expected {expected}, found "{sensor.pzt}"'
     joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     for k, load in enumerate(scene.load, 1):
-        count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
-        if count and found != count:
+        count, number = counts.get(load.pzt or "", 0), len(load.voltage or ())
+        if count and number != count:
             of = f'one for each patch of "{load.pzt}"'
-            yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
+            yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {number}"
         if load.pzt in passive:
             yield f'load no. {k}: pzt: expected patches {DRIVEN}, found "{load.pzt}"'
         joint = joints.get(load.joint or "")
@@ -326,9 +326,9 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
                 f'load no. {k}: joint: expected one with coordinates, found "{joint.name}", a {joint.type} joint:'
                 " forces and moments on what it joins are loads on points (x, y, z, mx, my, mz)"
             )
-        elif (found := len(load.moments)) != len(joint.units):
+        elif (number := len(load.moments)) != len(joint.units):
             of = f'one for each coordinate of "{joint.name}" ({", ".join(joint.units)})'
-            yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {found}"
+            yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {number}"
 
 
 def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:

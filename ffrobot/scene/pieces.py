@@ -46,26 +46,26 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
         return {}
     from ..fe_models.pieces import IN_PLANE, cut
 
-    found, families = {}, IN_PLANE if scene.is_planar else FAMILIES
+    divided, families = {}, IN_PLANE if scene.is_planar else FAMILIES
     for body in scene.body:
         if body.link is not None and body.name in counts:
             names = tuple(f"{body.name}, piece {k}" for k in range(1, counts[body.name] + 1))
             whole = cut(body.link, counts[body.name], families)
-            found[body.name] = BodyInPieces(replace(whole, places=_with_tools(scene, body.name, whole.places)), names)
-    problems = [f"{scene.path}: {problem}" for problem in _problems(scene, found)]
+            divided[body.name] = BodyInPieces(replace(whole, places=_with_tools(scene, body.name, whole.places)), names)
+    problems = [f"{scene.path}: {problem}" for problem in _problems(scene, divided)]
     if problems:
         raise InputError("\n".join(problems))
-    return {name: body for name, body in found.items() if len(body.names) > 1}
+    return {name: body for name, body in divided.items() if len(body.names) > 1}
 
 
 def _with_tools(scene: Scene, body: str, places: Mapping[str, tuple[int, str]]) -> dict[str, tuple[int, str]]:
     """Where points of a body are, by piece and name, tools too."""
-    found = dict(places)
+    used = dict(places)
     for tool in scene.tool:
         name, point = split_point(tool.point)
-        if name == body and point in found:
-            found[tool.name] = found[point][0], tool.name
-    return found
+        if name == body and point in used:
+            used[tool.name] = used[point][0], tool.name
+    return used
 
 
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:

@@ -176,9 +176,9 @@ def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
     tables, inner = _place(scene_path, key, option)
     value = value_of(tables, inner, key, option)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        found = "none" if value is None else repr(value)
+        text = "none" if value is None else repr(value)
         raise InputError(
-            f"{scene_path}: {option}: expected a number at {'.'.join(key)}, found {found}{_near(tables, inner)}"
+            f"{scene_path}: {option}: expected a number at {'.'.join(key)}, found {text}{_near(tables, inner)}"
             + (", and no default counts: write its value into the file" if value is None else "")
         )
     return float(value)
@@ -208,10 +208,10 @@ def _link_of(
     """The content of the link file that `links.BODY.…` means, read once, or the table in the scene itself."""
     with_links = [body["name"] for body in _bodies(scene) if "link" in body]
     if len(key) < 3 or key[1] not in with_links:
-        found = ".".join(key)
+        dotted = ".".join(key)
         raise InputError(
             f"{scene_path}: {option}: expected {LINKS}.BODY.KEY with a body that has a link file"
-            f' ({quoted(with_links)}), found "{found}"' + (did_you_mean(key[1], with_links) if len(key) > 1 else "")
+            f' ({quoted(with_links)}), found "{dotted}"' + (did_you_mean(key[1], with_links) if len(key) > 1 else "")
         )
     if key[1] not in links:
         try:
@@ -228,10 +228,10 @@ def _link_of(
 
 
 def _body(scene: Table, name: str) -> Table:
-    found = next((body for body in _bodies(scene) if body["name"] == name), None)
-    if found is None:
+    table = next((body for body in _bodies(scene) if body["name"] == name), None)
+    if table is None:
         raise InputError(f'--vary: expected no other name of the body "{shown(name)}" with {LINKS}.{shown(name)}')
-    return found
+    return table
 
 
 def _bodies(scene: Table) -> list[Table]:

@@ -69,10 +69,10 @@ class Worker:
             self._requests.write(json.dumps({"arguments": arguments}).encode() + b"\n")
             self._requests.flush()
             answer = self._answers.readline()
-        found: dict[str, Any] = json.loads(answer) if answer.endswith(b"\n") else {}
-        code = int(found["code"]) if found else self._process.wait()
+        answered: dict[str, Any] = json.loads(answer) if answer.endswith(b"\n") else {}
+        code = int(answered["code"]) if answered else self._process.wait()
         self._messages.seek(0)
-        return Done(code, self._messages.read().decode(errors="replace"), found.get("imported", {}))
+        return Done(code, self._messages.read().decode(errors="replace"), answered.get("imported", {}))
 
     @property
     def is_alive(self) -> bool:
@@ -247,28 +247,28 @@ def _message(printed: str, folder: Path, code: int) -> str:
 
 def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:
     with Results(path) as results:
-        found: dict[str, float] = {}
+        quantities: dict[str, float] = {}
         for analysis in results.analyses:
             about = results.attributes(analysis)
-            found |= {f"{analysis} {key}": float(about[key]) for key in ("steps", "wall_seconds")}
-            found[f"{analysis} warnings"] = float(len(about["warnings"]))
+            quantities |= {f"{analysis} {key}": float(about[key]) for key in ("steps", "wall_seconds")}
+            quantities[f"{analysis} warnings"] = float(len(about["warnings"]))
             for name in _standard(results, analysis):
-                found[f"{name} max"] = _reduce(results, name, "max")
+                quantities[f"{name} max"] = _reduce(results, name, "max")
         for request in collect:
             name, reduction = collected(request)
             if name in SETTLING:
                 with suppress(InputError):
-                    found[f"{name} {reduction}"] = float(results.settling(reduction)[1][SETTLING[name]])
+                    quantities[f"{name} {reduction}"] = float(results.settling(reduction)[1][SETTLING[name]])
             else:
-                found[f"{name} {reduction}"] = _reduce(results, _meant(results, name), reduction)
-    return found
+                quantities[f"{name} {reduction}"] = _reduce(results, _meant(results, name), reduction)
+    return quantities
 
 
 def _meant(results: Results, name: str) -> str:
     """The dataset, also with dots for "/", and of the first analysis without its name; `name` where there is none."""
     wanted, bracket, column = name.partition("[")
-    found = by_dots(results, list(results)).get(wanted.replace("/", "."))
-    return name if found is None else f"{found}{bracket}{column}"
+    dataset = by_dots(results, list(results)).get(wanted.replace("/", "."))
+    return name if dataset is None else f"{dataset}{bracket}{column}"
 
 
 def by_dots(results: Results, datasets: Sequence[str]) -> dict[str, str]:

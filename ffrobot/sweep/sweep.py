@@ -265,8 +265,8 @@ def _write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
     quantities = _quantities(rows)
     lines: list[list[object]] = [["run", *keys, "status", *quantities, "message"]]
     for row in rows:
-        found = [row.quantities.get(name, "") for name in quantities]
-        lines.append([row.number, *row.values, row.status, *found, row.message])
+        values = [row.quantities.get(name, "") for name in quantities]
+        lines.append([row.number, *row.values, row.status, *values, row.message])
     write_atomically(path, as_csv(lines).encode(), "table of the sweep", ours=True)
 
 
@@ -283,8 +283,8 @@ def print_table(
         table.add_column(_broken(header), justify="left" if header == "status" else "right", min_width=_width(header))
     for row in rows:
         values = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values]
-        found = [f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown]
-        table.add_row(str(row.number), *values, row.status, *found)
+        cells = [f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown]
+        table.add_row(str(row.number), *values, row.status, *cells)
     console.print(table)
     for row in rows:
         if row.status != "completed":

@@ -123,16 +123,16 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     return common_modes(model.scene.path, spectra, modes)
 
 
-def common_modes(path: Path, found: Sequence[tuple[Array, Array]], modes: int) -> PathFrequencies:
+def common_modes(path: Path, spectra: Sequence[tuple[Array, Array]], modes: int) -> PathFrequencies:
     """The `modes` lowest of ω (rad/s) and damping ratios by instant. Raises `InputError` where one has fewer."""
-    most = min(len(omega) for omega, _ in found)
+    most = min(len(omega) for omega, _ in spectra)
     if most < modes:
         raise InputError(
             f"{path}: trajectory: shaper.modes: expected at most {most}, the number of vibrations on the constrained"
             f" path, found {modes}"
         )
-    frequency = np.array([omega[:modes] for omega, _ in found]) / (2 * np.pi)
-    return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in found]))
+    frequency = np.array([omega[:modes] for omega, _ in spectra]) / (2 * np.pi)
+    return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in spectra]))
 
 
 def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:

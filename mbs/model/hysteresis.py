@@ -46,13 +46,13 @@ class Hysteresis:
 
     def output(self, V: Array) -> Array:
         """Return the voltages (T, k) that patches act under of V (T, k), straight between these, from rest."""
-        found, z = np.empty_like(V), np.zeros_like(self.weights)
+        acting, z = np.empty_like(V), np.zeros_like(self.weights)
         turns = np.flatnonzero(np.diff(np.sign(np.diff(V, axis=0)), axis=0).any(axis=1)) + 2
         begins = np.union1d(turns, np.arange(0, len(V), CHUNK))
-        for one, way in zip(np.split(found, begins[1:]), np.split(V, begins[1:]), strict=True):
+        for one, way in zip(np.split(acting, begins[1:]), np.split(V, begins[1:]), strict=True):
             plays = self.plays(z, way)
             one[:], z = self.acting(plays), plays[-1]
-        return found
+        return acting
 
 
 class Played:
@@ -63,6 +63,6 @@ class Played:
 
     def at(self, V: Array, last: Array | None = None) -> Array:
         """Return the voltages (k,) that patches act under at V (k,), on their way to the `last` (k,)."""
-        found = self._of.acting(self._of.plays(self._z, V))
+        output = self._of.acting(self._of.plays(self._z, V))
         self._z = self._of.plays(self._z, V if last is None else last)
-        return found
+        return output

@@ -39,10 +39,10 @@ class Watched(NamedTuple):
         lowest, highest = sorted(self.sign * limit for limit in self.joint.position_limits[self.number])
         return lowest, highest
 
-    def seen(self, found: Seen) -> Seen:
+    def seen(self, other: Seen) -> Seen:
         """Return the core's findings in terms of the joint's coordinate."""
-        least, largest = sorted(self.sign * value + 0.0 for value in found[:2])
-        return least, largest, found[2]
+        least, largest = sorted(self.sign * value + 0.0 for value in other[:2])
+        return least, largest, other[2]
 
 
 def watched(tree: KinematicTree) -> list[Watched]:
@@ -64,15 +64,15 @@ def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
         scene.add_limit(one.v, *one.limits)
 
 
-def left_ranges(model: Model, found: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
+def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
     """Yield a warning for each coordinate outside its position_limit: the first time, and the largest excess.
 
-    `found` is what the core has seen of `watched`, None of a motion without the core; the others are looked at in
+    `ranges` is what the core has seen of `watched`, None of a motion without the core; the others are looked at in
     outputs at `times` (T,): `q` (T, n_q), `v` (T, n_v).
     """
-    of_core = zip(watched(model.tree), found, strict=True) if found is not None else ()
+    of_core = zip(watched(model.tree), ranges, strict=True) if ranges is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
-    for joint, number, values in limited_coordinates(model, times, q, v, every=found is None):
+    for joint, number, values in limited_coordinates(model, times, q, v, every=ranges is None):
         (lowest, highest), round_off = joint.position_limits[number], ROUND_OFF * np.abs(values).max()
         outside = times[(values < lowest - round_off) | (values > highest + round_off)]
         seen.append((joint, number, (values.min(), values.max(), outside[0] if outside.size else None)))

@@ -280,15 +280,15 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
         yield from _check_motors(model, free)
 
 
-def _check_motors(model: Model, found: Mobility) -> Iterator[str]:
+def _check_motors(model: Model, seen: Mobility) -> Iterator[str]:
     motors = {name: len(columns) for name, columns in model.motors.items()}
     count, named = sum(motors.values()), any(joint.asks_for_motor for joint in model.scene.joint)
-    if count > found.freedom or (count < found.freedom and named and model.scene.is_planar):
+    if count > seen.freedom or (count < seen.freedom and named and model.scene.is_planar):
         raise InputError(
             f"{model.scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
-            f" ({found.freedom}), found {count} ({quoted(motors)})"
+            f" ({seen.freedom}), found {count} ({quoted(motors)})"
         )
-    if count < found.freedom and (named or model.scene.topology.is_open_chain):
+    if count < seen.freedom and (named or model.scene.topology.is_open_chain):
         joints = [node.joint for node in model.tree.nodes if node.joint.freedoms and node.joint.type != "free"]
         moving = [joint.name for joint in joints if joint.name not in motors]
         if moving:

@@ -99,9 +99,9 @@ def working_start(model: Model, guess: Array) -> Array | None:
     columns = turning_joints(model)[1]
     if not columns.size or not model.rows:
         return None
-    found = regular_postures(model, random_angles(guess, columns, TRIES))
-    rounded = np.tile(guess, (len(found), 1))
-    rounded[:, columns] = np.radians(np.round(np.degrees(np.angle(np.exp(1j * found[:, columns])))))
+    postures = regular_postures(model, random_angles(guess, columns, TRIES))
+    rounded = np.tile(guess, (len(postures), 1))
+    rounded[:, columns] = np.radians(np.round(np.degrees(np.angle(np.exp(1j * postures[:, columns])))))
     works = [q for q in rounded if len(regular_postures(model, q[None]))]
     return min(works, key=lambda q: float(np.abs(q[columns] - guess[columns]).sum()), default=None)
 
@@ -128,9 +128,9 @@ def _angles(node: Node) -> list[int]:
 
 def regular_postures(model: Model, q: Array) -> Array:
     """Return postures (…, n_q) near q (T, n_q) that satisfy all rows at t = 0 and are regular."""
-    found, is_met = solve_postures(model, np.zeros(len(q)), q)
-    found = found[is_met]
-    return found[are_regular(model, found, np.zeros(len(found)))]
+    postures, is_met = solve_postures(model, np.zeros(len(q)), q)
+    postures = postures[is_met]
+    return postures[are_regular(model, postures, np.zeros(len(postures)))]
 
 
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:

@@ -62,12 +62,12 @@ def resolving_joints(model: Model) -> list[str]:
     return [by_column[row.coordinate] for row in model.rows if row.owner == OWNER]
 
 
-def _check(model: Model, criterion: str, found: Mobility) -> None:
+def _check(model: Model, criterion: str, seen: Mobility) -> None:
     path = model.scene.path
-    if found.followed == found.freedom:
+    if seen.followed == seen.freedom:
         raise InputError(
             f"{path}: redundancy: expected a mechanism with more degrees of freedom than its trajectories prescribe,"
-            f" found {found.freedom} degrees of freedom and as many components: leave the key out"
+            f" found {seen.freedom} degrees of freedom and as many components: leave the key out"
         )
     if criterion == "least-torque" and model.loop_rows.any():
         raise InputError(

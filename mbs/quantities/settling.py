@@ -147,8 +147,8 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
     named += [path.point for path in scene.trajectory if path.point is not None]
     named += [*(tip for tip in tips if tip not in joined), *(str(load.point) for load in scene.payload)]
     known = {f"{body}.{label}" for body, labels in points.items() for label in labels}
-    found = [point for point in dict.fromkeys(named) if point in known]
-    yield from found or [f"{body}.{labels[-1]}" for body, labels in list(points.items())[-1:] if labels]
+    present = [point for point in dict.fromkeys(named) if point in known]
+    yield from present or [f"{body}.{labels[-1]}" for body, labels in list(points.items())[-1:] if labels]
 
 
 def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowest: float) -> dict[str, Settling]:
