@@ -158,13 +158,18 @@ def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, e
     path = (time >= 0.0) & (time <= end)
     on_path = time[path]
     return MotorFeasibility(
-        peak, limits.moment, speed, limits.speed, power, limits.power,
-        float(first_time(time, beyond[:, None])[0]) if beyond.any() or peak <= limits.moment else at,
+        moment=peak,
+        moment_limit=limits.moment,
+        speed=speed,
+        speed_limit=limits.speed,
+        power=power,
+        power_limit=limits.power,
+        saturation_time=float(first_time(time, beyond[:, None])[0]) if beyond.any() or peak <= limits.moment else at,
         rms_moment=root_mean_square(on_path, moment[path]),
         usual_moment=_not_exceeded(time, np.abs(moment), 1.0 - SHORT),
         moment_time=at,
         share_beyond=float(shares(on_path) @ beyond[path]),
-    )  # fmt: skip
+    )
 
 
 def first_time(time: Array, beyond: Booleans) -> Array:

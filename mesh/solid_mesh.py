@@ -200,7 +200,17 @@ def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> Solid
     facets, facet_tag = _tagged_facets(mesh, keys, known.facet_tag, count)
     tags = meshtags(mesh, 3, local, cell_tag.astype(np.int32)), meshtags(mesh, 2, facets, facet_tag)
     surface = surface_of(mesh)
-    return SolidMesh(mesh, known.cell, *tags, known.regions, known.faces, size, surface, known.overlaps, known.remarks)
+    return SolidMesh(
+        mesh,
+        known.cell,
+        *tags,
+        known.regions,
+        known.faces,
+        size=size,
+        surface=surface,
+        overlaps=known.overlaps,
+        remarks=known.remarks,
+    )
 
 
 def _known_to_all(part: PartMesh) -> tuple[PartMesh, int, float, Integers]:

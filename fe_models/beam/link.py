@@ -85,7 +85,9 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         geometric_stiffness=with_lumped_stiffness(geometric_stiffness(link, stations, fields, named), attached),
         interfaces=interfaces,
         stations=kept,
-        stress=beam_stresses(link, kept, omega**2, families, attached, residual, interfaces),
+        stress=beam_stresses(
+            link, kept, omega**2, families, attached=attached, residual=residual, interfaces=interfaces
+        ),
         stress_loads=stress_loads(link, interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
         ffrobot_version=VERSION,

@@ -103,7 +103,9 @@ def _averages(
     inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
     height, width = (high - low).T
     middle = 0.5 * (low + high) - centroid[:, 1:]
-    return Averages(weights, area, centroid, inertia, height, width, middle, model.total(mass) / area)
+    return Averages(
+        weights, area, centroid, inertia, height=height, width=width, middle=middle, density=model.total(mass) / area
+    )
 
 
 def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Array, Array]:

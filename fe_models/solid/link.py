@@ -105,7 +105,9 @@ def solid_modal_body(
     if link.modes.attachment_modes:
         progress(f"{link.name}: adding the attachment modes")
         length, named = link.geometry.length, list(places.rows)
-        residual = attachment_modes(link.families, mass, modes, loads, shapes, named, length, not fixed)
+        residual = attachment_modes(
+            link.families, mass, modes, loads, shapes, interfaces=named, length=length, twists_along=not fixed
+        )
         modes = modes.followed_by(residual)
     if fixed:
         modes = ritz_modes(model, modes, count)
@@ -121,7 +123,13 @@ def solid_modal_body(
     progress(f"{link.name}: integrating the geometric stiffness")
     supports = {} if link.coupling == "rigid" else SUPPORTS[link.reference.condition]
     stiffness = without_their_turn(
-        prestressed(model, X, shapes), flexibility, loads, shapes, places.rows, interfaces, supports
+        prestressed(model, X, shapes),
+        flexibility,
+        loads,
+        shapes,
+        rows=places.rows,
+        interfaces=interfaces,
+        supports=supports,
     )
     mesh = _picture(solid, model, seen)
     recovered = recovered_stresses(link, model, seen, with_lumped_loads(shapes, attached), mesh.points, path)
@@ -145,7 +153,13 @@ def solid_modal_body(
         **recovered,
         surface_patches=(
             outlined_patches(
-                model.V, solid.facet_tags, solid.faces, link.surface_patch, link.geometry.length, seen, path
+                model.V,
+                solid.facet_tags,
+                solid.faces,
+                link.surface_patch,
+                length=link.geometry.length,
+                modes=seen,
+                path=path,
             )
             if link.surface_patch
             else None

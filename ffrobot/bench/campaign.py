@@ -169,9 +169,15 @@ class Campaign:
         tolerance = TIGHTER * min(settings.tolerances)
         reference = find_reference(scene, name, tolerance, settings.budget, self.display)
         points = measure_points(
-            scene, name, reference, settings.integrators, settings.tolerances, settings.repeat, settings.budget,
-            self.display,
-        )  # fmt: skip
+            scene,
+            name,
+            reference,
+            settings.integrators,
+            settings.tolerances,
+            repeat=settings.repeat,
+            budget=settings.budget,
+            display=self.display,
+        )
         rows = [point.row() for point in points]
         about = {"inputs": inputs_of(scene, reference.bodies), "analysis": name, "reference": reference.about()}
         self.keep("work-precision", rows, about, folder, f"{scene.name}, {name}: {reference.in_words}")

@@ -284,7 +284,7 @@ def find_reference(scene: Scene, name: str, tolerance: float, budget: float, dis
         )
     (integrator, at, best), (other, other_at, second) = done
     error = errors(second.histories, best.histories)
-    return ReferenceRun(integrator, at, other, other_at, error, best.histories, best.bodies)
+    return ReferenceRun(integrator, at, other, other_at, error, histories=best.histories, bodies=best.bodies)
 
 
 def measure_points(

@@ -192,7 +192,9 @@ class Designs:
         check_folder(runs.folder)
         allowed = (runs.path.absolute().parent, *allowed_python())
         variations = tuple(Variation((key,), ()) for key in keys)
-        self._sweep = Sweep(runs.path, variations, (), runs.folder, (), allowed, fixed, own, growing=True)
+        self._sweep = Sweep(
+            runs.path, variations, (), runs.folder, (), allow_python=allowed, fixed=fixed, own=own, growing=True
+        )
         self._runs, self._workers, self.most = runs, Workers(), most
         self._designs: dict[Path, Design] = {}
         self._inputs = _digests(runs.path)

@@ -189,7 +189,14 @@ def read_history(results: Results, name: str, option: str) -> History:
         values = np.linalg.norm(values, axis=1, keepdims=True)
     largest, rms, mean = (float(one.max()) for one in sizes)
     return History(
-        name, _unit(results, dataset).replace(" ", "·"), time, as_floats(values), largest, rms, mean, in_doubt
+        name,
+        _unit(results, dataset).replace(" ", "·"),
+        time,
+        as_floats(values),
+        largest,
+        rms,
+        mean=mean,
+        is_in_doubt=in_doubt,
     )
 
 

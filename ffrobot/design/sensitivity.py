@@ -413,7 +413,7 @@ def _start(
             again = repeated_steps(results) if repeats else None
         if again:
             break
-    return designs, Base(responses, readings, keys, point, steps, repeats if again else 0.0, again or {})
+    return designs, Base(responses, readings, keys, point, steps, repeats=repeats if again else 0.0, again=again or {})
 
 
 def _check_steps(designs: Designs, base: Base) -> None:

@@ -81,7 +81,9 @@ def statistics(values: Array) -> SpreadStatistics:
     quantiles = np.quantile(values, p, axis=0)
     errors = as_floats(0.5 * (high - low))
     least, largest = values.min(axis=0), values.max(axis=0)
-    return SpreadStatistics(mean, s / np.sqrt(n), s, deviation_error, quantiles, errors, least, largest)
+    return SpreadStatistics(
+        mean, s / np.sqrt(n), s, deviation_error, quantiles, quantile_errors=errors, lowest=least, highest=largest
+    )
 
 
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
@@ -257,11 +259,15 @@ class LinearSpread:
         ends = np.array([(one.ends[1] - one.mean) / one.deviation for one in self.spreads])
         reach = np.tensordot(ends, np.abs(self.slopes), 1)
         return SpreadStatistics(
-            self.middle, as_floats(np.abs(bent.mean(axis=0) - linear.mean(axis=0))),
-            as_floats(deviation), as_floats(np.abs(bent.std(axis=0) - linear.std(axis=0))),
-            as_floats(quantiles), as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),
-            as_floats(self.middle - reach), as_floats(self.middle + reach),
-        )  # fmt: skip
+            mean=self.middle,
+            mean_error=as_floats(np.abs(bent.mean(axis=0) - linear.mean(axis=0))),
+            deviation=as_floats(deviation),
+            deviation_error=as_floats(np.abs(bent.std(axis=0) - linear.std(axis=0))),
+            quantiles=as_floats(quantiles),
+            quantile_errors=as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),
+            lowest=as_floats(self.middle - reach),
+            highest=as_floats(self.middle + reach),
+        )
 
 
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:

@@ -176,7 +176,10 @@ def optimise(
     from .optimise import find_optimum
 
     with runs_of("optimise", scene, output, **how) as runner:
-        return find_optimum(runner, vary, minimise, maximise, subject_to, method, starts, seed, runs, tolerance)
+        return find_optimum(
+            runner, vary, minimise, maximise, subject_to,
+            method=method, starts=starts, seed=seed, runs=runs, tolerance=tolerance,
+        )  # fmt: skip
 
 
 @_checked
@@ -216,7 +219,7 @@ def trade_off(
     from .optimise import find_front
 
     with runs_of("optimise", scene, output, **how) as runner:
-        return find_front(runner, vary, minimise, against, points, subject_to, runs, tolerance)
+        return find_front(runner, vary, minimise, against, points, subject_to, runs=runs, tolerance=tolerance)
 
 
 @_checked

@@ -217,7 +217,8 @@ def perform(run: SweepRun, workers: Workers) -> Row | None:
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
     message = "" if code == 0 else _message(printed, run.folder, code)
     quantities = _quantities(results, run.collect) if results.exists() else {}
-    return Row(run.number, run.values, status, message, quantities, run.inputs | imported, tuple(imported))
+    inputs = run.inputs | imported
+    return Row(run.number, run.values, status, message, quantities, inputs=inputs, imported=tuple(imported))
 
 
 _of_process = Workers()

@@ -218,7 +218,7 @@ class Statics:
             np.array([at.force * self.length, at.moment]),
         )
         size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
-        return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent, size)
+        return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent=independent, size=size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
         """∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), exact."""
