@@ -134,8 +134,7 @@ def make_point_set(
         along_x = "axial ones" if space.is_plane else "those along x"
         raise InputError(
             f"{key}: expected components that differ in what they do to the body, found {len(points)} of which only"
-            f" {rank} are independent: {along_x} coincide where no mode moves along the link, and it has {coordinates}"
-            " coordinates"
+            f" {rank} are independent: {along_x} coincide without axial modes, and it has {coordinates} coordinates"
         )
     return chosen
 

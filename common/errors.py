@@ -105,7 +105,7 @@ ELSEWHERE = {
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` (did you mean "…"?)`, or nothing when no known word is close, or begins with this one and an underscore."""
+    """Return ` (did you mean "…"?)`; empty if no known word is close, or begins with this one and an underscore."""
     from difflib import get_close_matches
 
     words = {one.casefold(): one for one in known}
@@ -127,6 +127,6 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def either(words: Iterable[str]) -> str:
-    """`"a", "b" or "c"`."""
+    """Return `"a", "b" or "c"`."""
     *first, last = (f'"{word}"' for word in words)
     return f"{', '.join(first)} or {last}" if first else last

@@ -52,7 +52,7 @@ def check_not_an_input(path: Path) -> None:
 
 
 def check_file_name(text: str) -> Path:
-    """`text` as a path. Raises `InputError` where it can be the name of no file, or is that of no regular one."""
+    """Return `text` as a path. Raises `InputError` unless it can be the name of a regular file."""
     path = Path(text)
     try:
         path.resolve()

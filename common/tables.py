@@ -80,7 +80,7 @@ def _is_formula(cell: object) -> bool:
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass"); alternatives of unions are left out."""
+    """Return `body "link1": rigid.mass` for ("body", 0, "rigid", "mass"); alternatives of unions are left out."""
     path = ""
     here: Any = data
     for k, part in enumerate(loc):
@@ -95,13 +95,13 @@ def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missin
 
 
 def shown(text: str) -> str:
-    """`text` in one line of a message, shortened: control characters and line breaks as Python writes them."""
+    """Return `text` in one line of a message, shortened: control characters and line breaks as Python writes them."""
     text = text if len(text) <= 60 else text[:59] + "…"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def beyond_limits(data: dict[str, Any]) -> Iterator[str]:
-    """`KEY: expected …, found …` of everything in tables that no key of any file may hold."""
+    """Yield `KEY: expected …, found …` for each value in tables that no key of any file may have."""
     yield from (f"{key_path(loc, data)}: {problem}" for loc, problem in _beyond(data, ()))
 
 

@@ -133,7 +133,7 @@ def _follows(item: ErrorDetails, within: Collection[tuple[int | str, ...]]) -> b
 
 
 def plain(value: Any, functions: dict[str, object] | None = None) -> Any:
-    """`value` in the types of TOML: NumPy numbers and arrays, tuples and paths replaced, keys that are None left out.
+    """Return `value` in types of TOML: NumPy numbers and arrays, tuples and paths replaced, keys that are None omitted.
 
     Functions go to `functions` under the text that stands for them.
     """

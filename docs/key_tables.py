@@ -40,7 +40,7 @@ UNSUPPORTED = (
     ),
     (
         'compliant gears (`stiffness` of joints) with `motors = "frame"` in joints whose axis modes tilt, where they'
-        " are driven, controlled or linear: no angle goes with a moment between frames there",
+        " are driven, controlled or linearized: no angle goes with a moment between frames there",
         '`motors = "section"`',
         "ffrobot.mbs.run.gears",
     ),

@@ -121,7 +121,7 @@ class _Planar(_Described):
         return super().function_wrap_schema(schema)
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-        """With as many components as the plane has: such defaults are zeros."""
+        """Return a default with as many components as 2D has: such defaults are zeros."""
         described = super().default_schema(schema)
         default = described.get("default")
         if isinstance(default, list) and _spelled(schema["schema"]):

@@ -147,7 +147,7 @@ def check_boundary(part: PartMesh, where: str) -> None:
 
 
 def oriented(part: PartMesh) -> PartMesh:
-    """`part` with its cells mirrored where all of them are left-handed, as some formats number them."""
+    """Return `part`, its cells mirrored if all of them are left-handed, as some formats number them."""
     at_corners = jacobians(part.points[part.corners], part.cell, 1, part.shape.corners)
     if np.all(np.linalg.det(at_corners) < 0):  # others may be curved too much
         nodes = reference_nodes(part.cell, part.degree)

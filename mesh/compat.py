@@ -101,7 +101,7 @@ def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
 
 
 def compiled_form(form: ufl.Form) -> fem.Form:
-    """`form` ready to be assembled."""
+    """Return `form` compiled, ready to be assembled."""
     with _compiling(form.ufl_domain().ufl_cargo().comm) as jit:
         return fem.form(form, **jit)
 

@@ -39,7 +39,7 @@ class Line(NamedTuple):
 
 
 def files_of(path: Path) -> list[Path]:
-    """`path`, and the files that there are of those that it includes or that belong to it, in order."""
+    """Return `path` and the existing files that it includes or that belong to it, in order."""
     pattern = _REFERENCES.get(path.suffix.lower())
     files: dict[Path, None] = {}
 

@@ -88,7 +88,7 @@ class _Cells:
         self.affine = self.tetrahedral and mesh.geometry.cmap.degree == 1
 
     def basis(self, X: Array, derivatives: int) -> Array:
-        """(1 + 3 or 1, q, v) values, and derivatives along X, of the shape functions at `X` (q, 3)."""
+        """Return values, and derivatives along X, of the shape functions at `X` (q, 3): (1 or 4, q, v)."""
         return self.element.tabulate(derivatives, X)[..., 0]
 
     def distance(self, cell: Integers, X: Array) -> tuple[Array, Array]:

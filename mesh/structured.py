@@ -66,7 +66,7 @@ def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
 
 
 def with_points(nodes: Array, points: Sequence[float]) -> Array:
-    """`nodes` (m,) and `points` in one ascending list (≥ m,); a point that coincides with a node adds nothing."""
+    """Return `nodes` (m,) and `points` in one ascending list (≥ m,); points that coincide with nodes add nothing."""
     length = nodes[-1] - nodes[0]
     merged = list(nodes)
     for point in points:

@@ -42,7 +42,7 @@ class BeamForms:
         by: Functions | None = None,
         derivative_by: int | None = None,
     ) -> sp.csr_matrix:
-        """∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements: test functions f `of`, trial functions g `by`.
+        """Return ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx for weights (e,) of the elements: test functions f `of`, trial functions g `by`.
 
         Without `by` both are the same functions, and so are the derivatives.
         """

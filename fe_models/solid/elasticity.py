@@ -145,7 +145,7 @@ class MassMatrix:
 def material_map(
     mesh: Mesh, material: AnyMaterial, regions: Sequence[tuple[NDArray[np.int32], AnyMaterial]] = ()
 ) -> MaterialMap:
-    """`material` everywhere but in the cells (of this rank, ghosts too) of each of `regions`."""
+    """Return `material` for all cells but those (of this rank, ghosts too) of each of `regions`."""
     cells = mesh.topology.index_map(3)
     of_cell = np.zeros(cells.size_local + cells.num_ghosts, dtype=np.int64)
     for number, (members, _) in enumerate(regions, start=1):

@@ -103,7 +103,7 @@ def number(value: object) -> str:
 
 
 def in_words(keys: Iterable[Key], point: Point) -> str:
-    """`payload.0.mass = 0.5, …`."""
+    """Return the values of the keys as text: `payload.0.mass = 0.5, …`."""
     return ", ".join(f"{'.'.join(key)} = {number(value)}" for key, value in zip(keys, point, strict=True))
 
 
@@ -267,7 +267,7 @@ def _digests(path: Path) -> dict[str, str]:
 
 
 def parse_key(text: str, option: str) -> Key:
-    """`payload.0.mass` in parts. Raises `InputError` where that is no key."""
+    """Return the parts of a key such as `payload.0.mass`. Raises `InputError` if `text` is none."""
     parts = tuple(text.strip().split("."))
     if not all(parts) or len(parts) > DEEPEST:
         raise InputError(f'{option}: expected a key such as payload.0.mass, found "{text[:100]}"')

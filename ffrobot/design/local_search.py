@@ -308,7 +308,7 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
     count = len(space.variables)
 
     def values(places: Array) -> Array:
-        """(1 + m, S) of S places (n, S), or of one (n); infinite where designs fail."""
+        """Return scaled responses (1 + m, S) of S places (n, S), or of one (n); infinite where designs fail."""
         designs = evaluations.at([tuple(map(float, place)) for place in places.reshape(count, -1).T])
         failed = [np.inf] * len(problem.responses)
         return np.array([problem.scaled(one.values) if one.completed else failed for one in designs]).reshape(

@@ -119,7 +119,7 @@ SUPPORT = 6  # outputs that a value between outputs is made from
 
 @dataclass(frozen=True)
 class History:
-    """`values` (T, columns) at `time` (T,), s; of a vector its length, one column.
+    """A dataset over time: `values` (T, columns) at `time` (T,), s; the length of a vector as one column.
 
     `largest`, `rms`, `mean`: of all columns and of all times that the run looked at; NaN where that is not known.
     `is_in_doubt`: whether that is so of a part of a vector whose length outputs miss.

@@ -261,7 +261,7 @@ KEPT = 1e-6  # of a limit: what is beyond it by no more keeps it
 
 @dataclass(frozen=True)
 class Limit:
-    """`sense` · (response − bound) ≤ 0; `sense` is 1 of "<=" and −1 of ">="."""
+    """Limit of a response: `sense` · (response − bound) ≤ 0; `sense` is 1 of "<=" and −1 of ">="."""
 
     response: Response
     sense: float
@@ -360,7 +360,7 @@ def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:
 
 
 def parse_limit(text: str) -> Limit:
-    """`peak joints.elbow.moment <= 20`. Raises `InputError`."""
+    """Return the limit that `text` states, such as `peak joints.elbow.moment <= 20`. Raises `InputError`."""
     match = LIMIT.fullmatch(text.strip())
     try:
         bound = float(match["bound"]) if match else np.nan

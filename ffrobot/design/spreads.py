@@ -196,7 +196,7 @@ def parse_spread(text: str, path: Path) -> Spread:
 
 
 def spread_points(spreads: Sequence[Spread], u: Array) -> list[tuple[float, ...]]:
-    """Points of probabilities u (n, k)."""
+    """Return n values of the k keys whose cumulative probabilities are u (n, k)."""
     columns = np.column_stack([spread.values(u[:, k]) for k, spread in enumerate(spreads)])
     return [tuple(map(float, row)) for row in columns]
 

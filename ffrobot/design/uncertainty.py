@@ -236,7 +236,7 @@ class Uncertainty(Finding):
 
 
 def with_error(value: float, error: float) -> str:
-    """`0.173 ± 0.01`: one digit more than the error leaves, five at most; nothing where there is no value."""
+    """Return `0.173 ± 0.01`: digits down to a tenth of the error, no more than five; empty if the value is NaN."""
     known = np.floor(np.log10(abs(value) / error)) + 2 if value and error > 0.0 else 5
     digits = ((value, int(np.clip(known, 1, 5))), (error, 1))
     return "" if np.isnan(value) else " ± ".join(f"{float(f'{one:.{count}g}'):g}" for one, count in digits)
@@ -313,7 +313,7 @@ class _Study:
         self._notes = {f"peak of {g.text}": f"{g.text}: {one.remark}" for g, one in pairs if one.remark}
 
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
-        """Of a Latin hypercube (McKay, Beckman & Conover 1979) of `count` points, keys paired for low discrepancy."""
+        """Return statistics of `count` points of a Latin hypercube (McKay, Beckman & Conover 1979)."""
         from scipy.stats.qmc import LatinHypercube
 
         k = len(self._spreads)
@@ -348,7 +348,7 @@ class _Study:
         )
 
     def by_gradients(self) -> Uncertainty:
-        """Of the linear model, whose errors a quadratic one without products of keys tells."""
+        """Return statistics of the linear model; a quadratic one without products of keys estimates its errors."""
         sides = [(k, sign * one.deviation) for k, one in enumerate(self._spreads) for sign in (1.0, -1.0)]
         designs = self._designs.run([self._moved(k, self._point[k] + offset) for k, offset in sides])
         pairs = np.array([self._follow(design) for design in designs])

@@ -137,7 +137,10 @@ def read_space(path: Path, vary: Sequence[str]) -> DesignSpace:
 
 
 def parse_variable(text: str) -> DesignVariable:
-    """`payload.0.mass=0.1:0.5`, or `a.outer,a.inner in {0.05:0.045, 0.06:0.054}`. Raises `InputError`."""
+    """Read a variable: `payload.0.mass=0.1:0.5` or `a.outer,a.inner in {0.05:0.045, 0.06:0.054}`.
+
+    Raises `InputError` for other text.
+    """
     if match := MOTOR.fullmatch(text):
         return _motors(match["joint"], match["mass"], Path(match["file"]))
     if match := CATALOGUE.fullmatch(text):

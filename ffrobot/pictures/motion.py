@@ -72,7 +72,7 @@ class MovingBody:
         return self.placed(self.points + s * self.deflection) + (s - 1.0) * self.shift[:, None]
 
     def global_deflection(self, point: str) -> Array:
-        """A Φ p of a point (T, 3), in m: how much a unit of s moves it in global axes."""
+        """Return the deflection A Φ p of a point (T, 3), m, in global axes."""
         return self.turned(self.deflection[:, self.point_names.index(point)])
 
 

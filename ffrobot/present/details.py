@@ -258,7 +258,7 @@ def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:
         half = len(pair) // 2
         yield f"{name}: {', '.join(pair[:half])} → {', '.join(pair[half:])}: {worst[pair].describe()}"
     if len(worst) > len(shown):
-        yield f"{name}: zeros of {len(worst) - len(shown)} more transfers are in the results file, linear/zeros"
+        yield f"{name}: zeros of {len(worst) - len(shown)} more transfer functions: see linear/zeros in the results"
     for verb, reaches in (("uncontrollable:", linear.controllable), ("unobservable:", linear.observable)):
         for model, reach in zip(linear.models, reaches, strict=True):
             if reach.lost:

@@ -129,7 +129,7 @@ class AnalysisAccess(Datasets):
         return (self.controller(analysis),) if is_loop else self.linear(analysis)
 
     def linear_analysis(self, analysis: str | None) -> str:
-        """`analysis`, or the first one with linear models. Raises `InputError` if there is none."""
+        """Return `analysis`, or the first one with linear models. Raises `InputError` if there is none."""
         known = self._with("linear")
         if analysis is None and not known:
             loops = self._with("control/controller")

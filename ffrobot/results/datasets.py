@@ -90,7 +90,7 @@ class Datasets:
     def save(self, path: PathLike[str] | str) -> Path:
         """Write the results, or a copy of their file, to the file `path`.
 
-        Raises `InputError` where that would cost a file of another kind, `SolveError` where it cannot be written.
+        Raises `InputError` if it would overwrite a file of another kind, `SolveError` if it cannot be written.
         """
         self._file.flush()
         content: bytes = self._file.id.get_file_image()

@@ -200,7 +200,7 @@ def _continuation(file: Results, group: str) -> Continuation:
 
 
 def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Keep | None = None) -> Solution | None:
-    """`solve_scene`, going on from the file `results`; None where that is complete. From the start if absent.
+    """Run `solve_scene` from where the file `results` ends; None if that is complete. From the start if absent.
 
     Raises `InputError` where the file is not that of the same scene, modal bodies and waypoints; else as
     `solve_scene`.

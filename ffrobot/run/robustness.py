@@ -65,7 +65,7 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
     robots[f"{asked.force:g} N at the tip"] = [_with_force(nominal, runs.points[-1], force) for force in forces]
 
     def lane(run: Callable[[Model], Run], *, is_sampled: bool) -> Array:
-        """Those that are sampled anyhow have no first row."""
+        """Return the largest error for each cause; NaN "as computed" for runs that are sampled in any case."""
         first = [np.nan] if is_sampled else [runs.worst(run, [nominal]), runs.worst(runs.held, [nominal])]
         return np.array(first + [runs.worst(run, of) for of in list(robots.values())[len(first) :]])
 

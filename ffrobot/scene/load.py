@@ -139,7 +139,7 @@ def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
 
 
 def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
-    """`data` with the `end` and `output_step` of forward analyses taken from their actuation where not given."""
+    """Return `data` where forward analyses without `end` or `output_step` have those of their actuation."""
     try:
         sources = {analysis["name"]: analysis for analysis in data["analysis"]}
         analyses = []

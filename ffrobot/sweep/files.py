@@ -55,9 +55,9 @@ class Variation:
 
 
 def parse_variation(text: str) -> Variation:
-    """`key=0.01:0.03:9` (evenly spaced), `key=1e-6:1e-3:4:log`, or `key=0.1,0.2` and `key="static","undeformed"`.
+    """Read a variation: `key=0.01:0.03:9` (evenly spaced), `key=1e-6:1e-3:4:log` or a list `key=0.1,0.2`.
 
-    `key,key=…` sets both to the same value.
+    Lists may have texts: `key="static","undeformed"`. `key,key=…` sets both to the same value.
     Raises `InputError` where it is none of these.
     """
     key, equals, values = text.partition("=")
@@ -104,7 +104,7 @@ def grid(variations: Sequence[Variation]) -> list[tuple[Value, ...]]:
 
 
 def latin_hypercube(variations: Sequence[Variation], count: int, seed: int) -> list[tuple[Value, ...]]:
-    """`count` combinations of which each key's values spread evenly over its range (McKay, Beckman & Conover 1979)."""
+    """Return `count` combinations whose values spread evenly over each range (McKay, Beckman & Conover 1979)."""
     from scipy.stats.qmc import LatinHypercube
 
     sample = LatinHypercube(len(variations), seed=seed).random(count)

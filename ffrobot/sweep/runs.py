@@ -61,7 +61,7 @@ class Worker:
         self._requests, self._answers = self._process.stdin, self._process.stdout
 
     def perform(self, arguments: list[str]) -> Done:
-        """`ffrobot ARGUMENTS`; exit code and messages are those of the worker where it ends with the run."""
+        """Run `ffrobot ARGUMENTS` in a worker; return exit code and messages, its own if it ends with the run."""
         self._messages.seek(0)
         self._messages.truncate()
         answer = b""

@@ -166,7 +166,7 @@ def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
 def given_shape_of_pieces(
     scene_path: Path, bodies: Bodies, analysis: Fcid, links: Bodies, divided: Mapping[str, DividedLink]
 ) -> Shape:
-    """`given_shape` of the whole `links`, in the coordinates of `bodies`, which have pieces of the divided ones."""
+    """Return `given_shape` of the whole `links` in coordinates of `bodies`, the pieces of subdivided links included."""
     nodes, counts = shape_nodes(analysis), {body.name: body.n_modes for body in bodies}
     shape = dict(zip((link.name for link in links), given_shape(scene_path, links, analysis), strict=True))
     for name, link in divided.items():

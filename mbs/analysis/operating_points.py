@@ -59,7 +59,7 @@ NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be f
 
 
 class InstantAnalysis(Analysis):
-    """`about` the static equilibrium (not given, or "static") or an earlier analysis at `times`."""
+    """Analysis `about` the static equilibrium (not given, or "static") or an earlier analysis at `times`."""
 
     about: str | None = None
     """Earlier analysis of a motion, or "static" (the default): the equilibrium at t = 0."""
@@ -96,7 +96,7 @@ class InstantAnalysis(Analysis):
             yield f'about: expected an earlier analysis of a motion, {known}, found "{self.source}"{hint}'
             return
         if self.instants is None and self.needs_times:
-            yield f'times: expected the times of "{source.name}" about which to be linear, found none'
+            yield f'times: expected the times of "{source.name}" at which to linearize, found none'
         for t in self.instants or ():
             if t - source.last_time > NEAR * source.last_time:
                 yield f'times: expected at most {source.last_time!r}, where "{source.name}" ends, found {t!r}'

@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def split_point(reference: str) -> tuple[str, str]:
-    """`"link1.tip"` → `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
+    """Split `"link1.tip"` into `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
     body, dot, point = reference.partition(".")
     if not (body and dot and point) or "." in point:
         raise ValueError(f'expected a point as "BODY.POINT", found "{shown(reference)}"')

@@ -49,10 +49,10 @@ class OrientationLaw:
 
 
 def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:
-    """The columns qw, qx, qy, qz of a table as those of a rotation vector, and the reference that it turns.
+    """Convert columns qw, qx, qy, qz of a table to a rotation vector, rad, and the reference orientation that it turns.
 
-    It is log(A A_refᵀ) about the middle of all orientations: splines of it have all the derivatives that they have of
-    numbers, where those of quaternions by pieces jump in angular velocity. Raises `InputError` for a row that is no
+    The vector is log(A A_refᵀ) about the mean orientation. Splines of it are smooth; piecewise interpolation of
+    quaternions would jump in angular velocity. Raises `InputError` for a row that is no
     unit quaternion, and for orientations too far apart for one rotation vector.
     """
     columns = [table.columns.index(name) for name in QUATERNION]

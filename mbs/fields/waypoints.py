@@ -314,7 +314,7 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
 
 
 def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]:
-    """Of a row of `path`. Raises `InputError` where they are not as many, or no numbers."""
+    """Return the `count` numbers of a row of `path`. Raises `InputError` if there are others or more."""
     try:
         numbers = [float(cell) for cell in row]
     except ValueError:

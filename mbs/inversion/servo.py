@@ -158,7 +158,7 @@ class Servo:
         return states.left[:, self.of_modes], states.tau
 
     def quasi_static(self, times: Array, p: Array) -> Array:
-        """What the motors do (N, motors) with the shapes p (N, n) if these did not move."""
+        """Return motor torques (N, motors), N·m or N, for shapes p (N, n) at rest relative to the links."""
         return self.forces(times, p, 0 * p, 0 * p)[1]
 
     @cached_property

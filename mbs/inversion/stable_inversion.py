@@ -126,7 +126,7 @@ class _Solver:
         self.status, self.iterations, self.unmet, self.worst = "", 0, 0.0, 0.0
 
     def solve(self, breaks: Array, guess: States, along: Callable[[States, Array], Derivatives]) -> None:
-        """On all breaks; `along`(states, breaks): derivatives, taken where those of the last mesh do not lead on."""
+        """Solve on all breaks from `guess`; `along`(states, breaks): derivatives if those of the last mesh fail."""
         is_near = True  # derivatives to the guess
         for refinement in range(MOST_REFINEMENTS):
             collocated = collocate(self.problem, breaks, guess)
@@ -281,7 +281,7 @@ def _breaks(pre: float, end: float, post: float) -> Array:
 
 
 def with_corners(breaks: Array, functions: Iterable[_core.TimeFunction]) -> Array:
-    """The breaks, and those times within at which conditions of functions change, if they are not next to one."""
+    """Return `breaks` with the times between, s, at which comparisons of t in `functions` change."""
     corners = np.unique([t for function in functions for t in function.switches()])
     near = np.abs(breaks[:, None] - corners).min(axis=0) <= SHORTEST * (breaks[-1] - breaks[0])
     within = (corners > breaks[0]) & (corners < breaks[-1])

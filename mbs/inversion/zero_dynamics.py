@@ -112,7 +112,10 @@ TINY = 1e-300
 
 @struct
 class Linearisation:
-    """The internal dynamics along the path, with the shape (N, n) that links sag to there; `scale` of the output."""
+    """Linear internal dynamics at N times of the path, about the quasi-static `shape` (N, n) of the links.
+
+    `scale` is that of the output, with which zeros are computed.
+    """
 
     dynamics: LinearDynamics
     shape: Array

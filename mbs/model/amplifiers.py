@@ -47,12 +47,12 @@ class Amplifiers:
 
     @property
     def hysteresis(self) -> Hysteresis:
-        """Of the patches."""
+        """Hysteresis of the patches."""
         return Hysteresis(*self.plays)
 
     @property
     def compensator(self) -> Hysteresis:
-        """What wanted voltages go through before the amplifier."""
+        """Inverse hysteresis between wanted voltages and amplifier; identity for patches without compensation."""
         inverse = self.hysteresis.inverse
         none = 1.0 - self.compensated
         weights = self.compensated * inverse.weights

@@ -122,7 +122,7 @@ def resistance(model: Model, q: Array, v: Array) -> Array:
 
 
 def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
-    """Return the derivative (T, n_v) of the friction torque of tree joints by v, coordinate by coordinate."""
+    """Return the derivative (T, n_v), N·m·s/rad or N·s/m, of friction in each tree joint by its own rate."""
     return _of_frictions(tree, v, Friction.slope)
 
 

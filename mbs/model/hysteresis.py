@@ -25,7 +25,7 @@ class Hysteresis:
 
     @property
     def acts(self) -> bool:
-        """Whether any patch acts otherwise than its voltage says."""
+        """Whether the force of any patch is not proportional to its voltage."""
         return bool(self.weights[1:].any() or (self.weights[:1] != 1.0).any())
 
     @property

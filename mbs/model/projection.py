@@ -112,7 +112,10 @@ def _is_small(across: Array, whole: Array) -> bool:
 
 
 def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarker:
-    """`axes` (3, 3): rows x, y of the plane and its normal, in axes of the body."""
+    """Return the marker in 2D; `axes` (3, 3): rows x, y of the plane and its normal, body axes.
+
+    Raises `AcrossError` if modes move it out of the plane.
+    """
     planar, Phi, Phi_r = _core.PlanarMarker(), axes @ marker.Phi[:3], axes @ marker.Phi[3:]
     if not (_is_small(Phi[2], Phi) and _is_small(Phi_r[:2], Phi_r)):
         raise AcrossError

@@ -114,7 +114,7 @@ def turning_joints(model: Model) -> tuple[list[Node], Indices]:
 
 
 def random_angles(guess: Array, columns: Indices, count: int) -> Array:
-    """`count` postures (…, n_q) as `guess` (n_q,), with reproducible random angles, rad, in `columns`."""
+    """Return `count` postures (…, n_q) like `guess` (n_q,), with reproducible random angles, rad, in `columns`."""
     starts = np.tile(guess, (count, 1))
     starts[:, columns] = np.random.default_rng(0).uniform(-np.pi, np.pi, (count, len(columns)))
     return starts

@@ -77,9 +77,9 @@ def _twisted_gears(model: Model, given: State, relaxed: State) -> State:
 
 
 def check_turning(model: Model) -> None:
-    """Raise `InputError` where bodies without inertia about an axis leave a coordinate of a joint without any.
+    """Raise `InputError` if a joint coordinate has no inertia.
 
-    Such bodies, point masses and rods, turn by what their mass has about a joint that is away from them.
+    Point masses and rods have inertia about a joint only if its axis is away from them.
     """
     rigid = ((body.name, tensor(body.rigid.inertia)) for body in model.scene.body if body.rigid is not None)
     slim = [name for name, J in rigid if np.linalg.eigvalsh(J)[0] <= ROUND_OFF * np.abs(J).max()]

@@ -122,7 +122,7 @@ def modal_rates(run: Run, body: str) -> Array:
 
 
 def plane_angle(run: Run, body: str) -> Array:
-    """θ (T,) of the frame of a body that moves in the plane, rad; turns of the joints before it count."""
+    """Return θ (T,), rad, of the frame of a body in 2D, without jumps at ±π: full turns of its joints count."""
     e = body_motion(run, body).orientation
     angle = 2 * np.arctan2(e[:, 3], e[:, 0])
     counted = _turned(run, run.links[body].names[0] if body in run.links else body)

@@ -143,7 +143,7 @@ def missing_to_first_order(
 ) -> Missing:
     """Return the errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
-    p (T, n) and `stations` (k, 3, n), the translations of stations at `places` (k, 3), in the modes of the equations.
+    p (T, n), √kg·m, are modal coordinates, `stations` (k, 3, n) translations of stations at `places` (k, 3), m.
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)

@@ -144,7 +144,7 @@ class _Integration:
 
     @cached_property
     def ends(self) -> Array:
-        """(n,) s at which steps end: see `stops`."""
+        """Times (n,), s, at which steps end: see `stops`."""
         scene, is_replay = self.system.model.scene, self.drives.replayed is not None
         paths = scene.trajectory if self.is_followed or is_replay else ()
         at_points = (size for drive in self.drives.at_points for size in drive.components.values())
@@ -152,7 +152,7 @@ class _Integration:
         return stops(self.times, paths, (*scene.load_functions, *at_points), is_driven=is_driven, is_replay=is_replay)
 
     def run(self, start: State, progress: Progress) -> _core.TreeRun:
-        """What the core makes of it from `start`, or from where it has stopped before."""
+        """Integrate in the core from `start`, or from where an earlier run has stopped."""
         (core, scene, _), control, continuation = self.system.integrated, self.control, self.continuation
         controls = integration_controls(self.analysis, self.integrator)
         controls.stops = as_list(self.ends)
@@ -220,7 +220,7 @@ class _Integration:
         )
 
     def posture(self, run: _core.TreeRun, motion: Run) -> str:
-        """What to say of the worst posture on the path; "" where it is fine."""
+        """Return a remark on the posture nearest to a singular one; "" if all are far from it."""
         model, size, loop_rank = motion.model, len(motion.time), self.loop_rank
         if loop_rank is None or not size:
             is_end = _ends_in_posture(run)
@@ -232,7 +232,7 @@ class _Integration:
         return posture or describe_branches(model, some.time, some.q, loop_rank)
 
     def replayed(self, run: _core.TreeRun, motion: Run, known: int) -> Array:
-        """What a replay does (T, numbers) at the times of `motion`, of which `run` has none of the `known` first."""
+        """Return what a replay applies (T, numbers) at the times of `motion`; `run` lacks the `known` first ones."""
         if self.drives.replayed is None:
             return np.zeros((len(motion.time), 0))
         before = self.drives.replayed.source.sample(as_list(motion.time[:known]))

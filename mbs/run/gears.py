@@ -154,7 +154,7 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
     if turning:
         raise InputError(
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
-            f" linear and modes tilt the joint's axis ({quoted(sorted(turning))}),"
+            f" linearized and modes tilt the joint's axis ({quoted(sorted(turning))}),"
             ' found "frame"'
         )
     forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run), run.twists or None)
@@ -190,7 +190,7 @@ def gear_motion(
     """Return the motion of a gear from torque `tau` (T,) with a rigid gear, of which its rotor takes `rotor` (T,).
 
     `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t), and τ(t), where they are known.
-    Raises `InputError` where damping holds it so long that its moments say nothing of its twist.
+    Raises `InputError` if damping delays the twist so much that torques do not determine it.
     """
     lasts, longest = spring.damping / min(spring.spring.slopes), SLOWEST * (time[-1] - time[0])
     if len(time) > 1 and lasts > longest:

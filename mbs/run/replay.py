@@ -167,12 +167,12 @@ def _found(run: Run, reader: Reader, system: MultibodySystem | None = None) -> _
 
 
 def motor_forces_of(run: Run) -> MotorForces:
-    """τ and F_p of a run, its gears rigid (see `mbs.model.motors`)."""
+    """Return τ (N·m or N) and modal forces F_p of a run, its gears rigid (see `mbs.model.motors`)."""
     return motor_forces(run.model, run.q, supplied_in(run))
 
 
 def supplied_in(run: Run) -> Array:
-    """Return generalized forces (T, n_v) that the paths, or a prescribed shape, of a run require."""
+    """Return generalized forces (T, n_v), N·m or N, modal ones too, that paths or a prescribed shape require."""
     if run.required is not None:
         return run.required
     return path_forces(run.model, run.time, run.q, run.multipliers)

@@ -124,9 +124,9 @@ class BodyKeys(Record):
     The default `name` in a table of a link's keys is that of the body. A link moves in the families of modes that its
     file has, and is rigid in the others.
 
-    Modes beyond `modes` are represented by their static flexibility. Patches that are enough for all modes of the file
-    serve these, others those kept. Results of a link in `pieces` are those of the whole link; geometric stiffening is
-    then on by default.
+    Modes beyond `modes` are represented by their static flexibility. If there are at least as many patches as modes in
+    the file, voltages supply the forces of all of them, else of the kept ones. Results of a link in `pieces` are
+    those of the whole link; geometric stiffening is then on by default.
     """
 
     name: Name

@@ -187,7 +187,7 @@ class Trajectory(MotionKeys):
 
     @cached_property
     def stopping(self) -> Piecewise | None:
-        """`path` with a stop at each place; None where it has them anyway."""
+        """Return `path` with a stop at each place; None if it has these stops."""
         return self.model_copy(update={"blend": 0.0}).through(self._places[:, :3]) if self.blend else None
 
     @cached_property

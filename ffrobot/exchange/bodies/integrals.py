@@ -146,7 +146,7 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
 
 
 def slopes(S: Array) -> tuple[Array, Array]:
-    """`spin_slope` and `centrifugal_slope` from S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV at [k, l]."""
+    """Return `spin_slope` and `centrifugal_slope` from S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV at [k, l]."""
     total = S[0, 0] + S[1, 1] + S[2, 2]
     centrifugal = [S[a, a] - total if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
     return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)

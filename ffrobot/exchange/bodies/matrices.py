@@ -92,7 +92,7 @@ def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
         missing = [name for name in wanted if name not in link.coordinates]
         raise InputError(
             f"modal body {body.name}: expected six coordinates of each interface, found none for {', '.join(missing)}:"
-            ' take [modes] family = "all"'
+            ' use [modes] family = "all"'
         )
     damping = np.diag(2 * body.damping_ratio * 2 * np.pi * body.frequency)
     content = io.BytesIO()

@@ -116,7 +116,7 @@ def _turned_nodes(modal: Modal) -> Iterator[str]:
         node.keys["number"] for node, part in axes if np.abs(modal.taylor(part, (3, 3)).m0 - np.eye(3)).max() > SAME
     ]
     if turned:
-        yield f"AP: turned axes of nodes {', '.join(turned)} left out: joints there have those of the body"
+        yield f"AP: turned axes of nodes {', '.join(turned)} are omitted: joints there have the axes of the body"
 
 
 def _integrals(modal: Modal) -> ShapeIntegrals:

@@ -136,7 +136,7 @@ class Chart:
 
 
 def plain(text: str) -> str:
-    """`text` as Plotly shows it literally: it would take <b> for bold."""
+    """Return `text` so that Plotly shows it literally, `<b>` too."""
     return escape(text, quote=False)
 
 
