@@ -73,6 +73,7 @@ class Smoothed:
         path, best = Path(output), self.best
         make = maker_of(path)
         rates = np.gradient(best.command, best.times, axis=0)
+        rates[[0, -1]] = 0.0  # at rest, which controllers of trajectories ask for
         moments = [None] * len(self.robot.joints) if best.moments is None else best.moments.T
         joints = map(JointMotion, self.robot.joints, best.command.T, rates.T, moments)
         motion = JointMotions("smooth", best.times, tuple(joints), ())
