@@ -10,6 +10,8 @@ from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
 from .options import POSITIVE, output_option, protect, scene_argument
 
+KINDS = ("averaged", "slower", "shaped", "inverted")
+
 
 @click.command()
 @scene_argument
@@ -33,6 +35,9 @@ from .options import POSITIVE, output_option, protect, scene_argument
 @click.option("--jerk", metavar="LIMIT", type=POSITIVE, help="Limit of all joints (rad/s³, m/s³).")
 @click.option("--degrees", is_flag=True, help="Angles of the file are in degrees.")
 @click.option("--rate", metavar="HZ", type=POSITIVE, default=125.0, show_default=True, help="Rate of new set points.")
+@click.option(
+    "--write", "kind", type=click.Choice(KINDS), help="Kind of motion to write.  [default: the first to settle]"
+)
 @output_option(
     "OUT.json|.csv|.rosbag2", "New motion, with OUT.png and OUT.report.html [SCENE.smooth.json next to the input]."
 )
@@ -48,6 +53,7 @@ def smooth(
     acceleration: float | None,
     jerk: float | None,
     rate: float,
+    kind: str | None,
     output: Path | None,
     *,
     degrees: bool,
@@ -58,7 +64,7 @@ def smooth(
     MOTION is a CSV table of joint positions with times, a JointTrajectory (JSON, YAML), or a bag of ROS. Compliant
     gears (`stiffness` of joints) and flexible links vibrate; motors follow set points through position controllers.
     New motions are averaged, slower, shaped for natural frequencies, or inverted: motors lead by the strain of their
-    gears. Each is simulated; OUT is the one that settles first.
+    gears. Each is simulated; OUT is the one that settles first, or that of --write.
     """
     from ..common.files import write_atomically
     from ..present.console import Display, summary_console
@@ -81,7 +87,7 @@ def smooth(
     console = summary_console()
     print_smooth(found, console)
     if found.candidates:
-        found.write(target, force=force)
+        found.write(target, kind=kind or "", force=force)
         console.print(f"written    {target}", soft_wrap=True)
     figure, page = target.with_suffix(".png"), target.with_suffix(".report.html")
     write_atomically(figure, picture(found, "png"), "picture", ours=True)

@@ -54,29 +54,36 @@ class Smoothed:
     @property
     def best(self) -> Candidate:
         """The motion that settles first. Raises `SolveError` where there is none."""
+        return self.first()
+
+    def first(self, kind: str = "") -> Candidate:
+        """Return the best motion of a kind: averaged, slower, shaped or inverted. Raises `SolveError` without one."""
         if not self.candidates:
             raise SolveError(f"expected a motion to be improved, found: {self.verdict}")
-        return self.candidates[0]
+        for candidate in self.candidates:
+            if candidate.name.startswith(kind):
+                return candidate
+        raise SolveError(f"expected a motion that is {kind}, found {quoted(one.name for one in self.candidates)}")
 
     @property
     def torque(self) -> float:
         """The largest torque of the motion as it is, by its limit; 0 without limits."""
         return float((self.before.ride.torque / self.limits.sizes[3]).max())
 
-    def write(self, output: AnyPath, *, force: bool = False) -> None:
-        """Write the best motion as a JointTrajectory (`.json`), a table (`.csv`) or a bag of ROS 2 (`.rosbag2`).
+    def write(self, output: AnyPath, *, kind: str = "", force: bool = False) -> None:
+        """Write the best motion (of a kind) as JointTrajectory (`.json`), table (`.csv`) or bag of ROS 2 (`.rosbag2`).
 
         Raises:
             InputError: another ending, or a file would be replaced without `force`.
-            SolveError: nothing vibrates, or `rosbags` is not installed.
+            SolveError: nothing vibrates, no motion is of that kind, or `rosbags` is not installed.
         """
-        path, best = Path(output), self.best
+        path, new = Path(output), self.first(kind)
         make = maker_of(path)
-        rates = np.gradient(best.command, best.times, axis=0)
+        rates = np.gradient(new.command, new.times, axis=0)
         rates[[0, -1]] = 0.0  # at rest, which controllers of trajectories ask for
-        moments = [None] * len(self.robot.joints) if best.moments is None else best.moments.T
-        joints = map(JointMotion, self.robot.joints, best.command.T, rates.T, moments)
-        motion = JointMotions("smooth", best.times, tuple(joints), ())
+        torques = [None] * len(self.robot.joints) if new.moments is None else new.moments.T
+        joints = map(JointMotion, self.robot.joints, new.command.T, rates.T, torques)
+        motion = JointMotions("smooth", new.times, tuple(joints), ())
         write_content(path, make(motion), force=force)
 
 

@@ -71,6 +71,15 @@ def test_what_is_written_is_a_stream_without_faults(tmp_path, found, name):
             assert point["velocities"] == [0.0, 0.0]
 
 
+def test_another_motion_is_written_by_its_kind(tmp_path, found):
+    found.write(tmp_path / "new.csv", kind="shaped")
+    shaped = next(one for one in found.candidates if one.name.startswith("shaped"))
+    written_values = np.loadtxt(tmp_path / "new.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(written_values[:, 0], shaped.times, atol=1e-9)
+    with pytest.raises(SolveError, match="expected a motion that is doubled, found"):
+        found.write(tmp_path / "other.csv", kind="doubled")
+
+
 def test_other_endings_are_rejected(tmp_path, found):
     with pytest.raises(InputError, match=r'expected a name that ends in .*found "new\.txt"'):
         found.write(tmp_path / "new.txt")
