@@ -27,6 +27,7 @@ class Diagnosis:
 
     Attributes:
         recording, ride: the stream, and the robot under it.
+        even: the robot under its set points at even times; the same where these are no smoother.
         faults: of the stream.
         frequencies: (instants, k) Hz, the lowest along the motion, with motors locked.
         alone: (n,) m, residual vibration at the point by each joint alone, peak to peak, linear model at the end.
@@ -37,6 +38,7 @@ class Diagnosis:
 
     recording: Recording
     ride: Ride
+    even: Ride
     faults: tuple[Fault, ...]
     frequencies: Array
     alone: Array
@@ -70,14 +72,20 @@ class Diagnosis:
         return (
             f"vibration of the robot: {robot.point} swings by {1e3 * self.residual:.3g} mm peak to peak after the last"
             f" set point, at {frequency:.3g} Hz, excited by {why}; {robot.joints[worst]} causes {100 * share:.0f} %"
+            + self._at_even_times()
         )
+
+    def _at_even_times(self) -> str:
+        if self.even is self.ride or self.even.settling is None:
+            return ""
+        return f". Sent at even times, the same set points leave {1e3 * self.even.settling.residual:.3g} mm"
 
 
 def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     """Simulate the stream as it is, and look for faults of it. Raises `SolveError` as `Robot.ride`."""
     times, command = recording.dense(min(recording.step / 4, 1e-3))
     ride = robot.ride(times, command)
-    path, modes = robot.servo.motors(times, command), modes_along(robot, ride)
+    path, modes, even = robot.servo.motors(times, command), modes_along(robot, ride), evened(recording)
     kept = min(KEPT, *(len(one.omega) for one in modes))
     frequencies = np.array([one.omega[:kept] for one in modes]) / (2 * np.pi)
     left = modes[-1].left(*accelerations(path))
@@ -85,14 +93,19 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     spectrum = _spectrum(path, grid)
     faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits, ride.torque)]
     if kept:
-        even = evened(recording)
         of_even = spectrum if even is recording else _spectrum(robot.servo.motors(even.times, even.values), grid)
         faults += [*_coarse(recording, frequencies), *_resonance(robot, frequencies, grid, of_even)]
     return Diagnosis(
-        recording, ride, tuple(faults), as_floats(frequencies), as_floats(2 * np.abs(left).sum(axis=0)),
-        as_floats(2 * np.abs(left.sum(axis=1))[:kept]), np.vstack([grid, spectrum.T]),
-        peaks(*recording.dense(recording.step / 4)),
-    )  # fmt: skip
+        recording=recording,
+        ride=ride,
+        even=ride if even is recording else robot.ride(*even.dense(min(even.step / 4, 1e-3))),
+        faults=tuple(faults),
+        frequencies=as_floats(frequencies),
+        alone=as_floats(2 * np.abs(left).sum(axis=0)),
+        by_mode=as_floats(2 * np.abs(left.sum(axis=1))[:kept]),
+        spectrum=np.vstack([grid, spectrum.T]),
+        peaks=peaks(*recording.dense(recording.step / 4)),
+    )
 
 
 def modes_along(robot: Robot, ride: Ride, *, of_links: bool = False) -> list[Modes]:

@@ -182,10 +182,15 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
         )  # fmt: skip
 
 
+def _even_times(recording: Recording) -> Array:
+    """(T,) s; of the usual step, its median, jitter leaves some per cent, which add up."""
+    return np.linspace(recording.times[0], recording.times[-1], len(recording.times))
+
+
 def is_even(recording: Recording) -> bool:
     """Whether rows make a smoother motion at even times than at those of their stamps."""
-    even = np.arange(len(recording.times)) * recording.step
-    rates = (difference_quotients(times, recording.values)[1] for times in (even, recording.times))
+    both = (_even_times(recording), recording.times)
+    rates = (difference_quotients(times, recording.values)[1] for times in both)
     by_even, by_stamps = (np.mean(np.diff(of, axis=0) ** 2) for of in rates)
     return bool(by_even < EVEN**2 * by_stamps)
 
@@ -194,7 +199,7 @@ def evened(recording: Recording) -> Recording:
     """Return the recording with rows at even times, if these make a smoother motion."""
     if recording.rates is not None or not is_even(recording):
         return recording
-    return replace(recording, times=np.arange(len(recording.times)) * recording.step)
+    return replace(recording, times=_even_times(recording))
 
 
 def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Iterator[Fault]:

@@ -31,4 +31,5 @@ def test_numbers_of_the_readme(tmp_path):
         assert row[2] == pytest.approx(printed[name][2], rel=0.02, abs=1e-5), name  # mm: the tolerance of integration
     assert 1e3 * logged.before.residual == pytest.approx(6.0, rel=0.02)
     assert [fault.kind for fault in logged.before.faults] == ["jitter", *["limit"] * 3]
+    assert 1e3 * logged.before.even.settling.residual == pytest.approx(printed["as it is"][2], rel=0.02)
     assert logged.best.residual < 1e-4

@@ -165,6 +165,21 @@ def test_each_fault_has_its_diagnosis(tmp_path, name):
         assert found.verdict.endswith("the stream has no fault")
 
 
+def test_jitter_is_told_apart_from_the_motion(tmp_path):
+    """At even times the robot does what it does on the set points before their stamps jittered."""
+    rows = motion(averaged_step(np.array([0.6, 0.3])))
+    late = TIMES.copy()
+    _jitter(late)
+    as_planned, found = (
+        smooth_motion(arm(tmp_path), table(tmp_path / "path.csv", times, **rows)) for times in (TIMES, late)
+    )
+    left = found.before.even.settling.residual
+    assert left == pytest.approx(as_planned.before.residual, rel=0.05)
+    assert found.before.residual > 1.2 * left
+    assert found.verdict.endswith(f"Sent at even times, the same set points leave {1e3 * left:.3g} mm")
+    assert "even times" not in as_planned.verdict
+
+
 def test_joints_go_by_name_in_any_order_and_file(tmp_path, ffrobot):
     """A JointTrajectory in YAML with joints the other way round, in degrees, by the command: what the CSV is."""
     rows = motion(averaged_step(np.array([0.6, 0.3])))
