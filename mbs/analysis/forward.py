@@ -76,14 +76,15 @@ class Forward(ActuatedAnalysis):
             return drive_robot(model, self, start, progress, warnings=texts, earlier=context.earlier)
         source = context.outcomes[self.actuation]
         if model.tree.gears and not source.model.tree.gears:
-            return _behind_gears(source, model, self, context)
-        replayed = _replayed(context, source, self)
+            replayed, start = _behind_gears(source, model, self, context)
+        else:
+            replayed, start = _replayed(context, model, source, self), State(source.q[0], source.v[0])
         if self.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
             replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
         run = drive_robot(
             model,
             self,
-            context.start or State(source.q[0], source.v[0]),
+            context.start or start,
             progress,
             drives=Drives(replayed=replayed),
             times=replay_times(source, self),
@@ -112,19 +113,19 @@ class Forward(ActuatedAnalysis):
             )
 
 
-def _replayed(context: Context, source: Run, analysis: Forward) -> Replayed:
-    model = source.model
+def _replayed(context: Context, model: Model, source: Run, analysis: Forward) -> Replayed:
+    """What `source` found, as it acts on `model`, whose links may be other ones."""
     nothing = Command(np.zeros(model.tree.n_v))
     if analysis.apply == "trajectory":
         forces, joints, at_points, count = path_numbers(source)
-        rows = [row for row in model.rows if row.is_trajectory and row.kind == "coordinate"]
+        rows = [row for row in source.model.rows if row.is_trajectory and row.kind == "coordinate"]
         along = [Command(row.sign * np.eye(model.tree.n_v)[row.coordinate]) for row in rows]
         return Replayed(forces, (*along, *[nothing] * (count - len(along))), at_points, joints)
     if analysis.apply == "points":
         chosen = list(context.at_points(source))
         at_points = {point: dict(zip("xyz", range(3 * k, 3 * k + 3), strict=True)) for k, point in enumerate(chosen)}
         return Replayed(point_numbers(source, context.points), (nothing,) * (3 * len(chosen)), at_points)
-    _check_motors(model, analysis, source.q[0])
+    _check_motors(source.model, analysis, source.q[0])
     patches = context.patches if analysis.apply == "joints+pzt" else {}
     forces = _supplied(source, largest_moments(model, limits=analysis.limits), patches, analysis)
     return Replayed(forces, actuator_commands(model, patches), moments=numbers_of_motors(model))
@@ -142,8 +143,11 @@ def numbers_of_motors(model: Model) -> dict[str, list[int]]:
     return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
 
 
-def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context) -> Run:
-    """Where gears of `model` give: moments at the outputs of `source` and splines between these, and its voltages."""
+def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context) -> tuple[Replayed, State]:
+    """Where gears of `model` give: moments at the outputs of `source` and splines between these, and its voltages.
+
+    And where their motors begin.
+    """
     if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints with'
@@ -165,15 +169,7 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
         forces = _core.ForcesOfBoth(forces, _supplied(source, most, context.patches, analysis))
         motors = (*motors, *[Command(np.zeros(model.tree.n_v))] * len(most), *patches)
     replayed = Replayed(forces, motors, moments=numbers_of_motors(model))
-    return drive_robot(
-        model,
-        analysis,
-        State(in_motors.q[0], in_motors.v[0]),
-        context.progress,
-        drives=Drives(replayed=replayed),
-        times=replay_times(source, analysis),
-        earlier=context.earlier,
-    )
+    return replayed, State(in_motors.q[0], in_motors.v[0])
 
 
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
