@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..actuation.points import PointSet, with_points
-from ..common.errors import InputError, quoted
+from ..common.errors import InputError
 from ..mbs.linear.vibration import with_robot_damping
 from ..mbs.model.body import Body
 from ..mbs.model.model import Model, build_model
@@ -169,15 +169,12 @@ def _known_between(scene: Scene, bodies: Mapping[str, Body], links: Iterable[tup
 
 
 def check_replays(solution: Solution) -> None:
-    """Raise `InputError` where `check` or `robustness` would simulate robots for which nothing does that."""
+    """Raise `InputError` where `check` would simulate robots for which nothing does that."""
     scene, motors = solution.scene, solution.model.motors
-    compliant = [joint.name for joint in scene.joint if getattr(joint, "stiffness", None) is not None]
+    is_compliant = any(getattr(joint, "stiffness", None) is not None for joint in scene.joint)
     for analysis in scene.analysis:
-        place = f'{scene.path}: analysis "{analysis.name}"'
-        if analysis.is_checked and (compliant or not motors):
-            raise InputError(f'{place}: check: expected motors, and joints without stiffness, for "finer"')
-        if compliant and getattr(analysis, "robustness", None) is not None:
+        if analysis.is_checked and (is_compliant or not motors):
             raise InputError(
-                f"{place}: robustness: expected rigid gears, found stiffness in {quoted(compliant)}; closed-loop"
-                " analyses simulate these"
+                f'{scene.path}: analysis "{analysis.name}": check: expected motors, and joints without stiffness, for'
+                ' "finer"'
             )

@@ -18,11 +18,16 @@ from ..common.errors import SolveError
 from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.operating_points import locked_motors
+from ..mbs.joints.joints import AnyJoint
+from ..mbs.joints.revolute import RevoluteJoint
+from ..mbs.joints.twist_spring import stiffer
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
+from ..mbs.model.gears import elastic_joints, with_compliance
 from ..mbs.model.known_motion import State, mass_matrices
 from ..mbs.model.model import Model, build_model, without_paths
 from ..mbs.run.context import place_of
+from ..mbs.run.gears import with_motor_coordinates
 from ..mbs.run.record import Run
 from ..mbs.scene.loads import Load
 from ..mbs.scene.robustness import Robustness
@@ -54,7 +59,7 @@ def robust(scene: Scene) -> Scene:
 
 
 def deviations(context: ActuatedContext, source: Run) -> Deviations:
-    """Return the robustness table of a run of a robot with rigid gears."""
+    """Return the robustness table of a run."""
     asked: Robustness = source.analysis.robustness  # type: ignore[attr-defined]
     held = f"zero-order hold of {1e3 * asked.sample_time:g} ms"
     runs, nominal = _Runs(context, source, asked), context.model
@@ -79,12 +84,25 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
 
 
 def _varied(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
-    """Robots with other links, by cause: the same for both signs."""
+    """Robots with other links and gears, by cause: the same for both signs."""
+    scene, bodies = model.scene, _bodies(model)
     for what in ("stiffness", "mass"):
-        for share in asked.parameters:
-            for factor in (1.0 - share, 1.0 + share):
-                bodies = [scaled(body, **{what: factor}) if body.n_modes else body for body in _bodies(model)]
-                yield f"{what} ± {100 * share:g} %", build_model(model.scene, bodies)
+        for share, factor in _both_ways(asked.parameters):
+            varied = [scaled(body, **{what: factor}) if body.n_modes else body for body in bodies]
+            yield f"{what} ± {100 * share:g} %", build_model(scene, varied)
+    for share, factor in _both_ways(asked.gears if elastic_joints(model) else ()):
+        joints = tuple(_with_gear(joint, factor) for joint in scene.joint)
+        yield f"gear stiffness ± {100 * share:g} %", build_model(scene.model_copy(update={"joint": joints}), bodies)
+
+
+def _with_gear(joint: AnyJoint, factor: float) -> AnyJoint:
+    if not isinstance(joint, RevoluteJoint) or joint.stiffness is None:
+        return joint
+    return joint.model_copy(update={"stiffness": stiffer(joint.stiffness, factor)})
+
+
+def _both_ways(shares: Sequence[float]) -> Iterator[tuple[float, float]]:
+    return ((share, 1.0 + sign * share) for share in shares for sign in (-1, 1))
 
 
 def _bodies(model: Model) -> list[Any]:
@@ -108,8 +126,6 @@ class _Runs:
         self.applied = "joints+pzt" if "joints+pzt" in given.applicable else "joints"
         followed = dict.fromkeys(path.point for path in scene.trajectory if path.point is not None)
         self.points = [place_of(context.whole, point) for point in followed] or [default_tip(source.model)]
-        lowest = [float(node.body.stiffness.min()) ** 0.5 for node in source.model.tree.nodes if node.body.n_modes]
-        self.bandwidth = asked.bandwidth or 0.5 * min(lowest, default=2.0 / asked.sample_time)
         self.keys = {
             "name": "robustness",
             "actuation": given.name,
@@ -121,24 +137,31 @@ class _Runs:
         self.controller = self._controller()
 
     def _controller(self) -> dict[str, Any]:
-        """Critically damped with rigid links, and slow enough for its samples where links bend away from the motors."""
-        model, motors = self.context.model, self.context.model.motors
-        columns = np.concatenate([*motors.values()]).astype(int)
+        """Critically damped with rigid links and gears; slow enough for its samples where they give way to motors."""
+        model, T = self.context.model, self.asked.sample_time
         arm = ControlledRobot(without_paths(model), self.context.patches, self.source).rigid()
         angles = arm.angles()
         rigid = np.diag(np.linalg.inv(arm.terms(angles, np.zeros_like(angles))[0]))
-        bending = np.diag(np.linalg.inv(mass_matrices(model, self.source.q[:1])[0]))[columns]
-        if self.asked.bandwidth is None:
-            slow_enough = SAMPLED / self.asked.sample_time * float((rigid / bending).min())
-            self.bandwidth = min(self.bandwidth, slow_enough)
-        gains, first = {}, 0
-        for joint, of in motors.items():
-            gains[joint] = float((1.0 / rigid[first : first + len(of)]).min()) * self.bandwidth**2
-            first += len(of)
-        damping = {joint: 2.0 * gain / self.bandwidth for joint, gain in gains.items()}
-        pid = JointPid(kind="joint-pid", proportional=gains, derivative=damping, rate="difference")
-        encoders = [Sensor(joint=joint, resolution=self.asked.resolution) for joint in motors]
-        return {"controller": (pid,), "sensor": tuple(encoders)}
+        mobility = model.by_motor(rigid)
+        geared, start = self._geared(model)
+        columns = np.concatenate([*geared.motors.values()]).astype(int)
+        giving = np.diag(np.linalg.inv(mass_matrices(geared, start.q[None])[0]))[columns]
+        squares = [float(node.body.stiffness.min()) for node in model.tree.nodes if node.body.n_modes]
+        squares += [min(gear.spring.slopes) * mobility[gear.joint.joint.name].max() for gear in geared.tree.gears]
+        slow_enough = SAMPLED * float((rigid / giving).min())
+        self.bandwidth = self.asked.bandwidth or min(0.5 * min(squares, default=4.0 / T**2) ** 0.5, slow_enough / T)
+        sides = dict.fromkeys(model.motors, "joint") | {gear.joint.joint.name: "motor" for gear in geared.tree.gears}
+        gains = {joint: float((1.0 / of).min()) * self.bandwidth**2 for joint, of in mobility.items()}
+
+        def pid(side: str) -> JointPid:
+            P = {joint: gain for joint, gain in gains.items() if sides[joint] == side}
+            D = {joint: 2.0 * gain / self.bandwidth for joint, gain in P.items()}
+            keys = {"kind": "joint-pid", "side": side, "rate": "difference", "proportional": P, "derivative": D}
+            return JointPid.model_validate(keys)
+
+        read = {"resolution": self.asked.resolution}
+        encoders = (Sensor.model_validate(read | {side: joint}) for joint, side in sides.items())
+        return {"controller": tuple(map(pid, sorted(set(sides.values())))), "sensor": tuple(encoders)}
 
     def replayed(self, model: Model) -> Run:
         """Under the torques and voltages of the source, at any time."""
@@ -158,17 +181,21 @@ class _Runs:
         assert isinstance(run, Run)
         return run
 
+    def _geared(self, model: Model) -> tuple[Model, State]:
+        """The robot alone with its compliant gears, and in its coordinates where the source begins."""
+        alone = with_compliance(without_paths(model))
+        moved = with_motor_coordinates(self.source, alone)
+        return alone, State(moved.q[0], moved.v[0])
+
     def _start(self, model: Model) -> State | None:
         """At rest with the motors where those of the source begin, links in equilibrium; None for its own model."""
         if model is self.context.model:
             return None
-        alone, source = without_paths(model), self.source
-        q = source.q[0].copy()
+        alone, start = self._geared(model)
+        q = start.q.copy()
         for node in alone.tree.nodes:
             q[node.p_q] = 0.0
-        return static_equilibrium(
-            replace(alone, rows=(*alone.rows, *locked_motors(alone, q))), State(q, 0.0 * source.v[0])
-        )
+        return static_equilibrium(replace(alone, rows=(*alone.rows, *locked_motors(alone, q))), State(q, 0.0 * start.v))
 
     def worst(self, run: Callable[[Model], Run], robots: Sequence[Model]) -> float:
         """The largest distance, m, of the followed points from where they are to be; infinite where a run fails."""

@@ -203,7 +203,7 @@ def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
     """Rows that keep the coordinates of motors where they are at q (n_q,)."""
     rows: list[ConstraintRow] = []
     for joint, columns in model.motors.items():
-        node = model.tree.nodes[model.tree.carried[joint]]
+        node = model.driven(joint)
         now = q[node.q.start + columns - node.v.start]
         rows += rows_of_joint(joint, node, columns, [TimeFunction.constant(float(value)) for value in now])
     return rows

@@ -30,6 +30,13 @@ class StiffnessSteps(Record):
         return self
 
 
+def stiffer(stiffness: float | StiffnessSteps, factor: float) -> float | StiffnessSteps:
+    """Return the key `stiffness` of a spring with `factor` times the slopes, its steps at the same torques."""
+    if not isinstance(stiffness, StiffnessSteps):
+        return factor * stiffness
+    return stiffness.model_copy(update={"values": tuple(factor * K for K in stiffness.values)})
+
+
 @struct
 class TwistSpring:
     """Torque of a twist, odd and piecewise linear."""
