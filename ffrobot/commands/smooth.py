@@ -10,8 +10,6 @@ from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
 from .options import POSITIVE, output_option, protect, scene_argument
 
-KINDS = ("averaged", "slower", "shaped", "inverted")
-
 
 @click.command()
 @scene_argument
@@ -36,7 +34,11 @@ KINDS = ("averaged", "slower", "shaped", "inverted")
 @click.option("--degrees", is_flag=True, help="Angles of the file are in degrees.")
 @click.option("--rate", metavar="HZ", type=POSITIVE, default=125.0, show_default=True, help="Rate of new set points.")
 @click.option(
-    "--write", "kind", type=click.Choice(KINDS), help="Kind of motion to write.  [default: the first to settle]"
+    "--write",
+    "kind",
+    metavar="averaged|slower|shaped|inverted",
+    default="",
+    help="Kind of motion to write.  [default: the first to settle]",
 )
 @output_option(
     "OUT.json|.csv|.rosbag2", "New motion, with OUT.png and OUT.report.html [SCENE.smooth.json next to the input]."
@@ -53,7 +55,7 @@ def smooth(
     acceleration: float | None,
     jerk: float | None,
     rate: float,
-    kind: str | None,
+    kind: str,
     output: Path | None,
     *,
     degrees: bool,
@@ -82,13 +84,15 @@ def smooth(
         found = smooth_motion(
             scene_file, motion, servo=controllers, damping_ratio=damping_ratio, point=point,
             settled=settled, acceleration=acceleration or float("inf"), jerk=jerk or float("inf"),
-            degrees=degrees, rate=rate, watcher=display,
+            degrees=degrees, rate=rate, kind=kind, watcher=display,
         )  # fmt: skip
     console = summary_console()
     print_smooth(found, console)
     if found.candidates:
-        found.write(target, kind=kind or "", force=force)
-        console.print(f"written    {target}", soft_wrap=True)
+        found.write(target, force=force)
+        console.print(f"written    {target}: {found.best.name}", soft_wrap=True, markup=False)
+    else:
+        console.print("written    no other motion", soft_wrap=True)
     figure, page = target.with_suffix(".png"), target.with_suffix(".report.html")
     write_atomically(figure, picture(found, "png"), "picture", ours=True)
     console.print(f"figure     {figure}", soft_wrap=True)

@@ -29,6 +29,7 @@ MOST = 24  # durations
 TRIALS = 5  # durations of inverted motions
 SHARE = 0.5  # of the tolerance that the linear models may leave
 WRONG = 0.1  # of the stiffness of gears, by which it may be off: so much of the vibration without inversion is left
+TINY = 1e-300  # of the square of a line's length, where set points rest
 SHAPERS: tuple[Kind, ...] = ("zv", "zvd", "ei")
 
 T = TypeVar("T")
@@ -69,14 +70,18 @@ class Candidate:
         return np.inf if self.ride.settling is None else self.ride.settling.residual
 
 
-def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float) -> list[Candidate]:
-    """One of each kind, set points every `step` s, simulated; the best first.
+def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float, kind: str = "") -> list[Candidate]:
+    """One of each kind, set points every `step` s, simulated; that of `kind` first, then the best.
 
     That is the one which settles first of those that keep the limits; where none settles, that which vibrates least.
     """
     search = _Search(robot, before, limits, step)
     found = [search.simulated(*motion) for motion in search.motions()]
-    return sorted(found, key=lambda one: (max(one.excess, one.torque) > 1.0, one.settled, one.residual))
+
+    def rank(one: Candidate) -> tuple[bool, bool, float, float]:
+        return not one.name.startswith(kind), max(one.excess, one.torque) > 1.0, one.settled, one.residual
+
+    return sorted(found, key=rank)
 
 
 Motion = tuple[str, Array, Array, Array | None]
@@ -105,7 +110,7 @@ class _Search:
         factor, values = self._first([(float(c), self._averaged(self._along(c), kept[0][0])) for c in factors])
         yield f"slower by {100 * (factor - 1):.3g} %", values, values, None
         name, values = self._first(sorted(self._shaped(kept[0][1]), key=lambda one: len(one[1])))
-        yield f"shaped by {name}", values, values, None
+        yield f"shaped by {name}, averaged over {1e3 * kept[0][0]:.3g} ms", values, values, None
         if self.robot.has_gears and self.robot.servo.is_invertible:
             yield self._inverted(kept)
 
@@ -130,11 +135,8 @@ class _Search:
 
     def simulated(self, name: str, values: Array, smooth: Array, moments: Array | None) -> Candidate:
         """The robot under the set points."""
-        from scipy.spatial import cKDTree
-
         times = self.step * np.arange(len(values))
-        fine = np.linspace(0.0, self.times[-1], 4 * len(self.times))
-        off = float(cKDTree(_between(fine, self.times, self.values)).query(smooth)[0].max())
+        off = float(distances(smooth, self.values).max())
         ride = self.robot.ride(times, values)
         torque = float((ride.torque / self.limits.sizes[3]).max())
         return Candidate(name, times, values, moments, ride, off, self._excess(values), torque)
@@ -161,7 +163,8 @@ class _Search:
                 rows = np.arange(len(shaped) + last, dtype=float)
                 before = [_between(rows - one.delay / self.step, rows[: len(shaped)], shaped) for one in sequence]
                 shaped = np.tensordot([one.share for one in sequence], before, 1)
-            yield f"{kind} for {', '.join(f'{1 / period:.3g} Hz' for period in self.periods[:count])}", shaped
+            frequencies = ", ".join(f"{1 / period:.3g} Hz" for period in self.periods[:count])
+            yield f"{kind} for {frequencies}", shaped
 
     def _first(
         self, motions: Sequence[tuple[T, Array]], left: Callable[[Array], float] | None = None
@@ -197,6 +200,19 @@ def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
     """Residual vibration (m, peak to peak) of the worst posture, driven along the path."""
     driving = accelerations(path)
     return max((float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in modes), default=0.0)
+
+
+def distances(points: Array, line: Array) -> Array:
+    """Return distances (T,) of points (T, n) from lines through vertices (m, n), about the nearest vertex of each."""
+    from scipy.spatial import cKDTree
+
+    nearest, last = cKDTree(line).query(points)[1], len(line) - 1
+    off = []
+    for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, last - 1)):
+        along, apart = line[first + 1] - line[first], points - line[first]
+        part = np.einsum("ij,ij->i", apart, along) / np.maximum(np.einsum("ij,ij->i", along, along), TINY)
+        off.append(np.linalg.norm(apart - np.clip(part, 0.0, 1.0)[:, None] * along, axis=1))
+    return np.minimum(*off)
 
 
 def _between(at: Array, times: Array, values: Array) -> Array:

@@ -28,6 +28,8 @@ from .recording import Limits, limits_of, planned, read_recording
 from .robot import Robot
 from .servo import Servo
 
+KINDS = ("averaged", "slower", "shaped", "inverted")
+
 
 @struct
 class Smoothed:
@@ -37,14 +39,16 @@ class Smoothed:
         robot: what was simulated.
         before: the motion as it is.
         limits: of joints.
-        candidates: motions along the same path, simulated, the best first; none where the motion is good as it is, or
-            nothing can vibrate.
+        candidates: motions along the same path, simulated, that of `kind` first, then the best; none where the motion
+            is good as it is, or nothing can vibrate.
+        kind: requested kind of motion: averaged, slower, shaped, inverted; any if empty.
     """
 
     robot: Robot
     before: Diagnosis
     limits: Limits
     candidates: tuple[Candidate, ...]
+    kind: str = ""
 
     @property
     def verdict(self) -> str:
@@ -53,31 +57,32 @@ class Smoothed:
 
     @property
     def best(self) -> Candidate:
-        """The motion that settles first. Raises `SolveError` where there is none."""
-        return self.first()
-
-    def first(self, kind: str = "") -> Candidate:
-        """Return the best motion of a kind: averaged, slower, shaped or inverted. Raises `SolveError` without one."""
+        """The motion that settles first, of the requested kind. Raises `SolveError` where there is none."""
         if not self.candidates:
             raise SolveError(f"expected a motion to be improved, found: {self.verdict}")
-        for candidate in self.candidates:
-            if candidate.name.startswith(kind):
-                return candidate
-        raise SolveError(f"expected a motion that is {kind}, found {quoted(one.name for one in self.candidates)}")
+        if not self.candidates[0].name.startswith(self.kind):
+            names = quoted(one.name for one in self.candidates)
+            raise SolveError(f"expected a motion that is {self.kind}, found {names}")
+        return self.candidates[0]
+
+    @property
+    def excess(self) -> float:
+        """The largest of speed, acceleration and jerk of the motion as it is, by their limits; 0 without limits."""
+        return float((self.before.peaks / self.limits.sizes[:3]).max())
 
     @property
     def torque(self) -> float:
         """The largest torque of the motion as it is, by its limit; 0 without limits."""
         return float((self.before.ride.torque / self.limits.sizes[3]).max())
 
-    def write(self, output: AnyPath, *, kind: str = "", force: bool = False) -> None:
-        """Write the best motion (of a kind) as JointTrajectory (`.json`), table (`.csv`) or bag of ROS 2 (`.rosbag2`).
+    def write(self, output: AnyPath, *, force: bool = False) -> None:
+        """Write the best motion as a JointTrajectory (`.json`), a table (`.csv`) or a bag of ROS 2 (`.rosbag2`).
 
         Raises:
             InputError: another ending, or a file would be replaced without `force`.
-            SolveError: nothing vibrates, no motion is of that kind, or `rosbags` is not installed.
+            SolveError: as `best`, or `rosbags` is not installed.
         """
-        path, new = Path(output), self.first(kind)
+        path, new = Path(output), self.best
         make = maker_of(path)
         rates = np.gradient(new.command, new.times, axis=0)
         rates[[0, -1]] = 0.0  # at rest, which controllers of trajectories ask for
@@ -123,6 +128,7 @@ def smooth_motion(
     jerk: float = np.inf,
     degrees: bool = False,
     rate: float = 125.0,
+    kind: str = "",
     watcher: Watcher | None = None,
 ) -> Smoothed:
     """Find out why a robot vibrates on a recorded or planned motion, and one that leaves less: `ffrobot smooth`.
@@ -140,6 +146,7 @@ def smooth_motion(
         jerk: limit of all joints, rad/s³ or m/s³.
         degrees: whether angles in the file are in degrees.
         rate: of set points of the new motion, Hz.
+        kind: requested kind of motion: averaged, slower, shaped, inverted; empty: the one that settles first.
         watcher: an object that observes progress and can stop the run.
 
     Returns:
@@ -158,6 +165,8 @@ def smooth_motion(
     loaded, watcher = load_robot(Path(scene)), watcher or Watcher()
     if not loaded.motor_joints:
         raise InputError(f"{loaded.path}: expected joints with motors, found none")
+    if kind:
+        check_known(kind, KINDS, f"kind: expected one of {quoted(KINDS)}")
     if not 10.0 <= rate <= 10_000.0:
         raise InputError(f"rate: expected 10 to 10000 Hz, found {rate:g}")
     controllers = _servo(loaded, servo, damping_ratio)
@@ -170,7 +179,8 @@ def smooth_motion(
     before = diagnose(robot, read, limits)
     has_rest = before.frequencies.size and before.ride.settling is not None
     needed = has_rest and (before.residual > settled or before.faults)
-    return Smoothed(robot, before, limits, tuple(candidates(robot, before, limits, 1 / rate)) if needed else ())
+    new = candidates(robot, before, limits, 1 / rate, kind) if needed else ()
+    return Smoothed(robot, before, limits, tuple(new), kind)
 
 
 def _servo(scene: Scene, servo: float | str | Mapping[str, float | str], ratio: float) -> Servo:
