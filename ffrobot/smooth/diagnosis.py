@@ -30,8 +30,10 @@ class Diagnosis:
         even: the robot under its set points at even times; the same where these are no smoother.
         faults: of the stream.
         frequencies: (instants, k) Hz, the lowest along the motion, with motors locked.
-        alone: (n,) m, residual vibration at the point by each joint alone, peak to peak, linear model at the end.
-        by_mode: (k,) m, likewise by frequency.
+        alone: (n,) m, residual vibration at the point by each joint alone, peak to peak, linear model at the end: the
+            sum of its modes, which is the most that it can be.
+        shares: (n,) of the vibration by each joint in phase with the whole; they add up to 1.
+        by_mode: (k,) m, by frequency, of all joints.
         spectrum: (1 + n, F) Hz, and of motors' accelerations, |∫ θ̈ e^(−iωt) dt|, rad/s.
         peaks: (3, n) speed, acceleration and jerk.
     """
@@ -42,6 +44,7 @@ class Diagnosis:
     faults: tuple[Fault, ...]
     frequencies: Array
     alone: Array
+    shares: Array
     by_mode: Array
     spectrum: Array
     peaks: Array
@@ -65,14 +68,15 @@ class Diagnosis:
             what = f"{robot.point} vibrates by {1e3 * self.residual:.2g} mm at most"
             stream = f". Faults of the stream: {', '.join(kinds)}" if kinds else ", and the stream has no fault"
             return f"not vibration of the robot: {what}{stream}"
-        worst = int(self.alone.argmax())
-        share = self.alone[worst] / self.alone.sum()
+        worst = int(self.shares.argmax())
+        share = 100 * self.shares[worst]
+        others = f", other joints take {share - 100:.0f} % away" if round(share) > 100 else ""
         frequency = self.frequencies[-1, int(self.by_mode.argmax())]
         why = f"faults of the stream ({', '.join(causes)})" if causes else "the motion, without a fault of the stream"
         return (
             f"vibration of the robot: {robot.point} swings by {1e3 * self.residual:.3g} mm peak to peak after the last"
-            f" set point, at {frequency:.3g} Hz, excited by {why}; {robot.joints[worst]} causes {100 * share:.0f} %"
-            + self._at_even_times()
+            f" set point, at {frequency:.3g} Hz, excited by {why}; {robot.joints[worst]} causes"
+            f" {share:.0f} %{others}{self._at_even_times()}"
         )
 
     def _at_even_times(self) -> str:
@@ -89,6 +93,8 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     kept = min(KEPT, *(len(one.omega) for one in modes))
     frequencies = np.array([one.omega[:kept] for one in modes]) / (2 * np.pi)
     left = modes[-1].left(*accelerations(path))
+    whole = left.sum(axis=1)
+    in_phase = (whole.conj() @ left).real
     grid = np.linspace(0.0, ABOUT[1] * (frequencies[:, 0].max() if kept else 10.0), GRID)
     spectrum = _spectrum(path, grid)
     faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits, ride.torque)]
@@ -102,7 +108,8 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
         faults=tuple(faults),
         frequencies=as_floats(frequencies),
         alone=as_floats(2 * np.abs(left).sum(axis=0)),
-        by_mode=as_floats(2 * np.abs(left.sum(axis=1))[:kept]),
+        shares=as_floats(in_phase / (in_phase.sum() or 1.0)),
+        by_mode=as_floats(2 * np.abs(whole)[:kept]),
         spectrum=np.vstack([grid, spectrum.T]),
         peaks=peaks(*recording.dense(recording.step / 4)),
     )

@@ -20,7 +20,7 @@ from .smoothing import Smoothed
 
 MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit", "torque")
 STUBBORN = "controllers have zeros that decay too slowly for inversion"
-COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "vibration by it alone (mm)")
+COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "at most, by it alone (mm)", "share")
 
 
 def print_smooth(found: Smoothed, console: Console) -> None:
@@ -96,7 +96,7 @@ def _motions(found: Smoothed) -> Iterator[tuple[str, ...]]:
         _time(last + settling.time_to),
         f"{1e3 * before.residual:.3g}",
         "0",
-        "",
+        _part(found.excess),
         _part(found.torque),
     )
     for one in found.candidates:
@@ -116,4 +116,4 @@ def _rows(of: Diagnosis) -> Iterator[tuple[str, ...]]:
     values = of.recording.values
     for k, joint in enumerate(of.recording.joints):
         numbers = (values[0, k], values[-1, k], *of.peaks[:, k], 1e3 * of.alone[k])
-        yield joint, *(f"{number:.3g}" for number in numbers)
+        yield joint, *(f"{number:.3g}" for number in numbers), f"{100 * of.shares[k]:.0f} %"

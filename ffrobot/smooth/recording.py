@@ -210,7 +210,7 @@ def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Ite
     motion = evened(recording)
     times, values = motion.dense(motion.step / 4)
     for k, name in enumerate(motion.joints):
-        yield from _jumps(name, times, values[:, k])
+        yield from _jumps(name, limits.units[k], times, values[:, k])
         for bound, beyond in zip(limits.positions[k], (values[:, k].min(), values[:, k].max()), strict=True):
             if not limits.positions[k, 0] <= beyond <= limits.positions[k, 1]:
                 yield Fault("limit", f"{name}: position {beyond:.4g} beyond its limit of {bound:.4g}")
@@ -225,17 +225,22 @@ def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Ite
 
 @struct
 class Limits:
-    """Ranges of positions (n, 2); `sizes` (4, n) of speed, acceleration, jerk and torque; infinite without a limit."""
+    """Ranges of positions (n, 2); `sizes` (4, n) of speed, acceleration, jerk and torque; infinite without a limit.
+
+    `units` (n,) are those of coordinates.
+    """
 
     positions: Array
     sizes: Array
+    units: tuple[str, ...]
 
 
 def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
     """Return limits of joints with motors; `acceleration` and `jerk` are in rad/s² and rad/s³ (m/s², m/s³)."""
     joints = scene.motor_joints
     sizes = [(motor.speed, acceleration, jerk, motor.moment) for motor in (joint.motor_limits[0] for joint in joints)]
-    return Limits(np.array([joint.position_limits[0] for joint in joints]), np.transpose(sizes))
+    positions = np.array([joint.position_limits[0] for joint in joints])
+    return Limits(positions, np.transpose(sizes), tuple(joint.units[0] for joint in joints))
 
 
 def peaks(times: Array, values: Array) -> Array:
@@ -249,7 +254,7 @@ def peaks(times: Array, values: Array) -> Array:
     return np.array(found)
 
 
-def _jumps(name: str, times: Array, values: Array) -> Iterator[Fault]:
+def _jumps(name: str, unit: str, times: Array, values: Array) -> Iterator[Fault]:
     """Of the position or the speed, else of the acceleration; or noise, of which each row is a jump."""
     if np.ptp(values) <= STILL:
         return
@@ -265,19 +270,20 @@ def _jumps(name: str, times: Array, values: Array) -> Iterator[Fault]:
     abrupt = _stands_out(bends, NOTABLE * np.abs(rates).max(), bridged)
     if abrupt.any():
         k = int(abrupt.argmax())
-        kind, size = "speed", f"{abrupt[k]:.3g} per s"
+        kind, size = "speed", f"{abrupt[k]:.3g} {unit}/s"
         if abs(bends[max(k - 1, 0) : k + 2].sum()) < BACK * abrupt[k]:  # there and back again
-            kind, size = "position", f"{usual * abrupt[k]:.3g}"
+            kind, size = "position", f"{usual * abrupt[k]:.3g} {unit}"
         yield Fault(f"jump of {kind}", f"{name}: {kind} jumps by {size} at t = {times[k]:.4g} s")
         return
-    thirds = np.diff(bends)
-    abrupt = _stands_out(thirds, ABOVE * np.abs(bends).max(), bridged[1:] | bridged[:-1])
+    thirds = np.diff(bends, prepend=0.0, append=0.0)
+    abrupt = _stands_out(thirds, ABOVE * np.abs(bends).max(), np.append(False, bridged) | np.append(bridged, False))
     if abrupt.any():
         k = int(abrupt.argmax())
         others = int(np.count_nonzero(np.diff(abrupt > 0.0, prepend=False) & (abrupt > 0.0))) - 1
         more = f", and {others} times more" if others else ""
-        size = f"{abs(thirds[max(k - 1, 0) : k + 2].sum()) / usual:.3g} per s²"  # between two rows it is in two of them
-        yield Fault("jump of acceleration", f"{name}: acceleration jumps by {size} at t = {times[k]:.4g} s{more}")
+        size = f"{abs(thirds[max(k - 1, 0) : k + 2].sum()) / usual:.3g} {unit}/s²"  # in up to three rows
+        at = times[min(k, len(times) - 1)]
+        yield Fault("jump of acceleration", f"{name}: acceleration jumps by {size} at t = {at:.4g} s{more}")
 
 
 def _is_noise(bends: Array) -> bool:

@@ -1,6 +1,7 @@
 """What makes a robot vibrate: residual vibration by closed forms, synthetic faults of a stream, wrong input."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -99,6 +100,19 @@ def motion(law, times=TIMES):
     """Hip and knee on their way, s from 0 to 1."""
     s = law.sample(times)[:, 0]
     return {"hip": 0.6 * s, "knee": 0.4 - 0.9 * s}
+
+
+def test_jumps_have_their_size_wherever_they_lie(tmp_path):
+    """Of a trapezoid of speed, at its ends and between two set points; shares of joints add up."""
+    times = np.arange(151) * 0.008
+    for at in (0.24, 0.243):
+        law = averaged_step(np.array([1.2 - at, at]))
+        found = smooth_motion(arm(tmp_path), table(tmp_path / "path.csv", times, **motion(law, times)))
+        (jump,) = (fault for fault in found.before.faults if fault.text.startswith("hip"))
+        assert float(re.search(r"jumps by (\S+) rad/s²", jump.text)[1]) == pytest.approx(
+            0.6 / (at * (1.2 - at)), rel=0.01
+        )
+        assert found.before.shares.sum() == pytest.approx(1.0, rel=1e-12)
 
 
 SMOOTH = law_in(0.9, "rest-to-rest", 4)
