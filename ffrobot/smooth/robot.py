@@ -152,10 +152,11 @@ class Robot:
         """
         found = self._solved(motion, "joint", float(times[-1]), float(times[1]))
         position, rate = motion.sample(times), motion.sample(times, 1)
+        moments = np.column_stack([motor_moments(found.run)[joint] for joint in self.joints])
         for joint, gear in gear_motions(found.run).items():
             k = self.joints.index(joint)
             position[:, k], rate[:, k] = gear.angle, gear.rate
-        moments = np.column_stack([motor_moments(found.run)[joint] for joint in self.joints])
+            moments[[0, -1], k] = gear.gear_moment[[0, -1]]  # at rest; the rotor's acceleration jumps there
         around = (np.ceil(np.array(self.servo.margins) / times[1]).astype(int), (0, 0))
         position, moments = (np.pad(of, around, "edge") for of in (position, moments))
         command = self.servo.command(times[1], position, np.pad(rate, around))

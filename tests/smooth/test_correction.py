@@ -8,13 +8,14 @@ import pytest
 from beam_links import beam_link, rectangle
 from scipy.integrate import trapezoid
 from scipy.signal import lsim
-from test_diagnosis import LAWS, OMEGA, RATIO, SERVO, STEP, TIMES, WAY, J, T, arm, axis, motion, table, written
+from test_diagnosis import LAWS, LENGTH, OMEGA, RATIO, SERVO, STEP, TIMES, WAY, J, T, arm, axis, motion, table, written
 
 from ffrobot import InputError, SolveError, smooth_motion
 from ffrobot.mbs.fields.paths import averaged_step, polynomial_law
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_robot
 from ffrobot.smooth.axes import axis_of
+from ffrobot.smooth.candidates import distances
 from ffrobot.smooth.robot import Robot
 from ffrobot.smooth.servo import Servo
 
@@ -34,6 +35,16 @@ def test_inversion_leaves_nothing_or_as_much_as_the_stiffness_is_off(tmp_path):
         found = robot(tmp_path, stiffer).ride(times, command).settling.residual
         assert found == pytest.approx(2e-3 * expected, abs=2e-3 * tolerance), stiffer
     np.testing.assert_allclose(moments[:, 0], (5.0 + 0.1) * law.sample(times, 2)[:, 0], atol=0.02 * abs(moments).max())
+
+
+def weight(set_points):
+    """Torques (2,), N·m, that bear the arm at rest, whose joints are off by them over the stiffness of gears."""
+    torque = np.zeros(2)
+    for _ in range(20):
+        hip, knee = set_points - torque / [6000.0, 2000.0]
+        fore = -2.0 * 9.81 * LENGTH / 2 * np.cos(hip + knee)
+        torque = np.array([fore - 2.0 * 9.81 * 1.5 * LENGTH * np.cos(hip), fore])
+    return torque
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +68,8 @@ def test_candidates_settle_and_keep_path_and_limits(found):
     assert found.best.settled == min(one.settled for one in found.candidates)
     inverted = next(one for one in found.candidates if one.name.startswith("inverted"))
     assert inverted.residual < 1e-4 * found.before.residual
+    for k in (0, -1):
+        np.testing.assert_allclose(inverted.moments[k], weight(inverted.command[k]), rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["new.json", "new.csv", "new.rosbag2"])
@@ -67,17 +80,33 @@ def test_what_is_written_is_a_stream_without_faults(tmp_path, found, name):
     assert again.before.faults == ()
     assert again.before.residual == pytest.approx(found.best.residual, abs=1e-6)
     if name == "new.json":  # controllers of ROS 2 ask for a motion that ends at rest
-        for point in np.array(json.loads((tmp_path / name).read_text())["points"])[[0, -1]]:
+        points = json.loads((tmp_path / name).read_text())["points"]
+        for point in (points[0], points[-1]):
             assert point["velocities"] == [0.0, 0.0]
 
 
-def test_another_motion_is_written_by_its_kind(tmp_path, found):
-    found.write(tmp_path / "new.csv", kind="shaped")
-    shaped = next(one for one in found.candidates if one.name.startswith("shaped"))
-    written_values = np.loadtxt(tmp_path / "new.csv", delimiter=",", skiprows=1)
-    np.testing.assert_allclose(written_values[:, 0], shaped.times, atol=1e-9)
-    with pytest.raises(SolveError, match="expected a motion that is doubled, found"):
-        found.write(tmp_path / "other.csv", kind="doubled")
+def test_another_motion_is_written_by_its_kind(tmp_path, ffrobot):
+    path = table(tmp_path / "path.csv", TIMES, hub=WAY * LAWS["trapezoid"].sample(TIMES)[:, 0])
+    printed = ffrobot.ok(
+        "smooth", axis(tmp_path), "--path", path, "--write", "slower", "-o", tmp_path / "new.csv"
+    ).stdout
+    assert "new.csv: slower by" in " ".join(printed.split())
+    again = smooth_motion(tmp_path / "scene.toml", path, kind="slower")
+    assert again.best.name.startswith("slower")
+    assert again.best.settled > min(one.settled for one in again.candidates)
+    new = np.loadtxt(tmp_path / "new.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(new[:, :2], np.column_stack([again.best.times, again.best.command]), atol=1e-9)
+    with pytest.raises(InputError, match=r'kind: expected one of .*, found "slow" \(did you mean "slower"'):
+        smooth_motion(tmp_path / "scene.toml", path, kind="slow")
+
+
+def test_distances_are_from_the_line_between_set_points():
+    """Of points on a straight motion none, whatever its set points; of others by the perpendicular."""
+    line = np.outer([0.0, 0.1, 0.4, 0.6, 1.0, 1.0], [3.0, 4.0])
+    on = np.outer(np.linspace(0.0, 1.0, 57), [3.0, 4.0])
+    np.testing.assert_allclose(distances(on, line), 0.0, atol=1e-15)
+    np.testing.assert_allclose(distances(on + np.array([-0.08, 0.06]), line), 0.1, rtol=1e-12)
+    np.testing.assert_allclose(distances(np.array([[3.3, 4.4], [-0.3, -0.4]]), line), 0.5, rtol=1e-12)
 
 
 def test_other_endings_are_rejected(tmp_path, found):
