@@ -58,10 +58,10 @@ class Sensing:
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
         self._where = _places_in_q(tree)
         sections = {signal.point: tree.section(signal.point) for signal in read if signal.point}
-        self._points: list[tuple[str, Section, list[tuple[int, int, int]]]] = [
-            (point, section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
-            for point, section in sections.items()
-        ]
+        self._points: list[tuple[str, Section, int, list[int], list[int]]] = []  # by order: where in readings, axes
+        for point, order in dict.fromkeys((s.point, s.order) for s in read if s.point):
+            columns = [k for k, s in enumerate(read) if (s.point, s.order) == (point, order)]
+            self._points.append((point, sections[point], order, columns, [read[k].axis for k in columns]))
         accelerated = any(signal.point and signal.order in (2, 3) for signal in read)
         self._gravity = np.zeros(3)
         self._gravity[: len(model.scene.gravity)] = model.scene.gravity
@@ -79,14 +79,12 @@ class Sensing:
         if self._system is not None:
             none = np.zeros((len(q), len(self._system.model.rows)))
             forces = motion_forces(self._system, KnownStates(q, v, a), np.zeros(len(q)), none)
-        for point, section, columns in self._points:
+        for point, section, order, columns, axes in self._points:
             at = places.at(section)
-            a = np.zeros_like(at.r) if forces is None else forces.of_point(point).a
-            orders = at.r, at.velocity, a, a - self._gravity, at.omega
-            for k, order, axis in columns:
-                of = orders[order]
-                in_axes = order >= ORDERS["accelerometer"]
-                found[:, k] = (at.F[:, :, axis] * of).sum(axis=1) if in_axes else of[:, axis]
+            a = at.r if forces is None else forces.of_point(point).a
+            of = (at.r, at.velocity, a, a - self._gravity, at.omega)[order]
+            in_axes = order >= ORDERS["accelerometer"]
+            found[:, columns] = (np.einsum("tij,ti->tj", at.F, of) if in_axes else of)[:, axes]
         return found
 
     def rows(self, about: LinearMechanism) -> tuple[Array, Array, Array]:

@@ -127,7 +127,7 @@ def _wrench(table: Array, number: int) -> Wrench:
 
 
 def _motion(table: Array, number: int) -> SectionMotion:
-    return SectionMotion(*np.hsplit(table[:, 9 * number : 9 * number + 9], 3))
+    return SectionMotion(*(table[:, k : k + 3] for k in range(9 * number, 9 * number + 9, 3)))
 
 
 def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
