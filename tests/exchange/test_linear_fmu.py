@@ -34,7 +34,10 @@ joint = [{ name = "hub", type = "revolute", between = ["ground", "arm.root"], ge
 payload = [{ point = "arm.tip", mass = 0.05 }]
 trajectory = [{ name = "swing", joint = "hub", value = "sin(t)**2" }]
 analysis = [
-  { name = "at_rest", kind = "linear" },
+  { name = "at_rest", kind = "linear", sensor = [
+    { joint = "hub", measure = "rate" }, { pzt = "arm" },
+    { point = "arm.tip", measure = "accelerometer" }, { point = "arm.tip", measure = "gyro" },
+  ] },
   { name = "inverse", kind = "pcid", end = 0.1, output_step = 0.01 },
   { name = "along", kind = "linear", about = "inverse", times = [0.0, 0.05] },
   { name = "loop", kind = "closed-loop", actuation = "inverse", sample_time = 1e-3, controller = [
@@ -53,6 +56,7 @@ modulus = 63e9
 d31 = 110e-12
 """
 MOTOR, PATCH, FORCE, TIP = "joint/hub/moment", "pzt/arm/1", "force/arm.tip/y", "point/arm.tip/y"
+SENSORS = {"joint/hub/rate": "rad/s", f"{TIP}/accelerometer": "m/s2", "point/arm.tip/z/gyro": "rad/s"}
 STEP, COUNT = 1e-3, 400
 EXACT = 1e-11  # of the largest value: rounding of COUNT steps
 
@@ -67,6 +71,7 @@ class Robot:
         self.unpacked = extract(str(path), str(folder / "unpacked"))
         self.reference = {each.name: each.valueReference for each in self.description.modelVariables}
         self.inputs = [f"{name}/moment" if name.startswith("joint/") else name for name in self.model.input_names]
+        self.outputs = [f"measured {of}" if of.startswith("pzt/") else of for of in self.model.output_names]
         names = [each.name for each in self.description.modelVariables]
         f = len(self.model.A)
         self.states, self.derivatives = names[:f], names[f : 2 * f]
@@ -99,18 +104,19 @@ class Robot:
             table[name] = values
         found = simulate_fmu(
             str(self.path), fmi_type=kind, start_time=0.0, stop_time=time[-1], output_interval=step, input=table,
-            output=list(self.model.output_names), **options,
+            output=self.outputs, **options,
         )  # fmt: skip
-        return np.array([found[name] for name in self.model.output_names]).T
+        return np.array([found[name] for name in self.outputs]).T
 
     def response(self, signals, *, linear):
-        """What the model does with inputs held between steps, or on straight lines (scipy)."""
+        """What the model does with inputs on straight lines, or held until the instant of each output (scipy)."""
         model = self.model
         u = np.zeros((len(next(iter(signals.values()))), len(self.inputs)))
         for name, values in signals.items():
             u[:, self.inputs.index(name)] = values
         time = STEP * np.arange(len(u))
-        return lsim((model.A, model.B, model.C, model.D), u, time, interp=linear)[1]
+        felt = np.zeros_like(u) if linear else np.vstack([u[:1], u[:-1]]) - u
+        return lsim((model.A, model.B, model.C, model.D), u, time, interp=linear)[1] + felt @ model.D.T
 
 
 def signals(count=COUNT, step=STEP):
@@ -137,7 +143,7 @@ def folder(ffrobot, tmp_path_factory):
 @pytest.fixture(scope="module")
 def robot(ffrobot, folder):
     done = ffrobot.ok("export", "scene.results.h5", "--format", "fmu", cwd=folder)
-    assert "written    scene.results.at_rest.fmu: at_rest, 14 states, 5 inputs, 9 outputs" in done.stdout
+    assert "written    scene.results.at_rest.fmu: at_rest, 14 states, 5 inputs, 15 outputs" in done.stdout
     assert "sources only" not in done.stdout
     return Robot(folder, folder / "scene.results.at_rest.fmu")
 
@@ -146,6 +152,7 @@ def test_fmpy_finds_no_fault(robot):
     assert validate_fmu(str(robot.path)) == []
     units = {each.name: each.unit for each in robot.description.modelVariables}
     assert [units[name] for name in (MOTOR, PATCH, FORCE, "joint/hub", TIP)] == ["N.m", "V", "N", "rad", "m"]
+    assert {name: units[name] for name in SENSORS} == SENSORS
     assert units["der(rate of joint/hub)"] == "rad/s2"
 
 
@@ -191,7 +198,7 @@ def test_co_simulation_holds_inputs(robot):
 def test_co_simulation_follows_slopes_of_inputs(robot):
     """Straight lines between steps, which need the integral of the integral of exp(A s)."""
     given = signals()
-    inputs, outputs = robot.references(given), robot.references(robot.model.output_names)
+    inputs, outputs = robot.references(given), robot.references(robot.outputs)
     table = np.array(list(given.values())).T
     found = np.zeros((COUNT, len(outputs)))
     with robot.running() as fmu:
@@ -228,7 +235,7 @@ def test_derivatives_are_the_matrices(robot):
     """Of model exchange: x' and y are A x + B u and C x + D u; directional derivatives are columns of them."""
     model, rng = robot.model, np.random.default_rng(0)
     x, u = rng.standard_normal(len(model.A)), rng.standard_normal(len(robot.inputs))
-    unknown = robot.references([*robot.derivatives, *model.output_names])
+    unknown = robot.references([*robot.derivatives, *robot.outputs])
     known = robot.references([*robot.states, *robot.inputs])
     matrix = np.block([[model.A, model.B], [model.C, model.D]])
     with robot.running(FMU2Model) as fmu:
@@ -244,7 +251,7 @@ def test_model_structure_names_what_depends_on_what(robot):
     matrix = np.block([[model.A, model.B], [model.C, model.D]])
     known = [*robot.states, *robot.inputs]
     unknowns = [*robot.description.derivatives, *robot.description.outputs]
-    assert [each.variable.name for each in unknowns] == [*robot.derivatives, *model.output_names]
+    assert [each.variable.name for each in unknowns] == [*robot.derivatives, *robot.outputs]
     for row, each in zip(matrix, unknowns, strict=True):
         assert [on.name for on in each.dependencies] == [known[k] for k in np.flatnonzero(row)]
 
