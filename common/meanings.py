@@ -265,6 +265,7 @@ lowest_frequency | Hz | by the linear model
 vibration_window | s | before the end
 []
 control/pole | | of the sampled linear loop, real and imaginary part
+control/controller/time | s | of the matrices
 control/controller/* | | of ξ(k+1) = A ξ + B y, u = C ξ + D y, off the reference
 control/estimate/points/*/position | m | of the tip, estimated | axis
 control/estimate/points/*/error | m | distance of the estimated tip from the tip

@@ -152,11 +152,11 @@ class ClosedLoop(SampledAnalysis):
         quiet = max((last_change(partial(_values, of, self), outputs) for of in _exciting(plant, self)), default=0.0)
         runs = _followed(run, place_at, held, tip, quiet), _followed(closer, place_at, held, tip, quiet)
         readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
-        found = loops_about(setup, begun, readings[: loop.taken], models)
+        found, along = loops_about(setup, begun, readings[: loop.taken], models)
         filtering = filters(read, self.sample_time)
         loops = [(model, feedback.behind(*filtering)) for model, feedback in found]
         record = loop_record(self, setup, loop, acting, runs, loops, lowest, gears=bool(plant.tree.gears))
-        record = replace(record, feedback=found[0][1] if found else None)
+        record = replace(record, feedback=along)
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T
             names = [each.name for each in estimated]
@@ -212,24 +212,30 @@ def loops_about(
     controllers: Sequence[Controller],
     readings: Array,
     models: Sequence[LinearModel],
-) -> list[tuple[LinearModel, Feedback]]:
-    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there."""
+) -> tuple[list[tuple[LinearModel, Feedback]], Mapping[float, Feedback]]:
+    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there.
+
+    Beside them the controllers at the start, or at each time (s) of an observer's schedule.
+    """
     is_asked_in_order = any(isinstance(controller, PythonControl) for controller in controllers)
     latest = 0 if is_asked_in_order else max(len(setup.times) - LONGEST, 0)
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
 
-    @cache
-    def at(first: int) -> Feedback | None:
-        if observed is None:
-            return find_feedback(setup, controllers, readings, first)
-        inner = find_feedback(observed.setup, observed.controllers, readings, first)
-        return None if inner is None else observed.schedule.at(float(setup.times[first])).closed(inner)
+    acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
+    inner = cache(partial(find_feedback, acting, asked, readings))
 
-    found = [(model, at(min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
+    def at(t: float, first: int) -> Feedback | None:
+        law = inner(first)
+        return law if law is None or observed is None else observed.schedule.at(t).closed(law)
+
+    found = [(model, at(model.time, min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
     of, motors = joined(setup.patches.values()), np.zeros((2, len(setup.robot.motors)))
     late = np.hstack([motors, np.stack([of.lag, of.delay])])
     known = [(model, replace(feedback, late=late)) for model, feedback in found if feedback is not None]
-    return known if len(known) == len(found) else []
+    if len(known) < len(found) or not known:
+        return [], {}
+    times = [float(setup.times[0])] if observed is None else observed.schedule.times.tolist()
+    return known, {t: law for t in times if (law := at(t, 0)) is not None}
 
 
 def _exciting(model: Model, analysis: ClosedLoop) -> Iterator[TimeFunction]:

@@ -33,6 +33,7 @@ class StateSpace:
 
     Attributes:
         A, B, C, D: (n, n), (n, inputs), (outputs, n), (outputs, inputs).
+        time: s, of the motion, about which it is linear.
     """
 
     A: Array
@@ -42,6 +43,7 @@ class StateSpace:
     state_names: tuple[str, ...]
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
+    time: float
 
     @property
     def step(self) -> float:
@@ -112,12 +114,10 @@ class LinearModel(StateSpace):
         state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
         input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
         output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k"; of sensors as of `Signal`.
-        time: s.
         mass: (f, f) mass matrix of s: the metric that compares coordinates of different kinds.
         transformation: (coordinates, f) ∂q/∂s, which takes mode shapes to the robot.
     """
 
-    time: float
     mass: Array
     transformation: Array
 
@@ -256,10 +256,12 @@ def _some(names: tuple[str, ...]) -> str:
 
 
 def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
+    places = {name: k for k, name in enumerate(known)}
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
-        check_known(name, known, f"linear model: expected an {kind} ({quoted(known)})")
-    return [known.index(name) for name in wanted]
+        if name not in places:
+            check_known(name, known, f"linear model: expected an {kind} ({quoted(known)})")
+    return [places[name] for name in wanted]
 
 
 STILL = 1e-10  # of the largest effect on its kind of output: less is round-off

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 
 import numpy as np
 
@@ -194,7 +195,8 @@ class LoopRecord(Details):
     warnings: tuple[str, ...]  # one line each
     margins: Margins | None = None  # by the linear model; None where controllers, or the robot, are not linear
     advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
-    feedback: Feedback | None = None  # from readings to commands at the start, off the reference; None likewise
+    # from readings to commands, off the reference, by time (s): at the start, or along a schedule; none likewise
+    feedback: Mapping[float, Feedback] = field(default_factory=dict)
     poles: ComplexArray | None = None  # of the linear loop there, from sample to sample
     estimate: Estimates | None = None  # of an observer
 

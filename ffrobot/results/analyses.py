@@ -116,17 +116,24 @@ class AnalysisAccess(Datasets):
 
         Raises `InputError` where the analysis has none: no loop, or controllers that are not linear.
         """
+        return self.controllers(analysis)[0]
+
+    def controllers(self, analysis: str) -> tuple[SampledController, ...]:
+        """Return controllers as `controller` does, one for each instant of a scheduled observer, with the same states.
+
+        Straight lines between their matrices approximate those of the run. Raises `InputError` likewise.
+        """
         if not self.has(f"{analysis}/control/controller"):
             known = quoted(self._with("control/controller"))
             raise InputError(f'{self.path}: expected a closed loop of linear controllers ({known}), found "{analysis}"')
-        from .linear import read_controller
+        from .linear import read_controllers
 
-        return read_controller(self._file, analysis)
+        return read_controllers(self._file, analysis)
 
     def state_spaces(self, analysis: str) -> tuple[StateSpace, ...]:
         """Return linear models of an analysis, or the controller of a run. Raises `InputError` without either."""
         is_loop = self.has(f"{analysis}/control")
-        return (self.controller(analysis),) if is_loop else self.linear(analysis)
+        return self.controllers(analysis) if is_loop else self.linear(analysis)
 
     def linear_analysis(self, analysis: str | None) -> str:
         """Return `analysis`, or the first one with linear models. Raises `InputError` if there is none."""

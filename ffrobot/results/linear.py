@@ -160,14 +160,18 @@ def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
     entry.attrs["off_rest"] = inversion.off_rest
 
 
-def read_controller(file: h5py.File, analysis: str) -> SampledController:
-    """The controllers of a loop that has linear ones."""
+def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController, ...]:
+    """The controllers of a loop that has linear ones, at each instant of their schedule."""
     from ..actuation.control.linear_model import SampledController
 
     group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
-    A, B, C, D = (np.asarray(group[key], dtype=float) for key in "ABCD")
-    states, step = tuple(f"state/{k}" for k in range(1, len(A) + 1)), float((time[-1] - time[0]) / (len(time) - 1))
-    return SampledController(A, B, C, D, states, tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"]), step)
+    inputs, outputs = tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"])
+    step = float((time[-1] - time[0]) / (len(time) - 1))
+    states = tuple(f"state/{k}" for k in range(1, group["A"].shape[1] + 1))
+    return tuple(
+        SampledController(A, B, C, D, states, inputs, outputs, float(t), step)
+        for A, B, C, D, t in zip(*(group[key][()] for key in ("A", "B", "C", "D", "time")), strict=True)
+    )
 
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
@@ -188,12 +192,11 @@ def save_models(models: Sequence[StateSpace], path: Path) -> None:
     if len(models) == 1:
         models[0].save(path)
         return
-    stacked: dict[str, Array] = {
-        key: np.array([getattr(model, key) for model in models]) for key in (*MATRICES, "time")
-    }
     from ..actuation.control.linear_model import save_arrays
 
-    save_arrays(models[0].arrays() | stacked, path)
+    first, every = models[0].arrays(), [model.arrays() for model in models]
+    along = (key for key, value in first.items() if isinstance(value, np.ndarray) or key == "time")
+    save_arrays(first | {key: np.array([of[key] for of in every]) for key in along}, path)
 
 
 def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
@@ -207,10 +210,12 @@ def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
     group.attrs["warnings"] = list(record.warnings)
     write_record(group, metrics)
     group.attrs["advice"] = list(record.advice)
-    if (of := record.feedback) is not None:
-        for key in ("A", "B", "C", "D"):
-            group[f"controller/{key}"] = getattr(of, key)
-        group["controller"].attrs.update(inputs=list(of.outputs), outputs=list(of.inputs))
+    if record.feedback:
+        laws = list(record.feedback.values())
+        group["controller/time"] = list(record.feedback)
+        for key in "ABCD":
+            group[f"controller/{key}"] = np.array([getattr(of, key) for of in laws])
+        group["controller"].attrs.update(inputs=list(laws[0].outputs), outputs=list(laws[0].inputs))
     if record.poles is not None:
         _write_poles(group, _by_size(record.poles))
     if record.estimate is not None:

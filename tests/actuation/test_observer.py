@@ -272,6 +272,51 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
         other.state_spaces("loop")
 
 
+def scheduled_arm(count):
+    rod = {"mass": 1.0, "inertia": 0.02, "center": [0.25, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
+    observer = {"kind": "scheduled", "count": count, "process": {"joint/a": 0.5, "joint/b": 0.3}}
+    pid = PID | {"proportional": {"a": 100.0, "b": 40.0}, "derivative": {"a": 10.0, "b": 3.0}}
+    loop = {"kind": "closed-loop", "actuation": "inverse", "sample_time": T, "observer": observer, "controller": [pid]}
+    loop |= {"sensor": [{"joint": name, "noise": 1e-4} for name in "ab"]}
+    loop |= {"disturbance": [{"point": "B.tip", "y": "-2"}]}
+    return make_scene(
+        name="arm", gravity=[0.0, -9.81], body=[{"name": name, "rigid": rod} for name in "AB"],
+        joint=[{"name": "a", "type": "revolute", "between": ["ground", "A.root"]},
+               {"name": "b", "type": "revolute", "between": ["A.tip", "B.root"]}],
+        trajectory=[{"name": "a", "joint": "a", "value": "t**2"},
+                    {"name": "b", "joint": "b", "value": "0.5 + 1.5*t**2"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": T / 2}, {"name": "loop"} | loop],
+    )  # fmt: skip
+
+
+def test_a_scheduled_controller_is_a_table_of_systems(tmp_path):
+    """Straight lines between them are off the run, whose observer alone has them, by the square of their distance."""
+    off = []
+    for count in (3, 9):
+        results = ffrobot.solve(scheduled_arm(count), output=tmp_path / f"{count}.h5")
+        results.export_linear("loop", tmp_path / "c.npz")
+        saved, group = np.load(tmp_path / "c.npz"), "loop/control"
+        y = results[f"{group}/readings"][()] - results[f"{group}/reference"][()]
+        times, x, found = results[f"{group}/time"][()], np.zeros(saved["A"].shape[1]), []
+        for t, read in zip(times, y, strict=True):
+            k = min(int((count - 1) * t), count - 2)
+            part = (t - saved["time"][k]) * (count - 1)
+            A, B, C, D = ((1 - part) * saved[key][k] + part * saved[key][k + 1] for key in "ABCD")
+            found.append(C @ x + D @ read)
+            x = A @ x + B @ read
+        moments = [results[f"inverse/joints/{name}/moment"][1::2].ravel()[: len(times)] for name in "ab"]
+        commanded = results[f"{group}/wanted"][()] - np.transpose(moments)
+        off.append(np.abs(commanded - found).max() / np.abs(found).max())
+    assert off[0] < 5e-3
+    assert off[1] < off[0] / 10
+    export_file(tmp_path / "3.h5", "c", "loop", tmp_path / "c.h")
+    text = (tmp_path / "c.h").read_text()
+    assert "#define N_TIME 3" in text
+    numbers = re.search(r"double A\[\] = \{(.*?)\}", text, re.DOTALL)[1].split(",")
+    controllers = ffrobot.Results(tmp_path / "3.h5").controllers("loop")
+    np.testing.assert_array_equal(np.array(numbers, dtype=float), np.ravel([of.A for of in controllers]))
+
+
 def test_sensors_are_outputs_of_linear_models():
     """A wheel: γ̇ = u/(I s), which a gyro reads, too; r u/I along y at r = 0.3 m, and u/(I s²) of an encoder."""
     sensors = [{"joint": "O", "measure": "rate"}, {"point": "w.rim", "measure": "accelerometer"},

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,8 +31,11 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     Raises:
         InputError: there is no such analysis, it has several times, or its model has no inputs or is not finite.
     """
-    unit, what, remarks, name = _unit(path, analysis)
-    files = {SOURCE: (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8"), HEADER: _header(unit)}
+    unit, models, remarks, name = _unit(path, analysis)
+    if len(models) > 1:
+        remarks.append(f"the controllers at {models[0].time:g} s; --format c has all of their schedule")
+    source = (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8")
+    files = {SOURCE: source, HEADER: _header(unit, models[:1])}
     compiled = binary(unit, files)
     content = {"modelDescription.xml": model_description(unit, f"ffrobot {VERSION}")}
     content |= {f"sources/{file}": text.encode() for file, text in files.items()}
@@ -40,16 +43,20 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
         remarks.append(f"sources only, no binary: {compiled}")
     else:
         content[compiled[0]] = compiled[1]
-    return zipped(content), what, tuple(remarks), name
+    return zipped(content), _what(name, unit), tuple(remarks), name
 
 
 def c_table(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...], str]:
-    """A header file with the matrices instead; otherwise as `linear_fmu`."""
-    unit, what, remarks, name = _unit(path, analysis)
-    return _header(unit), what, tuple(remarks), name
+    """A header file with the matrices instead, of all instants of a schedule; otherwise as `linear_fmu`."""
+    unit, models, remarks, name = _unit(path, analysis)
+    return _header(unit, models), _what(name, unit), tuple(remarks), name
 
 
-def _unit(path: Path, analysis: str | None) -> tuple[Unit, str, list[str], str]:
+def _what(analysis: str, unit: Unit) -> str:
+    return f"{analysis}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
+
+
+def _unit(path: Path, analysis: str | None) -> tuple[Unit, list[StateSpace], list[str], str]:
     with Results(path) as results:
         name = results.linear_analysis(analysis)
         if name in results.analyses and results.attributes(name)["kind"] == "forward":
@@ -58,7 +65,7 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, str, list[str], str]:
                 " the scene, SCENE.toml, for an FMU of that motion"
             )
         models, scene = results.state_spaces(name), results.scene
-    if len(models) != 1:
+    if len(models) != 1 and not models[0].step:
         raise InputError(
             f"{path}: {name}: expected a linear model of one instant, found {len(models)}; solve with one in `times`"
         )
@@ -68,11 +75,10 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, str, list[str], str]:
         B, C = np.zeros((1, model.B.shape[1])), np.zeros((len(model.C), 1))
         model = replace(model, A=np.zeros((1, 1)), B=B, C=C, state_names=("state/1",))
     unit = make_unit(str(scene["name"]), name, model, joint_units(scene))
-    what = f"{name}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
     remark = "all values are deviations from the configuration that the model is about"
     if model.step:
         remark = f"a step of {model.step:g} s; readings and commands are off those of the reference"
-    return unit, what, [remark], name
+    return unit, [model, *models[1:]], [remark], name
 
 
 def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, str]) -> Unit:
@@ -86,7 +92,7 @@ def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, 
             if isinstance(model, LinearModel)
             else "controllers and observer at the start, from readings to commands, both off the reference"
         ),
-        guid=guid_of(numbers(model), (*states, *inputs, *outputs)),
+        guid=guid_of(numbers([model]), (*states, *inputs, *outputs)),
         model=model,
         states=states,
         inputs=inputs,
@@ -108,14 +114,14 @@ HEADER = "model.h"
 COMPILERS = ("cc", "gcc", "clang")
 
 
-def numbers(model: StateSpace) -> str:
-    """Return the matrices as C source, and the scale of the states that balances A."""
-    _, (scale, _) = matrix_balance(model.A, permute=False, separate=True)
-    arrays = {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "SCALE": scale[None, :]}
+def numbers(models: Sequence[StateSpace]) -> str:
+    """Return the matrices as C source, those of several models one below the other, and a scale that balances A."""
+    _, (scale, _) = matrix_balance(models[0].A, permute=False, separate=True)
+    arrays = {key: np.vstack([getattr(of, key) for of in models]) for key in "ABCD"} | {"SCALE": scale[None, :]}
     return "\n".join(_array(name, values) for name, values in arrays.items())
 
 
-def _header(unit: Unit) -> str:
+def _header(unit: Unit, models: Sequence[StateSpace]) -> str:
     sizes = {"N_X": unit.states, "N_U": unit.inputs, "N_Y": unit.outputs}
     lines = [f"/* {_comment(unit.name)}: {_comment(unit.description)} */", f'#define GUID "{unit.guid}"']
     lines += [f"#define {name} {len(variables)}" for name, variables in sizes.items()]
@@ -125,7 +131,10 @@ def _header(unit: Unit) -> str:
     for title, variables in zip(("States", "Inputs", "Outputs"), sizes.values(), strict=True):
         names = "\n".join(f"     {_comment(each.name)} ({each.unit})" for each in variables)
         lines += ["", f"/* {title}:\n{names} */"]
-    return "\n".join([*lines, "", numbers(unit.model), ""])
+    if len(models) > 1:
+        lines += ["", f"/* Each of A to D {len(models)} times, for TIME (s); straight lines between */"]
+        lines += [f"#define N_TIME {len(models)}", _array("TIME", np.array([[of.time for of in models]]))]
+    return "\n".join([*lines, "", numbers(models), ""])
 
 
 def _comment(text: str) -> str:
