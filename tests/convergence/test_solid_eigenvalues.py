@@ -16,7 +16,8 @@ from solids import body_of, model_of, write_solid
 
 from ffrobot.fe_models.beam.link import beam_modal_body
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.fe_models.solid.elasticity import stiffness_matrix
+from ffrobot.fe_models.solid.elasticity import material_map, solid_model, stiffness_matrix
+from ffrobot.mesh.solid_mesh import solid_mesh
 
 STEEL = {"E": 200e9, "rho": 8000.0, "length": 10.0, "cell": "hexahedron", "order": 2}
 FV5 = STEEL | {"height": 2.0, "width": 2.0, "family": "all", "count": 9}
@@ -83,6 +84,25 @@ def test_nafems_fv52(tmp_path):
     # In-plane mode, which the supports do not touch. The others go on falling with finer meshes: a line holds no solid.
     np.testing.assert_allclose(fine[4], expected[4], rtol=2e-4)
     assert np.all(fine < coarse)
+
+
+def test_nafems_fv41(tmp_path):
+    """Free hollow cylinder, radii 1.8 and 2.2 m: what vibrates alike all round, by a sector of one degree."""
+    path = write_solid(tmp_path, **STEEL, height=0.4, width=0.1, divisions=(16, 2, 1))
+    link = read_link(path)
+    mesh, angle = solid_mesh(link.part(path)).mesh, np.deg2rad(1.0)
+    radius, theta = 2.0 + mesh.geometry.x[:, 1], angle * mesh.geometry.x[:, 2] / 0.1
+    mesh.geometry.x[:, 1], mesh.geometry.x[:, 2] = radius * np.cos(theta), radius * np.sin(theta)
+    model = solid_model(mesh, link.mesh.order, material_map(mesh, link.material))
+    theta = np.arctan2(model.x[:, 2], model.x[:, 1])
+    turned = sp.block_diag([[[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]] for a in theta], "csr")
+    sides = np.flatnonzero(np.abs(theta) > 0.49 * angle)
+    free = np.setdiff1d(np.arange(3 * model.owned), 3 * sides + 2)
+    matrices = symmetric(stiffness_matrix(model)), sp.kron(model.mass.csr, sp.eye(3), format="csc")
+    K, M = ((turned.T @ of @ turned).tocsc()[free][:, free] for of in matrices)
+    omega2 = np.sort(eigsh(K, 6, M, sigma=-1e4, return_eigenvectors=False))
+    expected = [243.53, 377.41, 394.11, 397.72, 405.28]
+    np.testing.assert_allclose(np.sqrt(omega2[1:]) / (2 * np.pi), expected, rtol=5e-4)
 
 
 def symmetric(K):
