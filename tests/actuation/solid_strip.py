@@ -13,13 +13,16 @@ from mpi4py import MPI
 
 from ffrobot.mesh.compat import compiled_form
 
+PASSING = np.array([0.25e-3, 0.5e-3, 1e-3, 2e-3])  # m from an end of the patch, where its strain passes into the strip
+
 
 class SolidStrip:
     """Axes of links: x along, y normal to the face at +y that the patch is on, z across; SI units."""
 
     def __init__(self, strip, patch, size=0.005):
         (L, h, b), (start, end, t, w, o) = strip["size"], patch["place"]
-        along = _lines((0.0, start, end, L), size)
+        near = sorted({round(x + way, 9) for x in (start, end) for way in (*-PASSING, 0.0, *PASSING)})
+        along = _lines((0.0, *near, L), size)
         across = _lines((-b / 2, o - w / 2, o + w / 2, b / 2), size)
         levels = np.array([-h / 2, 0.0, h / 2, h / 2 + t])
         axes = (along, levels, across)

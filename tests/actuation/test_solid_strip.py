@@ -18,6 +18,7 @@ PLACES = {  # begin and end, thickness, width, offset, m
     "wide": (0.1, 0.16, 0.25e-3, 0.02, 0.0),
     "offset": (0.1, 0.16, 0.25e-3, 0.008, 0.006),
     "near the clamp": (0.005, 0.065, 0.25e-3, 0.02, 0.0),
+    "thick": (0.1, 0.16, 0.5e-3, 0.02, 0.0),
 }
 
 
@@ -28,11 +29,15 @@ def strip():
     return modal_body(beam_link(L, rectangle(h, b), 30, E=STRIP["E"], nu=STRIP["nu"], rho=STRIP["rho"], modes=modes))
 
 
-@pytest.mark.parametrize(("name", "close"), [("wide", 0.02), ("offset", 0.02), ("near the clamp", 0.045)])
-def test_one_patch_on_a_strip(strip, name, close):
-    """Frequency 0.5 %, tip per volt 2 %; open electrodes raise the frequency by as much within 15 %.
+@pytest.mark.parametrize(
+    ("name", "close", "of_charge"),
+    [("wide", 0.002, 0.12), ("offset", 0.01, 0.15), ("near the clamp", 0.025, 0.07), ("thick", 0.025, 0.25)],
+)
+def test_one_patch_on_a_strip(strip, name, close, of_charge):
+    """Frequency 0.5 %, tip per volt 2.5 %; how far open electrodes raise the frequency.
 
-    The clamp keeps sections flat over half their width: a patch there is held across, and that of the model is not.
+    The clamp keeps sections flat over half their width: a patch there is held across, and that of the model is not. For
+    electric charge the model holds all patches across, while the strip gives way.
     """
     start, end, t, w, offset = PLACES[name]
     solid = SolidStrip(STRIP, CERAMIC | {"place": PLACES[name]}, size=0.005)
@@ -46,7 +51,7 @@ def test_one_patch_on_a_strip(strip, name, close):
     shorted, opened = (np.sqrt(body.stiffness.min()) / (2 * np.pi) for body in bodies)
     found = solid.frequency("shorted"), solid.frequency("open")
     assert shorted == pytest.approx(found[0], rel=0.005)
-    assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=0.15)
+    assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=of_charge)
     of_link = link_patches(SCENE, layouts[:1], strip, bodies[0])
     p = bodies[0].modal_transform.T @ of_link.Phi_V[:, 0] / bodies[0].stiffness
     moved, expected = bodies[0].points["tip"].translation @ p, solid.tip_per_volt()
