@@ -11,6 +11,7 @@ from ...common.rotations import smallest_turn
 from ..fields.field_types import NotNegative, Positive, Quantity, Vector3
 from ..fields.spelling import SPATIAL, NormalInPlane, Spelled, as_written
 from .joint import Friction, JointRecord, MotorLimits
+from .twist_spring import StiffnessSteps
 
 Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
 Range = tuple[Quantity, Quantity]
@@ -113,6 +114,28 @@ class AxialJoint(MovingJoint):
         """Their z is along the axis."""
         first = smallest_turn(np.array(self.axis))
         return first, self.orientation.T @ first
+
+
+class GearedJoint(AxialJoint):
+    """A joint with one coordinate, whose motor may drive it by a rotor and a gear, rigid or compliant."""
+
+    gear_ratio: Positive = 1.0
+    """Rotor turns per turn of the joint (sliding: rotor rotation per joint displacement, rad/m)."""
+    rotor_inertia: NotNegative = 0.0
+    """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
+    stiffness: Positive | StiffnessSteps | None = None
+    """Stiffness of a compliant gear, N·m/rad (sliding: N/m), or { values = [K1, K2, …], torques = [T1, …] } in steps of
+    its torque (force); default: rigid."""
+    damping: NotNegative = 0.0
+    """Damping of that gear, N·m·s/rad (sliding: N·s/m)."""
+
+    @model_validator(mode="after")
+    def _has_rotor_behind_spring(self) -> Self:
+        if self.stiffness is None and self.damping:
+            raise ValueError('expected the key "damping" only with stiffness, found it alone')
+        if self.stiffness is not None and not self.rotor_inertia:
+            raise ValueError("expected a rotor_inertia above 0 with stiffness, found none: the rotor turns freely")
+        return self
 
 
 def check_direction(key: str, axis: Sequence[float]) -> None:

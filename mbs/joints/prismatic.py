@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal
 
-from ..fields.field_types import NotNegative, Positive, Vector2, Vector3
+from ..fields.field_types import Vector2, Vector3
 from ..fields.spelling import Spelled, place
 from .joint import GUIDED, NOT_TURNED, Along
-from .moving_joint import AxialJoint
+from .moving_joint import GearedJoint
 
 
 def _direction(axis: Vector2) -> Vector3:
@@ -14,22 +14,19 @@ def _direction(axis: Vector2) -> Vector3:
     return place(axis)
 
 
-class PrismaticJoint(AxialJoint):
+class PrismaticJoint(GearedJoint):
     """The second point slides along `axis` by its coordinate, m; `rpy` is the orientation of the second side.
 
     In planar scenes the second side keeps the angle of the initial guess.
 
     Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a mass J
-    N² along it; that the first side turns the rotor is left out.
+    N² along it; that the first side turns the rotor is left out. Between the gear of a motor and the second body a
+    spring `stiffness` (N/m; default: rigid) and a damper `damping` (N·s/m).
     """
 
     type: Literal["prismatic"]
     axis: Annotated[Vector3, Spelled(Vector2, _direction)]
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
-    gear_ratio: Positive = 1.0
-    """Rotor rotation per joint displacement, rad/m."""
-    rotor_inertia: NotNegative = 0.0
-    """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
 
     @classmethod
     def demand_key(cls, key: str) -> str:

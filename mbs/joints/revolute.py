@@ -1,16 +1,12 @@
 """Revolute joints: two points coincide, the second side turns about an axis of the first."""
 
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import model_validator
-
-from ..fields.field_types import NotNegative, Positive
 from .joint import ALIGNED, POINT, Along
-from .moving_joint import AxialJoint
-from .twist_spring import StiffnessSteps
+from .moving_joint import GearedJoint
 
 
-class RevoluteJoint(AxialJoint):
+class RevoluteJoint(GearedJoint):
     """Two points coincide, the second side turns about `axis` by its coordinate, rad; in planar scenes about z.
 
     Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and turns
@@ -19,24 +15,6 @@ class RevoluteJoint(AxialJoint):
     """
 
     type: Literal["revolute"]
-    gear_ratio: Positive = 1.0
-    """Rotor turns per turn of the joint."""
-    rotor_inertia: NotNegative = 0.0
-    """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
-    stiffness: Positive | StiffnessSteps | None = None
-    """Stiffness of a compliant gear, N·m/rad, or { values = [K1, K2, …], torques = [T1, …] } in steps of its torque;
-    default: rigid."""
-    damping: NotNegative = 0.0
-    """Damping of that gear, N·m·s/rad."""
-
-    @model_validator(mode="after")
-    def _has_rotor_behind_spring(self) -> Self:
-        if self.stiffness is None and self.damping:
-            raise ValueError('expected the key "damping" only with stiffness, found it alone')
-        if self.stiffness is not None and not self.rotor_inertia:
-            raise ValueError("expected a rotor_inertia above 0 with stiffness, found none: the rotor turns freely")
-        return self
-
     units = ("rad",)
     axes = (5,)
     loop_equations = (POINT, *ALIGNED)

@@ -13,7 +13,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ..joints.joint import Friction, JointRecord
-from ..joints.revolute import RevoluteJoint
+from ..joints.moving_joint import GearedJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.analysis import Analysis
 from .drives import Drive
@@ -109,9 +109,9 @@ def _output(node: Node) -> tuple[JointRecord, str, Section]:
 
 
 def compliance(node: Node) -> tuple[TwistSpring, float] | None:
-    """Spring and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a rigid one."""
+    """Spring and damping (N·m·s/rad, N·s/m) of the gear in the joint that carries a body; None of a rigid one."""
     joint = node.joint
-    if not isinstance(joint, RevoluteJoint) or joint.stiffness is None:
+    if not isinstance(joint, GearedJoint) or joint.stiffness is None:
         return None
     return TwistSpring.of(joint.stiffness), joint.damping
 

@@ -11,7 +11,7 @@ from ...common.arrays import Array, as_floats
 from ...common.structs import struct
 from .. import _core
 from .model import Model
-from .nodes import Section
+from .nodes import Section, rotor
 from .system import MultibodySystem
 
 
@@ -144,7 +144,7 @@ def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multiplie
 
 
 def rotor_torques(model: Model, states: States, times: Array) -> Array:
-    """J u̇ (T, bodies) N·m about the axis of each rotor in a revolute joint, by the body that the joint carries."""
+    """J u̇ (T, bodies) N·m about the axis of each rotor, by the body that the joint carries."""
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
     places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
@@ -152,6 +152,9 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
         if node.joint.type == "revolute":
             axis = places.at(node.inner).F[:, :, 2]
             torque[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
+        elif node.joint.type == "prismatic":  # whose rotors feel no turn of their section
+            J, N = rotor(node)
+            torque[:, number] = J * N * states.a[:, node.v.start]
     return torque
 
 
