@@ -19,15 +19,20 @@ from ffrobot.design.sensitivity import Sensitivity
 from ffrobot.design.uncertainty import Uncertainty
 from ffrobot.fe_models.link import LinkOutcome
 from ffrobot.fit.fitting import Fit
+from ffrobot.fit.response_fit import PoseComparison, ResponseFit
 from ffrobot.results.verdict import AnalysisVerdict, Verdict
 from ffrobot.smooth.smoothing import Smoothed
 
 FUNCTIONS = (
-    "solve", "load_scene", "make_scene", "make_link", "read_modal_body", "fit_measured", "smooth_motion", "sensitivity",
-    "optimise", "trade_off", "uncertainty", "write_study", "plot_results", "write_report", "view_file", "write_movie",
+    "solve", "load_scene", "make_scene", "make_link", "read_modal_body", "fit_measured", "fit_responses",
+    "smooth_motion", "sensitivity", "optimise", "trade_off", "uncertainty", "write_study", "plot_results",
+    "write_report", "view_file", "write_movie",
 )  # fmt: skip
 CLASSES = ("Results", "ModalBody", "Watcher")
-RETURNED = (LinkOutcome, Verdict, AnalysisVerdict, LinearModel, Fit, Sensitivity, Optimum, Front, Uncertainty, Smoothed)
+RETURNED = (
+    LinkOutcome, Verdict, AnalysisVerdict, LinearModel, Fit, ResponseFit, PoseComparison, Sensitivity, Optimum, Front,
+    Uncertainty, Smoothed,
+)  # fmt: skip
 ERRORS = ("InputError", "SolveError", "FfrobotWarning")
 
 COMMANDS = """# Commands

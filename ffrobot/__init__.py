@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .fe_models.modal_body_file import read_modal_body
     from .fit.fitting import fit_measured
+    from .fit.responses import fit_responses
     from .results.file import Results
     from .run.watcher import Watcher
     from .scene.load import load_scene, make_scene
@@ -41,6 +42,7 @@ _NAMES = {
     ".fe_models.modal_body": ("ModalBody",),
     ".fe_models.modal_body_file": ("read_modal_body",),
     ".fit.fitting": ("fit_measured",),
+    ".fit.responses": ("fit_responses",),
     ".results.file": ("Results",),
     ".run.watcher": ("Watcher",),
     ".scene.load": ("load_scene", "make_scene"),
@@ -52,9 +54,9 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "FfrobotError", "FfrobotWarning", "InputError", "ModalBody", "Results", "Scene", "SolveError", "Watcher",
-    "fit_measured", "load_scene", "make_link", "make_scene", "optimise", "plot_results", "read_modal_body",
-    "sensitivity", "smooth_motion", "solve", "trade_off", "uncertainty", "view_file", "write_movie", "write_report",
-    "write_study",
+    "fit_measured", "fit_responses", "load_scene", "make_link", "make_scene", "optimise", "plot_results",
+    "read_modal_body", "sensitivity", "smooth_motion", "solve", "trade_off", "uncertainty", "view_file", "write_movie",
+    "write_report", "write_study",
 ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -31,8 +31,9 @@ from ..present.lines import print_table
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_scene, make_scene
+from ..scene.scene import Scene
 from ..sweep.files import LINKS, run_files, set_key, value_of
-from .least_squares import Fit, fit_frequencies
+from .least_squares import Fit, Parameters, fit_frequencies
 
 Key = tuple[str, ...]
 
@@ -122,16 +123,22 @@ class RobotTarget:
             return value_of(self._scene, key)
         return value_of(self._tables, key[1:]) if len(key) > 2 else None
 
-    def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
-        """Frequencies (Hz) of the robot's vibrations, the lowest first, with some values changed; no families."""
+    def scene(self, changes: Mapping[Key, float], initial: Mapping[str, object] | None = None) -> Scene:
+        """The scene with some values changed, and with other entries of [initial]. Raises `InputError`."""
         files = run_files(self._path, changes, self._path.parent)
         scene = files.scene | {"analysis": [ANALYSIS]}
+        if initial:
+            scene["initial"] = scene.get("initial", {}) | initial
         tables = {path.name: link for path, link in files.links.items()}
         for body in scene["body"]:
             body["link"] = tables.get(body.get("link"), body.get("link")) if "link" in body else None
             if body.get("modes") == "auto":  # the linear model needs no choice: all of them
                 del body["modes"]
-        solution = solve_scene(make_scene(folder=self._path.parent, **scene), Watcher())
+        return make_scene(folder=self._path.parent, **scene)
+
+    def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
+        """Frequencies (Hz) of the robot's vibrations, the lowest first, with some values changed; no families."""
+        solution = solve_scene(self.scene(changes), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
         free = robot_modes(model := details.models[0]).frequency
@@ -196,34 +203,67 @@ def fit_measured(
         fit.value, fit.relative_deviation
     """
     check_texts(vary, "fit_measured: vary")
-    path, table, place = Path(file), Path(measured), None if output is None else Path(output)
-    target = _target(path, motors)
-    groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
-    starts = {key: _start(path, target, key) for group in groups for key in group}
+    path, table = Path(file), Path(measured)
+    varied = VariedKeys(path, _target(path, motors), vary, output)
+    target = varied.target
     rows = [row for row in read_measured(table, target.families) if row.frequency is not None]
 
-    def changes(values: Array) -> dict[Key, float]:
-        factors = values / np.array([starts[group[0]] for group in groups])
-        return {key: float(starts[key] * c) for group, c in zip(groups, factors, strict=True) for key in group}
-
     def frequencies(values: Array) -> Array:
-        try:
-            family, fit = target.modes(changes(values))
-        except FfrobotError as error:
-            at = ", ".join(f"{'.'.join(key)} = {value:.6g}" for key, value in changes(values).items())
-            raise type(error)(f"with {at}:\n{error}") from None
-        return _of_rows(table, rows, family, fit)
+        with varied.named(values):
+            family, frequency = target.modes(varied.changes(values))
+        return _of_rows(table, rows, family, frequency)
 
-    for new in target.files(starts, place):  # before any work is done
-        check_new_file(new, replace=force)
-    keys = ["=".join(".".join(key) for key in group) for group in groups]
-    start = np.array([starts[group[0]] for group in groups])
+    varied.check_new(replace=force)  # before any work is done
     measured_at = np.array([row.frequency for row in rows], dtype=np.float64)
-    fit = fit_frequencies(frequencies, keys, start, [row.label for row in rows], measured_at, _uncertainty(table, rows))
-    texts = target.files({key: float(f"{value:.{DIGITS}g}") for key, value in changes(fit.value).items()}, place)
-    for new, text in texts.items():
-        write_atomically(new, text.encode(), "fitted file")
-    return replace(fit, files=tuple(map(str, texts)))
+    labels = [row.label for row in rows]
+    fit = fit_frequencies(frequencies, varied.names, varied.start, labels, measured_at, _uncertainty(table, rows))
+    return replace(fit, files=varied.write(fit.value))
+
+
+class VariedKeys:
+    """Keys of a link or scene file that `--vary` names; those of one text, "KEY=KEY", have a common factor.
+
+    Attributes:
+        names, start: of the texts, and values (n,) of their first keys in the file.
+    """
+
+    def __init__(
+        self, path: Path, target: LinkTarget | RobotTarget, vary: Sequence[str], output: AnyPath | None
+    ) -> None:
+        """Raises `InputError` for keys without a number above 0."""
+        self.target, self._place = target, None if output is None else Path(output)
+        self._groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
+        self._starts = {key: _start(path, target, key) for group in self._groups for key in group}
+        self.names = ["=".join(".".join(key) for key in group) for group in self._groups]
+        self.start = np.array([self._starts[group[0]] for group in self._groups])
+
+    def changes(self, values: Array) -> dict[Key, float]:
+        """Values of all keys from those (n,) of the parameters."""
+        factors = values / self.start
+        pairs = zip(self._groups, factors, strict=True)
+        return {key: float(self._starts[key] * c) for group, c in pairs for key in group}
+
+    @contextmanager
+    def named(self, values: Array) -> Iterator[None]:
+        """Context that puts the values (n,) on errors of a model with them."""
+        try:
+            yield
+        except FfrobotError as error:
+            at = ", ".join(f"{'.'.join(key)} = {value:.6g}" for key, value in self.changes(values).items())
+            raise type(error)(f"with {at}:\n{error}") from None
+
+    def check_new(self, *, replace: bool) -> None:
+        """Raise `InputError` where a file that `write` makes exists, unless to `replace` it."""
+        for new in self.target.files(self._starts, self._place):
+            check_new_file(new, replace=replace)
+
+    def write(self, values: Array) -> tuple[str, ...]:
+        """Write files with the values (n,) of the parameters, and return their paths."""
+        fitted = {key: float(f"{value:.{DIGITS}g}") for key, value in self.changes(values).items()}
+        texts = self.target.files(fitted, self._place)
+        for new, text in texts.items():
+            write_atomically(new, text.encode(), "fitted file")
+        return tuple(map(str, texts))
 
 
 def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
@@ -268,12 +308,7 @@ ALIKE = 0.95  # correlation of two parameters' errors from which their values ar
 
 def print_fit(fit: Fit, console: Console) -> None:
     """Tables of parameters and modes, remarks, and the files written."""
-    parameters = (
-        (key, f"{start:.6g}", f"{value:.6g}",
-         "not known" if np.isnan(spread) else f"{spread * value:.2g} ({100 * spread:.2g} %)")
-        for key, start, value, spread in zip(fit.keys, fit.start, fit.value, fit.relative_deviation, strict=True)
-    )  # fmt: skip
-    print_table(console, ("key", "start", "fitted", "standard deviation"), parameters)
+    print_parameters(fit, console)
     modes = (
         (label, *(f"{frequency:.6g}" for frequency in frequencies), f"{100 * error:+.3f} %")
         for label, *frequencies, error in zip(fit.labels, fit.measured, fit.before, fit.after, fit.error, strict=True)
@@ -281,6 +316,16 @@ def print_fit(fit: Fit, console: Console) -> None:
     print_table(console, ("mode", "measured (Hz)", "start (Hz)", "fitted (Hz)", "error"), modes)
     for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
         console.print(line, soft_wrap=True)
+
+
+def print_parameters(fit: Parameters, console: Console) -> None:
+    """A table of the parameters."""
+    rows = (
+        (key, f"{start:.6g}", f"{value:.6g}",
+         "not known" if np.isnan(spread) else f"{spread * value:.2g} ({100 * spread:.2g} %)")
+        for key, start, value, spread in zip(fit.keys, fit.start, fit.value, fit.relative_deviation, strict=True)
+    )  # fmt: skip
+    print_table(console, ("key", "start", "fitted", "standard deviation"), rows)
 
 
 def remarks(fit: Fit) -> Iterator[str]:
@@ -297,14 +342,19 @@ def remarks(fit: Fit) -> Iterator[str]:
             f" ± {wide:.3g} of them, that of 68 % ± {narrow:.3g} (Student's t); a column"
             " uncertainty (Hz), or more modes, make it narrower"
         )
+    yield from correlated(fit)
+    if fit.misfit > 2.0:
+        yield (
+            f"the remaining errors are {fit.misfit:.3g} times the uncertainties: the model lacks something that no"
+            " varied key describes"
+        )
+
+
+def correlated(fit: Parameters) -> Iterator[str]:
+    """Notes on pairs of parameters that are hardly distinguishable."""
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
         if abs(fit.correlation[i, j]) > ALIKE:
             yield (
                 f"{fit.keys[i]} and {fit.keys[j]} are hardly distinguishable: their errors have a correlation of"
                 f" {fit.correlation[i, j]:.4f}"
             )
-    if fit.misfit > 2.0:
-        yield (
-            f"the remaining errors are {fit.misfit:.3g} times the uncertainties: the model lacks something that no"
-            " varied key describes"
-        )

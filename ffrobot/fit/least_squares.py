@@ -25,18 +25,14 @@ Frequencies = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Fitted parameters, n, and frequencies before and after, m.
+class Parameters:
+    """Fitted parameters, n.
 
     Attributes:
         keys: names of the parameters.
         start, value: (n,) before and after.
         relative_deviation: (n,) standard deviations of the parameters, relative to them; NaN where not known.
         correlation: (n, n) of the parameters' errors; NaN where not known.
-        labels: (m) names of the modes.
-        measured, before, after: (m,) Hz.
-        uncertainty: (m,) standard deviations of `measured`, Hz; None where not known.
-        files: that were written.
     """
 
     keys: tuple[str, ...]
@@ -44,17 +40,30 @@ class Fit:
     value: Array
     relative_deviation: Array
     correlation: Array
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviations (n,) of the parameters, in their units."""
+        return self.relative_deviation * self.value
+
+
+@dataclass(frozen=True)
+class Fit(Parameters):
+    """Parameters fitted to frequencies, and these before and after, m.
+
+    Attributes:
+        labels: (m) names of the modes.
+        measured, before, after: (m,) Hz.
+        uncertainty: (m,) standard deviations of `measured`, Hz; None where not known.
+        files: that were written.
+    """
+
     labels: tuple[str, ...]
     measured: Array
     before: Array
     after: Array
     uncertainty: Array | None
     files: tuple[str, ...] = ()
-
-    @property
-    def deviation(self) -> Array:
-        """Standard deviations (n,) of the parameters, in their units."""
-        return self.relative_deviation * self.value
 
     @property
     def degrees_of_freedom(self) -> int | None:
@@ -124,7 +133,7 @@ def fit_frequencies(
         raise SolveError(f"fit: no convergence within {MOST_EVALUATIONS} steps: start nearer to the measured values")
     J, r = jacobian(optimum.x), optimum.fun
     check_distinguishable(J, keys)
-    deviation, correlation = _uncertainty(J, r, known=uncertainty is not None)
+    deviation, correlation = uncertainty_of(J, r, known=uncertainty is not None)
     before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, optimum.x))
     return Fit(
         keys=tuple(keys),
@@ -140,25 +149,25 @@ def fit_frequencies(
     )
 
 
-def check_distinguishable(J: Array, keys: Sequence[str]) -> None:
-    """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n)."""
-    _, values, V = np.linalg.svd(J)
+def check_distinguishable(J: Array, keys: Sequence[str], measured: str = "frequencies") -> None:
+    """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n), m ≥ n."""
+    _, values, V = np.linalg.svd(J, full_matrices=False)
     sizes = np.linalg.norm(J, axis=0)
     for key, size in zip(keys, sizes, strict=True):
         if size <= NO_EFFECT * sizes.max():
-            raise InputError(f"fit: expected keys on which the measured frequencies depend, found {key}: leave it out")
+            raise InputError(f"fit: expected keys on which the measured {measured} depend, found {key}: leave it out")
     if values[-1] > NO_EFFECT * values[0]:
         return
     vector = V[-1] / V[-1][np.abs(V[-1]).argmax()]
     named = [(key, part) for key, part in zip(keys, vector, strict=True) if abs(part) > SHARE]
     change = ", ".join(f"{key} times c" + ("" if part > 1 - 1e-3 else f"^{part:.3g}") for key, part in named)
     raise InputError(
-        f"fit: expected keys that the measured frequencies distinguish, found no change of these with {change}, for"
+        f"fit: expected keys that the measured {measured} distinguish, found no change of these with {change}, for"
         f" any c: vary only {len(named) - 1} of these {len(named)}, or measure with a known mass or spring attached"
     )
 
 
-def _uncertainty(J: Array, r: Array, *, known: bool) -> tuple[Array, Array]:
+def uncertainty_of(J: Array, r: Array, *, known: bool) -> tuple[Array, Array]:
     """Standard deviations (n,) of ln θ, and correlations (n, n); NaN where as many residuals tell none."""
     m, n = J.shape
     if not known and m == n:

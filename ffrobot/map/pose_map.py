@@ -202,10 +202,10 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     return _assembled(plan, solution, evaluator, postures, [(part, judged[name]) for name, part in named.items()])
 
 
-def check_point(solution: Solution, point: str) -> None:
-    """Raise `InputError` where the robot has no such point."""
+def check_point(solution: Solution, point: str, place: str = "--point") -> None:
+    """Raise `InputError` where the robot has no such point; `place`: the option or table that names it."""
     known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
-    check_known(point, known, f"{solution.scene.path}: --point: expected one of {quoted(known)}")
+    check_known(point, known, f"{solution.scene.path}: {place}: expected one of {quoted(known)}")
 
 
 def _judged(

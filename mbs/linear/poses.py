@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...common.arrays import Array
@@ -24,6 +26,7 @@ from .joint_conditions import (
 from .linearisation import LinearEquations, LinearMechanism, labelled
 from .statics import Statics
 
+NONE = np.zeros(0)
 FREE = 1e-12  # of the largest stiffness: less lets the robot move
 
 
@@ -35,11 +38,16 @@ class PoseEvaluator:
         segments: pairs of sections, straight lines between which show the robot.
     """
 
-    def __init__(self, model: Model, q: Array, point: str, *, count: int, omega: Array) -> None:
-        """`q` (n_q,) is any posture of `model`; `count` frequencies are kept, and responses at `omega` (F,), rad/s."""
+    def __init__(
+        self, model: Model, q: Array, point: str, *, count: int = 0, omega: Array = NONE, others: Sequence[str] = ()
+    ) -> None:
+        """`q` (n_q,) is any posture of `model`; `count` frequencies are kept, and responses at `omega` (F,), rad/s.
+
+        `others`: further points of `linear_equations`.
+        """
         self.model = with_compliance(without_paths(model))
         self.space, self.point, self._count, self._omega = SPACES[model.scene.space], point, count, omega
-        self._linear, self._statics = LinearEquations(self.model, self._all(q), {point: point}), Statics(self.model)
+        self._linear, self._statics = LinearEquations(self.model, self._all(q), [point, *others]), Statics(self.model)
         shafts = [name for name in self._linear.names if name.startswith("motor/")]
         driven = {name for joint in self.model.motors for name, _ in labelled(self.model, joint)}
         direct = [name for name in self._linear.names if name in driven]
@@ -56,7 +64,8 @@ class PoseEvaluator:
         """
         q, tree = self._all(q), self.model.tree
         before = self._place(q)
-        straight, mechanism, bent = self._equilibrium(q)
+        rest = np.zeros(tree.n_v)
+        straight, (mechanism, bent) = self._linear.at(0.0, q, rest, rest), self._equilibrium(q)
         torque = np.array([mechanism.force[mechanism.names.index(name)] for name in self.motors])
         values = {"place": before, "sag": self._place(bent) - before, "torque": torque}
         values["manipulability"] = np.array(self._manipulability(straight))
@@ -78,10 +87,16 @@ class PoseEvaluator:
         tree = self.model.tree
         return self.space.along(tree.places(q[None]).at(tree.section(self.point)).r[0])
 
-    def _equilibrium(self, q: Array) -> tuple[LinearMechanism, LinearMechanism, Array]:
-        """The linear equations in q (n_q,) and in the equilibrium near it with motors locked, and its coordinates."""
+    def linear_equations(self, q: Array, near: Array | None = None) -> tuple[LinearMechanism, Array]:
+        """The linear equations about the equilibrium of the undeformed posture q (n_q,), and its coordinates.
+
+        `near`: those of a like robot's equilibrium, from which this one is sought. Raises as `at`.
+        """
+        return self._equilibrium(self._all(q) if near is None else near)
+
+    def _equilibrium(self, q: Array) -> tuple[LinearMechanism, Array]:
+        """The linear equations in the equilibrium near q (n_q,) with motors locked, and its coordinates."""
         rest, motors = np.zeros(self.model.tree.n_v), [*self.model.motors.values(), np.zeros(0, dtype=np.intp)]
-        straight = self._linear.at(0.0, q, rest, rest)
         bent = self._statics.equilibrium(q, np.concatenate(motors))
         mechanism = self._linear.at(0.0, bent, rest, rest)
         K = free_coordinates(mechanism, COMPLIANT if self.model.tree.gears else LOCKED).K
@@ -90,7 +105,7 @@ class PoseEvaluator:
             raise SolveError("joints without motors leave the robot free to move")
         if len(values) and values[0] < 0.0:
             raise SolveError("no stable equilibrium near the posture with straight links")
-        return straight, mechanism, bent
+        return mechanism, bent
 
     def _manipulability(self, mechanism: LinearMechanism) -> float:
         """√det(J Jᵀ) of the point's velocity by the rates of joints with motors (Yoshikawa, 1985)."""

@@ -1,0 +1,210 @@
+"""Parameters by least squares from measured FRFs, with what these say of them and of poses left out.
+
+Residuals are ln(H/H_measured)/σ of each line, the logarithm of the magnitude and the phase (rad). The equations of the
+robot are taken as linear in the parameters θ from one place to the next, where they are made anew: they are linear in
+stiffness, damping and masses but for what gravity adds, so that a few places are enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+
+from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.errors import InputError, SolveError
+from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
+from .response_model import Equations, PoseEquations, ends_of, receptance
+from .response_tests import MeasuredPose
+
+STEP = 1e-4  # relative, for derivatives of the equations
+LINEAR = 1e-3  # relative: where the equations are off by more, their derivatives are made anew
+REACHED = 1e-9  # of ln θ: a last step
+FARTHEST = 1.5  # of ln θ at once
+MOST_PLACES = 30
+STANDS_OUT = float(np.log(2.0))  # of peaks, in the logarithm of the magnitude
+SMOOTH = (0.3, 0.1, 0.03)  # of ln f: widths over which magnitudes are first compared, so that peaks find each other
+
+
+@dataclass(frozen=True)
+class PoseComparison:
+    """The FRFs (F, p) of a pose, m/N: measured, at the start, and fitted."""
+
+    pose: MeasuredPose
+    before: ComplexArray
+    after: ComplexArray
+
+    @property
+    def frac(self) -> Array:
+        """Frequency response assurance criteria (p,), 1 of equal shapes (Heylen and Avitabile, IMAC 1998)."""
+        a, b = self.pose.receptance, self.after
+        across = np.abs((a.conj() * b).sum(axis=0)) ** 2
+        return as_floats(across / ((np.abs(a) ** 2).sum(axis=0) * (np.abs(b) ** 2).sum(axis=0)))
+
+    @property
+    def frequency_error(self) -> Array:
+        """Relative errors of the frequencies of peaks of the measured sum of magnitudes; empty without a peak."""
+        pairs = ((self.pose.receptance, STANDS_OUT), (self.after, 0.1 * STANDS_OUT))
+        measured, fitted = (_peaks(self.pose.frequency, *pair) for pair in pairs)
+        if not len(fitted):
+            return np.zeros(0)
+        return as_floats(np.array([fitted[np.abs(fitted / f - 1.0).argmin()] / f - 1.0 for f in measured]))
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of |ln(H/H_measured)|, about the relative error."""
+        return float(np.sqrt(np.mean(np.abs(np.log(self.after / self.pose.receptance)) ** 2)))
+
+
+def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
+    """Frequencies of peaks that stand out by `prominence` of the logarithm, by the parabola through three points."""
+    from scipy.signal import find_peaks
+
+    size = np.log((np.abs(H) * frequency[:, None]).sum(axis=1))
+    at = find_peaks(size, prominence=prominence)[0]
+    left, middle, right = size[at - 1], size[at], size[at + 1]
+    shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
+    return as_floats(frequency[at] + shift * 0.5 * (frequency[at + 1] - frequency[at - 1]))
+
+
+@dataclass(frozen=True)
+class ResponseFit(Parameters):
+    """Parameters fitted to FRFs, and these in all poses; `files`: that were written."""
+
+    poses: tuple[PoseComparison, ...]
+    files: tuple[str, ...] = ()
+
+
+class _Residuals:
+    """Of FRFs in some poses, about θ = `center` (n,) exp x, with `equations` there and their `slopes` by θ."""
+
+    def __init__(
+        self,
+        poses: Sequence[MeasuredPose],
+        center: Array,
+        equations: Sequence[PoseEquations],
+        slopes: Sequence[Sequence[PoseEquations]],
+    ) -> None:
+        self._poses, self._center, self._equations, self.slopes = poses, center, equations, slopes
+        self._ends = [ends_of(pose) for pose in poses]
+
+    def equations(self, x: Array) -> list[PoseEquations]:
+        """The equations of all poses, linear in θ."""
+        changes, found = self._center * np.expm1(x), list(self._equations)
+        for k, change in enumerate(changes):
+            found = [of.plus(slopes[k], float(change)) for of, slopes in zip(found, self.slopes, strict=True)]
+        return found
+
+    def at(self, x: Array, smoothing: Sequence[Array] = ()) -> tuple[Array, Array]:
+        """Residuals (m,) and their derivatives (m, n) by x; with a `smoothing` of each pose of magnitudes alone."""
+        values, slopes = [], []
+        poses = zip(self._poses, self.equations(x), self._ends, self.slopes, strict=True)
+        for (pose, of, ends, by), S in zip_longest(poses, smoothing):
+            H, dH = receptance(of, ends, _omega(pose), by)
+            off = np.log(H / pose.receptance) / pose.deviation
+            by_x = (self._center * np.exp(x))[:, None, None] * dH / H / pose.deviation
+            parts = (off.real, off.imag) if S is None else (S @ off.real,)
+            parts_by_x = (by_x.real, by_x.imag) if S is None else (S @ by_x.real,)
+            values += [part.ravel() for part in parts]
+            slopes += [part.reshape(len(x), -1) for part in parts_by_x]
+        return np.concatenate(values), np.hstack(slopes).T
+
+    def least(self, width: float = 0.0) -> Array:
+        """The x (n,) of least squares, at most `FARTHEST` away; of magnitudes smoothed over a `width` of ln f."""
+        from scipy.optimize import least_squares
+
+        smoothing = [_smoothing(pose.frequency, width) for pose in self._poses] if width else []
+        known: dict[bytes, tuple[Array, Array]] = {}
+
+        def at(x: Array) -> tuple[Array, Array]:
+            if x.tobytes() not in known:
+                known.clear()
+                known[x.tobytes()] = self.at(x, smoothing)
+            return known[x.tobytes()]
+
+        found = least_squares(
+            lambda x: at(x)[0],
+            np.zeros(len(self._center)),
+            jac=lambda x: at(x)[1],
+            bounds=(-FARTHEST, FARTHEST),
+            x_scale="jac",
+            max_nfev=MOST_EVALUATIONS,
+            xtol=1e-2 if width else 1e-11,
+            ftol=1e-3 if width else 1e-14,
+            gtol=None,
+        )
+        return as_floats(found.x)
+
+
+def _omega(pose: MeasuredPose) -> Array:
+    return as_floats(2 * np.pi * pose.frequency)
+
+
+def _smoothing(frequency: Array, width: float) -> Array:
+    """(F, F) means over ln f with Gaussian weights."""
+    apart = np.log(frequency[:, None] / frequency) / width
+    weights = np.exp(-0.5 * apart**2)
+    return as_floats(weights / weights.sum(axis=1, keepdims=True))
+
+
+def differentiated(equations: Equations, values: Array, place: Sequence[PoseEquations]) -> list[list[PoseEquations]]:
+    """∂/∂θ of the equations by pose and parameter at `values` (n,), from those in `place`: exact where linear."""
+    found = []
+    for step in np.diag(STEP * values):
+        pairs = zip(equations(values + step), place, strict=True)
+        found.append([ahead.slope(here, float(step.sum())) for ahead, here in pairs])
+    return [list(of_pose) for of_pose in zip(*found, strict=True)]
+
+
+def fit_receptances(
+    equations: Equations, keys: Sequence[str], start: Array, poses: Sequence[MeasuredPose]
+) -> ResponseFit:
+    """The parameters (n,), from `start` on, whose FRFs come nearest to those measured in `poses`.
+
+    `equations` has those of `poses`, in their order; poses for validation are compared alone.
+
+    Raises:
+        InputError: all poses are for validation, or FRFs do not distinguish the parameters.
+        SolveError: the iteration does not converge.
+    """
+    used = [k for k, pose in enumerate(poses) if not pose.test.validation]
+    if not used:
+        raise InputError("fit: expected a test that is not for validation, found none")
+    fitted = [poses[k] for k in used]
+
+    def of_used(values: Array) -> list[PoseEquations]:
+        found = equations(values)
+        return [found[k] for k in used]
+
+    theta, place = as_floats(start), of_used(start)
+    slopes = differentiated(of_used, theta, place)
+    check_distinguishable(_Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))[1], keys, "FRFs")
+    for width in (*SMOOTH, *[0.0] * MOST_PLACES):
+        about = _Residuals(fitted, theta, place, slopes)
+        x = about.least(width)
+        theta, place = as_floats(theta * np.exp(x)), of_used(theta * np.exp(x))
+        off = max(new.distance(old) for new, old in zip(place, about.equations(x), strict=True))
+        if off > LINEAR:
+            slopes = differentiated(of_used, theta, place)
+        elif not width and np.abs(x).max() <= REACHED:
+            break
+    else:
+        raise SolveError(f"fit: no convergence within {MOST_PLACES} places: start nearer to the measured FRFs")
+    r, J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))
+    check_distinguishable(J, keys, "FRFs")
+    deviation, correlation = uncertainty_of(J, r, known=all(pose.is_known for pose in fitted))
+    ends = [ends_of(pose) for pose in poses]
+    before, after = (
+        [receptance(of, at, _omega(pose))[0] for of, at, pose in zip(equations(values), ends, poses, strict=True)]
+        for values in (start, theta)
+    )
+    return ResponseFit(
+        keys=tuple(keys),
+        start=as_floats(start),
+        value=theta,
+        relative_deviation=deviation,
+        correlation=correlation,
+        poses=tuple(map(PoseComparison, poses, before, after)),
+    )

@@ -1,0 +1,286 @@
+"""Measured frequency response functions (FRFs): a TOML file of tests, whose tables are UFF 58, CSV or MAT files."""
+
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.errors import InputError, check_known, quoted
+from ..common.extras import extras
+from ..common.rotations import of_rpy
+from ..common.structs import struct
+from ..common.tables import parse_csv, shown
+from ..common.toml_files import load_toml, read_text
+from ..common.validation import InputFile, Record, validate
+from ..mbs.fields.field_types import NotNegative, PointReference, Positive
+from ..mbs.joints.joint import Angles
+
+G = 9.80665  # m/s²
+UNITS = {
+    "m/N": (0, 1.0), "mm/N": (0, 1e-3), "µm/N": (0, 1e-6), "m/s/N": (1, 1.0), "mm/s/N": (1, 1e-3), "m/s²/N": (2, 1.0),
+    "g/N": (2, G),
+}  # fmt: skip
+"""Order of the time derivative that was measured (receptance 0, mobility 1, accelerance 2), and factor to SI."""
+Unit = Literal["m/N", "mm/N", "µm/N", "m/s/N", "mm/s/N", "m/s²/N", "g/N"]
+FLOOR = 1e-3  # relative deviation that no FRF is better known than
+COLUMNS = ("frequency", "force", "response", "real", "imaginary", "coherence")
+FRF, COHERENCE = 4, 6  # function types of UFF 58
+FORCE, ORDERS = 13, {8: 0, 11: 1, 12: 2}  # data types of UFF 58: what is measured per force
+LABELS = {0: ("m",), 1: ("m/s",), 2: ("m/s^2", "m/s2", "m/s²", "m/s**2")}  # of its units, where they are SI
+
+
+class ResponseTest(Record):
+    """FRFs in one pose of the robot."""
+
+    name: str
+    """Name in tables and pictures."""
+    file: InputFile
+    """Universal file (.uff, .unv, .58), CSV table or .mat file."""
+    unit: Unit | None = None
+    """Unit of the FRFs, of receptance, mobility or accelerance. Universal files in SI units do not need it."""
+    pose: dict[str, Any] = Field(default_factory=dict)
+    """Pose, with the keys of [initial] of a scene: { joints = { elbow = "70*deg" } }; default: that of the scene."""
+    points: dict[str, PointReference] = Field(default_factory=dict)
+    """Points of the robot, "BODY.POINT", for node numbers or other names in the file."""
+    rpy: Angles = (0.0, 0.0, 0.0)
+    """Orientation of the axes x, y, z of the file in the global ones: roll, pitch, yaw about fixed axes, rad."""
+    band: tuple[NotNegative, Positive] | None = None
+    """Lowest and highest frequency that count, Hz; default: all."""
+    averages: Annotated[int, Field(ge=2)] | None = None
+    """Number of averages: with the coherence it determines the deviation of each value."""
+    validation: bool = False
+    """Whether the test is only compared with the fitted model."""
+
+
+class ResponseTests(Record):
+    """All tests of a robot."""
+
+    test: tuple[ResponseTest, ...] = Field(min_length=1)
+    """The tests."""
+
+
+class Direction(NamedTuple):
+    """A point "BODY.POINT" and a direction (3,) of unit length in global axes."""
+
+    point: str
+    axis: Array
+
+    @property
+    def label(self) -> str:
+        """The point and the axis, "fore.tip -z"; of an oblique one its components."""
+        k = int(np.abs(self.axis).argmax())
+        if abs(self.axis[k]) == 1.0:
+            return f"{self.point} {'-' * bool(self.axis[k] < 0)}{'xyz'[k]}"
+        return f"{self.point} ({', '.join(f'{x:.3g}' for x in self.axis)})"
+
+
+@struct
+class Response:
+    """A measured FRF as receptance, m/N, (F,) complex, of `response` by `force`; coherence (F,), NaN where unknown."""
+
+    force: Direction
+    response: Direction
+    receptance: ComplexArray
+    coherence: Array
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether it is where and along what the force is."""
+        return self.force.label == self.response.label
+
+    @property
+    def label(self) -> str:
+        """From where to where."""
+        return f"{self.force.label} → {self.response.label}"
+
+
+@struct
+class MeasuredPose:
+    """The FRFs of one test at `frequency` (F,), Hz; `deviation` (F, p): relative standard deviation, or a weight."""
+
+    test: ResponseTest
+    frequency: Array
+    responses: tuple[Response, ...]
+
+    @property
+    def receptance(self) -> ComplexArray:
+        """(F, p) m/N."""
+        return np.column_stack([one.receptance for one in self.responses])
+
+    @property
+    def is_known(self) -> bool:
+        """Whether coherence and averages determine the deviations."""
+        return self.test.averages is not None
+
+    @property
+    def deviation(self) -> Array:
+        """(F, p) of ln H: √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, 9.2); with unknown γ² all 1."""
+        coherence = np.column_stack([one.coherence for one in self.responses])
+        averages = self.test.averages or 2
+        spread = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, FLOOR)))
+        return as_floats(np.where(np.isnan(spread), 1.0, np.maximum(spread, FLOOR)))
+
+
+def read_tests(path: Path) -> list[MeasuredPose]:
+    """The tests of the TOML file at `path`. Raises `InputError` for anything wrong with it or the files it names."""
+    tests = validate(ResponseTests, load_toml(path, "file of tests"), path).test
+    for test in tests:
+        if len(tests) > 1 and not test.pose:
+            raise InputError(f'{path}: test "{test.name}": pose: expected one for each of several tests, found none')
+    return [_read(path, test) for test in tests]
+
+
+class Column(NamedTuple):
+    """An FRF as a file has it, with texts of its ends, "POINT/-x"."""
+
+    force: str
+    response: str
+    frequency: Array
+    values: ComplexArray
+    coherence: Array | None
+    order: int | None = None  # of the time derivative, where the file has it
+    is_si: bool = False
+
+
+def _read(path: Path, test: ResponseTest) -> MeasuredPose:
+    readers = {".uff": _universal, ".unv": _universal, ".58": _universal, ".csv": _of_csv, ".mat": _of_mat}
+    suffix = test.file.suffix.lower()
+    if suffix not in readers:
+        raise InputError(f'{test.file}: expected a file with {quoted(readers)}, found "{test.file.name}"')
+    columns = list(readers[suffix](test.file))
+    if not columns:
+        raise InputError(f"{test.file}: expected frequency response functions (type 4 of dataset 58), found none")
+    frequency = columns[0].frequency
+    low, high = test.band or (-np.inf, np.inf)
+    inside = (frequency >= low) & (frequency <= high)
+    for column in columns:
+        where = f"{test.file}: {column.force} → {column.response}"
+        if len(column.frequency) != len(frequency) or not np.allclose(column.frequency, frequency, rtol=1e-9):
+            raise InputError(f"{where}: expected the frequencies of the other functions, found others")
+        _check(where, column, inside)
+    if not inside.any():
+        raise InputError(f'{path}: test "{test.name}": band: expected frequencies of the file within it, found none')
+    responses = tuple(_response(test, column, inside) for column in columns)
+    if test.averages is not None and any(np.isnan(one.coherence).any() for one in responses):
+        raise InputError(
+            f'{path}: test "{test.name}": averages: expected them with a coherence in the file, found none'
+        )
+    return MeasuredPose(test, as_floats(frequency[inside]), responses)
+
+
+def _check(where: str, column: Column, inside: Array) -> None:
+    """Raise `InputError` for numbers that no FRF has."""
+    at, values = column.frequency[inside], column.values[inside]
+    if len(at) and not at.min() > 0.0:
+        raise InputError(
+            f"{where}: expected frequencies above 0 Hz, found {at.min():g}: the key band, such as [5.0, 200.0], leaves"
+            " them out"
+        )
+    if not (np.isfinite(values).all() and np.abs(values).all()):
+        raise InputError(f"{where}: expected finite values that are not 0, found others")
+    if column.coherence is not None and not ((column.coherence >= 0.0) & (column.coherence <= 1.0)).all():
+        raise InputError(f"{where}: coherence: expected values from 0 to 1, found {_worst(column.coherence):g}")
+
+
+def _worst(coherence: Array) -> float:
+    return float(coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()])
+
+
+def _response(test: ResponseTest, column: Column, inside: Array) -> Response:
+    where = f"{test.file}: {column.force} → {column.response}"
+    order, factor = UNITS[test.unit] if test.unit else (column.order, 1.0)
+    if test.unit is None and not column.is_si:
+        raise InputError(f"{where}: expected the key unit of the test, one of {quoted(UNITS)}, found none")
+    if order is None or column.order not in (None, order):
+        raise InputError(f'{where}: unit: expected that of derivative no. {column.order}, found "{test.unit}"')
+    axes = of_rpy(*test.rpy)
+    force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
+    receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order
+    coherence = np.full(len(receptance), np.nan) if column.coherence is None else column.coherence[inside]
+    return Response(force, response, receptance, as_floats(coherence))
+
+
+def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) -> Direction:
+    name, _, axis = text.rpartition("/")
+    sign, letter = (-1.0 if axis.startswith("-") else 1.0), axis.lstrip("+-")
+    if not name or len(letter) != 1 or letter not in "xyz":
+        raise InputError(f'{where}: expected POINT/x, POINT/-z, …, found "{shown(text)}"')
+    if name not in points and "." not in name:
+        raise InputError(f'{where}: points: expected the point of the robot for "{shown(name)}", found none')
+    return Direction(points.get(name, name), as_floats(sign * axes[:, "xyz".index(letter)]))
+
+
+def _universal(path: Path) -> Iterator[Column]:
+    """FRFs of datasets 58 with the coherence of the same ends; other functions are left out."""
+    with extras():
+        import pyuff
+    try:
+        data = pyuff.UFF(str(path)).read_sets()
+    except Exception as error:  # whatever pyuff finds in a file that is none
+        raise InputError(f"{path}: expected a universal file that pyuff reads, found: {error}") from None
+    sets = [one for one in (data if isinstance(data, list) else [data]) if one.get("type") == 58]
+    ends = [(one["ref_node"], one["ref_dir"], one["rsp_node"], one["rsp_dir"]) for one in sets]
+    coherence = {at: one["data"].real for at, one in zip(ends, sets, strict=True) if one["func_type"] == COHERENCE}
+    for at, one in zip(ends, sets, strict=True):
+        if one["func_type"] != FRF:
+            continue
+        kind, by = one["ordinate_spec_data_type"], one["orddenom_spec_data_type"]
+        if kind not in ORDERS or by != FORCE:
+            raise InputError(
+                f"{path}: node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per"
+                f" force (13), found types {kind} and {by}"
+            )
+        names = [f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:])]
+        label = str(one["ordinate_axis_units_lab"]).strip().lower()
+        is_si = label in ("", "none", *LABELS[ORDERS[kind]])
+        yield Column(*names, as_floats(one["x"]), one["data"].astype(complex), coherence.get(at), ORDERS[kind], is_si)
+
+
+def _axis(path: Path, code: float) -> str:
+    if abs(code) not in (1, 2, 3):
+        raise InputError(f"{path}: expected translations along x, y, z (directions ±1, ±2, ±3), found {code:g}")
+    return "-" * (code < 0) + "xyz"[int(abs(code)) - 1]
+
+
+def _of_csv(path: Path) -> Iterator[Column]:
+    """FRFs of a table with a line for each frequency of each function."""
+    try:
+        header, table = parse_csv(read_text(path, "table of FRFs"))
+        for name in header:
+            check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+        cells = [dict(zip(header, row, strict=True)) for _, row in table]
+        rows = [(one["force"], one["response"], *(float(one[k]) for k in COLUMNS if k in one and k not in ENDS))
+                for one in cells]  # fmt: skip
+    except (csv.Error, ValueError, KeyError) as error:
+        raise InputError(f"{path}: expected a table with the columns {quoted(COLUMNS)}, found: {error}") from None
+    for ends in dict.fromkeys(row[:2] for row in rows):
+        values = np.array([row[2:] for row in rows if row[:2] == ends], dtype=float)
+        coherence = as_floats(values[:, 3]) if values.shape[1] > 3 else None
+        yield Column(*ends, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
+
+
+ENDS = ("force", "response")
+
+
+def _of_mat(path: Path) -> Iterator[Column]:
+    """FRFs of variables frequency (F,), H (F, p), force and response (p names), and perhaps coherence (F, p)."""
+    from scipy.io import loadmat
+
+    try:
+        data = loadmat(path, chars_as_strings=True)
+        frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
+        ends = [[str(np.ravel(one)[0]) for one in data[name].ravel()] for name in ENDS]
+        coherence = data["coherence"].astype(float) if "coherence" in data else None
+        shapes = {H.shape, (len(frequency), len(ends[0])), (len(frequency), len(ends[1]))}
+        if len(shapes) > 1 or (coherence is not None and coherence.shape != H.shape):
+            raise ValueError(f"H of shape {H.shape} for {len(frequency)} frequencies and {len(ends[0])} forces")
+    except (OSError, ValueError, KeyError, IndexError, NotImplementedError) as error:
+        raise InputError(
+            f"{path}: expected a .mat file with frequency, H, force and response, found: {error}"
+        ) from None
+    for k, (force, response) in enumerate(zip(*ends, strict=True)):
+        yield Column(force, response, as_floats(frequency), H[:, k], None if coherence is None else coherence[:, k])

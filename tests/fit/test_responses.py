@@ -1,0 +1,236 @@
+"""`ffrobot fit --frf`: parameters from FRFs that closed forms and an assembly in NumPy have made."""
+
+import copy
+import time
+import tomllib
+
+import numpy as np
+import pytest
+import pyuff
+import tomli_w
+from rigid_chain import ARM, TOOL, receptance, scene
+from scipy.io import savemat
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.fit.response_fit import fit_receptances
+from ffrobot.fit.response_model import PoseEquations
+from ffrobot.fit.response_tests import Direction, MeasuredPose, Response, ResponseTest, read_tests
+
+LINES = np.linspace(2.0, 60.0, 200)  # Hz
+CHAIN = np.array([4e4, 3e4, 2e4, 8.0, 6.0, 4.0, 1.0])  # springs (N/m), dampers (N·s/m) from the wall on, last mass
+CHAIN_KEYS = ["k1", "k2", "k3", "c1", "c2", "c3", "m3"]
+
+
+def chain(values):
+    """Three masses in a row."""
+    of = [np.array([[a + b, -b, 0], [-b, b + c, -c], [0, -c, c]]) for a, b, c in (values[:3], values[3:6])]
+    return PoseEquations(np.diag([2.0, 1.5, values[6]]), *of, np.eye(3))
+
+
+def continued(values, w):
+    """Receptances of all masses by a force on the first one, by continued fractions: Z_k = z_k + b_k − b²/Z_(k+1)."""
+    b = values[:3, None] + 1j * w * values[3:6, None]
+    third = b[2] - w**2 * values[6]
+    second = b[1] + b[2] - w**2 * 1.5 - b[2] ** 2 / third
+    first = 1.0 / (b[0] + b[1] - w**2 * 2.0 - b[1] ** 2 / second)
+    return np.stack([first, first * b[1] / second, first * b[1] * b[2] / (second * third)], axis=1)
+
+
+def measured(H, lines=LINES, coherence=np.nan, **keys):
+    """FRFs (F, p) from the first point to all."""
+    places = [Direction(f"m{k}.p", np.eye(3)[0]) for k in range(H.shape[1])]
+    test = ResponseTest.model_construct(name="chain", validation=False, averages=None, pose={}).model_copy(update=keys)
+    known = np.full(len(lines), coherence)
+    return MeasuredPose(test, lines, tuple(Response(places[0], p, h, known) for p, h in zip(places, H.T, strict=True)))
+
+
+@pytest.mark.parametrize("averages", [None, 50])
+def test_three_masses_with_noise_are_within_three_deviations(averages):
+    """95 of 100 draws at least. With the coherence of this noise, σ² = (1 − γ²)/(2 n γ²), deviations are known."""
+    rng, exact = np.random.default_rng(63), continued(CHAIN, 2 * np.pi * LINES)
+    start = CHAIN * np.exp([0.2, -0.2, 0.15, 0.4, -0.4, 0.3, 0.2])
+    sigma = 0.02 / np.sqrt(2.0)  # of the real part and of the imaginary part
+    coherence = np.nan if averages is None else 1.0 / (1.0 + 2.0 * averages * sigma**2)
+    draws, off = (100 if averages is None else 20), []
+    for _ in range(draws):
+        noise = sigma * (rng.standard_normal(exact.shape) + 1j * rng.standard_normal(exact.shape))
+        pose = measured(exact * (1.0 + noise), coherence=coherence, averages=averages)
+        fit = fit_receptances(lambda x: [chain(x)], CHAIN_KEYS, start, [pose])
+        off.append((fit.value - CHAIN) / fit.deviation)
+    off = np.array(off)
+    assert np.count_nonzero(np.abs(off).max(axis=1) < 3.0) >= 0.95 * draws
+    assert 0.85 < np.sqrt(np.mean(off**2)) < 1.15
+
+
+def block(k, d, m, J):
+    return PoseEquations(np.diag(m), np.diag(k), np.diag(d), np.array(J))
+
+
+TOGETHER = r"k1 times c\S*, k2 times"
+NOT_SEEN = {
+    "a mass that no force moves": (lambda x: block(x, [1.0, 1.0], [1.0, 1.0], [[1.0, 0.0]]), (1e4, 2e4), r"found k2:"),
+    "springs in parallel": (lambda x: block([x[0] + x[1]], [1.0], [1.0], [[1.0]]), (1e4, 3e4), TOGETHER),
+    "springs in series": (
+        lambda x: block([1.0 / (1.0 / x[0] + 1.0 / x[1])], [1.0], [1.0], [[1.0]]), (2e4, 3e4), TOGETHER,
+    ),
+    "masses on one body": (lambda x: block([1e4], [1.0], [x[0] + x[1]], [[1.0]]), (1.0, 0.5), TOGETHER),
+    "a damper and a spring where no line has motion": (
+        lambda x: block([1e4, x[0]], [1.0, x[1]], [1.0, 1.0], [[1.0, 0.0]]), (2e4, 3.0), r"found k1:",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", NOT_SEEN)
+def test_parameters_that_tests_do_not_see_are_named(case):
+    equations, truth, expected = NOT_SEEN[case]
+    of = equations(np.array(truth))
+    w = 2 * np.pi * LINES[:, None, None]
+    H = of.J @ np.linalg.inv(of.K + 1j * w * of.D - w**2 * of.M) @ of.J.T
+    with pytest.raises(InputError, match=f"measured FRFs .*{expected}"):
+        fit_receptances(lambda x: [equations(x)], ["k1", "k2"], 1.1 * np.array(truth), [measured(H[:, :, 0])])
+
+
+POSES = [[0.0, 0.0, 0.2, -0.4, 0.9, 0.3, 0.5, 0.1], [0.0, 0.0, -0.5, 0.1, 0.3, -0.4, 0.8, 0.2]]
+
+
+def robot_tests(folder, start, poses=POSES, lines=60):
+    """Files of the arm in `poses`, the last for validation, and of a scene with `start`."""
+    frequency, tests = np.linspace(3.0, 100.0, lines), []
+    for k, pose in enumerate(poses):
+        H = receptance(ARM, np.array(pose), np.array(TOOL), frequency) * -((2 * np.pi * frequency[:, None, None]) ** 2)
+        rows = ["frequency,force,response,real,imaginary"]
+        for j, force in enumerate("xyz"):
+            for i, response in enumerate("xyz"):
+                pairs = zip(frequency.tolist(), H[:, i, j].tolist(), strict=True)
+                rows += [f"{f!r},tool/{force},tool/{response},{h.real!r},{h.imag!r}" for f, h in pairs]
+        (folder / f"pose{k}.csv").write_text("\n".join(rows))
+        joints = {joint.name: float(q) for joint, q in zip(ARM, pose, strict=True)}
+        tests.append({
+            "name": f"pose {k}", "file": f"pose{k}.csv", "unit": "m/s²/N", "points": {"tool": "body7.end"},
+            "pose": {"joints": joints}, "validation": 0 < k == len(poses) - 1,
+        })  # fmt: skip
+    (folder / "hammer.toml").write_text(tomli_w.dumps({"test": tests}))
+    (folder / "arm.toml").write_text(tomli_w.dumps(scene(start, TOOL, poses[0])))
+    return folder / "arm.toml", folder / "hammer.toml"
+
+
+def test_arm_assembled_in_numpy_is_found_again(tmp_path):
+    """Springs and dampers of joints and of the plate below, to 1e-6; a pose that was not fitted has FRAC 1."""
+    start, keys = copy.deepcopy(ARM), []
+    for joint, k, d in zip(start, (1.2, 0.85, 1.15, 0.9, 1.25, 0.8, 1.3, 0.75), (0.7, 1.3) * 4, strict=True):
+        if joint.name in ("tilt_x", "waist", "elbow", "pitch"):
+            joint.k, joint.d = k * joint.k, d * joint.d
+            keys += [f"joint.{joint.name}.stiffness", f"joint.{joint.name}.damping"]
+    fit = ffrobot.fit_responses(*robot_tests(tmp_path, start), keys)
+    truth = [value for joint in ARM if f"joint.{joint.name}.damping" in keys for value in (joint.k, joint.d)]
+    np.testing.assert_allclose(fit.value, truth, rtol=1e-6)
+    assert fit.poses[1].pose.test.validation
+    assert fit.poses[1].frac.min() > 1.0 - 1e-9
+    assert len(fit.poses[1].frequency_error) > 1
+    assert np.abs(fit.poses[1].frequency_error).max() < 1e-6
+    joints = {joint["name"]: joint for joint in tomllib.loads((tmp_path / "arm.fitted.toml").read_text())["joint"]}
+    assert joints["elbow"]["stiffness"] == pytest.approx(ARM[4].k, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_six_poses_of_nine_frfs_with_ten_parameters_take_twenty_seconds(tmp_path):
+    start = copy.deepcopy(ARM)
+    for joint in start:
+        joint.k *= 1.2
+    start[2].d, start[3].d = 1.3 * start[2].d, 0.7 * start[3].d
+    keys = [*(f"joint.{joint.name}.stiffness" for joint in ARM), "joint.waist.damping", "joint.shoulder.damping"]
+    rng = np.random.default_rng(6)
+    poses = [[0.0, 0.0, *rng.uniform(-1.0, 1.0, 6)] for _ in range(6)]
+    files, began = robot_tests(tmp_path, start, poses, 800), time.process_time()
+    ffrobot.fit_responses(*files, keys)
+    assert time.process_time() - began < 20.0
+
+
+def universal(path, H, lines, ends, kind=12, **keys):
+    data = {
+        "type": 58, "func_type": 4, "load_case_id": 0, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": kind,
+        "orddenom_spec_data_type": 13, "binary": 0, "abscissa_axis_lab": "Frequency", "id1": "hammer",
+    }  # fmt: skip
+    sets = []
+    for (force, response), h in zip(ends, H.T, strict=True):
+        nodes = {"ref_node": force[0], "ref_dir": force[1], "rsp_node": response[0], "rsp_dir": response[1]}
+        sets.append(data | nodes | {"x": lines, "data": h} | keys)
+    pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
+
+
+def table(**keys):
+    return tomli_w.dumps({"test": [{"name": "one", "points": {"1": "a.p", "2": "b.p"}} | keys]})
+
+
+def test_files_of_three_kinds_have_the_same_frfs(tmp_path):
+    lines = np.linspace(1.0, 20.0, 39)
+    H = continued(CHAIN, 2 * np.pi * lines)[:, :2] * -((2 * np.pi * lines[:, None]) ** 2)
+    universal(tmp_path / "a.uff", H, lines, [((1, 3), (1, 3)), ((1, 3), (2, -1))])
+    ends = {"force": ["1/z", "1/z"], "response": ["1/z", "2/-x"]}
+    cells = {name: np.array(texts, dtype=object) for name, texts in ends.items()}
+    savemat(tmp_path / "b.mat", {"frequency": lines, "H": H / 9.80665} | cells)
+    rows = [f"{f!r},1/z,{to},{h.real!r},{h.imag!r}" for to, of in zip(("1/z", "2/-x"), H.T, strict=True)
+            for f, h in zip(lines.tolist(), of.tolist(), strict=True)]  # fmt: skip
+    (tmp_path / "c.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+    for name, unit in (("a.uff", {}), ("b.mat", {"unit": "g/N"}), ("c.csv", {"unit": "m/s²/N"})):
+        (tmp_path / "tests.toml").write_text(table(file=name, band=[2.0, 15.0], **unit))
+        (pose,) = read_tests(tmp_path / "tests.toml")
+        inside = (lines >= 2.0) & (lines <= 15.0)
+        np.testing.assert_allclose(pose.frequency, lines[inside])
+        np.testing.assert_allclose(pose.receptance, continued(CHAIN, 2 * np.pi * lines[inside])[:, :2], rtol=1e-6)
+        assert [one.label for one in pose.responses] == ["a.p z → a.p z", "a.p z → b.p -x"]
+
+
+HEADER = "frequency,force,response,real,imaginary,coherence\n"
+BAD = {
+    "UFF of time histories": ({"func_type": 1}, {}, "expected frequency response functions"),
+    "UFF of strains": ({"kind": 3}, {}, r"data types 8, 11, 12\) per force \(13\), found types 3 and 13"),
+    "UFF of rotations": ({"axis": 4}, {}, "expected translations .*, found 4"),
+    "UFF in g": ({"ordinate_axis_units_lab": "g"}, {}, "expected the key unit of the test"),
+    "another quantity": ({}, {"unit": "m/N"}, "unit: expected that of derivative no. 2"),
+    "an unknown unit": ({}, {"unit": "ft/s²/lbf"}, 'unit: expected "m/N"'),
+    "frequency 0": ({"first": 0.0}, {}, "expected frequencies above 0 Hz, found 0: the key band"),
+    "no frequency": ({}, {"band": [900.0, 950.0]}, "band: expected frequencies of the file within it"),
+    "a node without a point": ({"node": 7}, {}, 'points: expected the point of the robot for "7"'),
+    "averages alone": ({}, {"averages": 5}, "averages: expected them with a coherence"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_are_refused(tmp_path, case):
+    of_file, of_test, expected = BAD[case]
+    of_file = dict(of_file)
+    lines = of_file.pop("first", 1.0) + np.arange(20.0)
+    data = continued(CHAIN, 2 * np.pi * (lines + 1.0))[:, :1]
+    if of_file.get("func_type") == 1:
+        data = data.real
+    ends = [((of_file.pop("node", 1), of_file.pop("axis", 3)), (1, 3))]
+    universal(tmp_path / "a.uff", data, lines, ends, **of_file)
+    (tmp_path / "tests.toml").write_text(table(file="a.uff", **of_test))
+    with pytest.raises(InputError, match=expected):
+        read_tests(tmp_path / "tests.toml")
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ("5.0,1/x,1/x,1e-3,0.0,-0.1\n", "coherence: expected values from 0 to 1, found -0.1"),
+        ("5.0,1/x,1/x,0.0,0.0,0.9\n", "finite values that are not 0"),
+        ("5.0,1/q,1/x,1e-3,0.0,0.9\n", 'expected POINT/x, POINT/-z, …, found "1/q"'),
+        ("5.0,1/x,1/x,one,0.0,0.9\n", "expected a table with the columns"),
+    ],
+)
+def test_bad_tables_are_refused(tmp_path, rows, expected):
+    (tmp_path / "a.csv").write_text(HEADER + rows)
+    (tmp_path / "tests.toml").write_text(table(file="a.csv", unit="g/N"))
+    with pytest.raises(InputError, match=expected):
+        read_tests(tmp_path / "tests.toml")
+
+
+def test_several_tests_need_poses(tmp_path):
+    (tmp_path / "a.csv").write_text(HEADER + "5.0,1/x,1/x,1e-3,0.0,0.9\n")
+    one = {"name": "one", "file": "a.csv", "unit": "g/N"}
+    (tmp_path / "tests.toml").write_text(tomli_w.dumps({"test": [one, one]}))
+    with pytest.raises(InputError, match='test "one": pose: expected one for each of several tests'):
+        read_tests(tmp_path / "tests.toml")
