@@ -24,10 +24,9 @@ def draw_responses(fit: ResponseFit, path: Path) -> Path:
         axes = figure.subplots(2, len(poses), squeeze=False, sharex="col", height_ratios=(2, 1))
         for (above, below), one in zip(axes.T, poses, strict=True):
             f = one.pose.frequency
-            direct = sorted(range(len(one.pose.responses)), key=lambda k, of=one.pose.responses: not of[k].is_direct)
-            for k, color in zip(direct[:MOST_FRFS], COLORS, strict=False):
-                response = one.pose.responses[k]
-                measured, fitted = response.receptance, one.after[:, k]
+            pairs = sorted(zip(one.pose.responses, one.after.T, strict=True), key=lambda pair: not pair[0].is_direct)
+            for (response, fitted), color in zip(pairs[:MOST_FRFS], COLORS, strict=False):
+                measured = response.receptance
                 above.semilogy(f, 1e3 * np.abs(measured), ".", color=color, markersize=2.0)
                 above.semilogy(f, 1e3 * np.abs(fitted), color=color, label=response.label)
                 below.plot(f, np.degrees(np.angle(measured)), ".", color=color, markersize=2.0)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.arrays import Array, Booleans, ComplexArray, as_floats
 from ..common.errors import InputError, check_known, quoted
 from ..common.extras import extras
 from ..common.rotations import of_rpy
@@ -172,7 +172,7 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
     return MeasuredPose(test, as_floats(frequency[inside]), responses)
 
 
-def _check(where: str, column: Column, inside: Array) -> None:
+def _check(where: str, column: Column, inside: Booleans) -> None:
     """Raise `InputError` for numbers that no FRF has."""
     at, values = column.frequency[inside], column.values[inside]
     if len(at) and not at.min() > 0.0:
@@ -190,7 +190,7 @@ def _worst(coherence: Array) -> float:
     return float(coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()])
 
 
-def _response(test: ResponseTest, column: Column, inside: Array) -> Response:
+def _response(test: ResponseTest, column: Column, inside: Booleans) -> Response:
     where = f"{test.file}: {column.force} → {column.response}"
     order, factor = UNITS[test.unit] if test.unit else (column.order, 1.0)
     if test.unit is None and not column.is_si:
@@ -234,10 +234,11 @@ def _universal(path: Path) -> Iterator[Column]:
                 f"{path}: node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per"
                 f" force (13), found types {kind} and {by}"
             )
-        names = [f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:])]
+        force, response = (f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:]))
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
         is_si = label in ("", "none", *LABELS[ORDERS[kind]])
-        yield Column(*names, as_floats(one["x"]), one["data"].astype(complex), coherence.get(at), ORDERS[kind], is_si)
+        values = one["data"].astype(complex)
+        yield Column(force, response, as_floats(one["x"]), values, coherence.get(at), ORDERS[kind], is_si)
 
 
 def _axis(path: Path, code: float) -> str:
@@ -253,14 +254,16 @@ def _of_csv(path: Path) -> Iterator[Column]:
         for name in header:
             check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
         cells = [dict(zip(header, row, strict=True)) for _, row in table]
-        rows = [(one["force"], one["response"], *(float(one[k]) for k in COLUMNS if k in one and k not in ENDS))
-                for one in cells]  # fmt: skip
+        ends = [(one["force"], one["response"]) for one in cells]
+        numbers = np.array(
+            [[float(one[name]) for name in COLUMNS if name in one and name not in ENDS] for one in cells]
+        )
     except (csv.Error, ValueError, KeyError) as error:
         raise InputError(f"{path}: expected a table with the columns {quoted(COLUMNS)}, found: {error}") from None
-    for ends in dict.fromkeys(row[:2] for row in rows):
-        values = np.array([row[2:] for row in rows if row[:2] == ends], dtype=float)
+    for force, response in dict.fromkeys(ends):
+        values = numbers[[at == (force, response) for at in ends]]
         coherence = as_floats(values[:, 3]) if values.shape[1] > 3 else None
-        yield Column(*ends, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
+        yield Column(force, response, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
 
 
 ENDS = ("force", "response")
