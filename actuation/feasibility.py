@@ -402,7 +402,7 @@ def find_unsupplied(
     voltages: Mapping[str, Voltages],
     others: Container[str],
 ) -> Unsupplied | None:
-    """Return what no voltages supply, except on links in `others`; None if no link bends by it."""
+    """Return modal forces that voltages cannot supply, except on links in `others`; None if no link bends by them."""
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     unsupplied: list[tuple[float, float, str, str]] = []
     for name, left in find_unmet(links, patches, voltages, limited=False).items():

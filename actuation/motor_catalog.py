@@ -117,7 +117,7 @@ def _numbers(text: Any) -> Any:
 
 
 def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoice]:
-    """Every motor with each of its gears: those that fit first, of these the lightest (or smallest) first."""
+    """Return every motor with each of its gears: fitting ones first, ordered by mass (or size)."""
     rated = [choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio]
     return sorted(rated, key=lambda one: (not one.fits, _size(one.motor) if one.fits else max(one.shares)))
 

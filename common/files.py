@@ -71,7 +71,7 @@ def _name(stream: BinaryIO, temporary: Path) -> None:
 
 
 def check_output(path: Path, file_format: str) -> None:
-    """Refuse, before any work is done, an output that could not be written or would cost another file.
+    """Raise `InputError`, before any work is done, if an output cannot be written or would overwrite another file.
 
     An existing file is replaced only where it is no input, and is empty, an HDF5 file whose attribute `format` is
     `file_format`, or one too damaged to tell. Raises `InputError`.

@@ -57,7 +57,7 @@ def check_links(file: h5py.File, path: Path) -> None:
 
 @contextmanager
 def in_memory() -> Iterator[h5py.File]:
-    """A new file in memory, for `image_of`: with a name of its own, for HDF5 opens none of a name twice."""
+    """Create a file in memory, for `image_of`, with a unique name: HDF5 opens no name twice."""
     with h5py.File(uuid4().hex, "w", driver="core", backing_store=False) as file:
         yield file
 

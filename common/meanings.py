@@ -366,7 +366,7 @@ def names_of(record: str) -> tuple[str, ...]:
 
 
 def write_record(group: h5py.Group, record: object) -> None:
-    """Write to `group` what the tables have of a record; None and () are nothing."""
+    """Write the fields of a record that the tables have to `group`; None and () are skipped."""
     for name in names_of(type(record).__name__):
         value = getattr(record, field := name.removeprefix("@"))
         if value is None or (isinstance(value, tuple) and not value):

@@ -60,7 +60,7 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 
 
 def write_modal_body(path: Path, body: ModalBody, *, in_cache: bool = False) -> None:
-    """Write `body` to `path`, replacing what is there only once the new file is complete.
+    """Write `body` to `path`; an existing file is replaced once the new one is complete.
 
     A file `in_cache` is for this user alone.
     Raises `SolveError`, with file and reason, where it cannot be written.
@@ -87,7 +87,7 @@ def read_modal_body(path: AnyPath) -> ModalBody:
 
 
 def read_mass(path: Path) -> float:
-    """Read the mass, kg, of the modal body in the file at `path`. Raises `InputError` likewise."""
+    """Read the mass, kg, of the modal body in the file at `path`. Raises `InputError` if it is no such file."""
     return _read(path, lambda file: float(_array(file, _DATASETS["mass"])))
 
 

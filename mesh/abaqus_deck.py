@@ -45,7 +45,7 @@ class Keyword:
 
 
 def keywords(path: Path) -> Iterator[Keyword]:
-    """The keywords of a deck, of included files too; comments and empty lines left out. Raises `InputError`."""
+    """Yield the keywords of a deck and its included files, without comments and empty lines. Raises `InputError`."""
     current: Keyword | None = None
     lines = lines_of(path, _included)
     for line in lines:

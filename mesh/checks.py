@@ -171,7 +171,7 @@ def check_quality(part: PartMesh, where: str) -> None:
 
 
 def straightened(part: PartMesh) -> PartMesh:
-    """Move mid-side nodes of cells that curved edges turn over towards the middle of their edges, until none is left.
+    """Move mid-side nodes towards the middle of their edges until no curved cell is turned over.
 
     Where a coarse cell has two edges on one smooth curve its corner between them is (nearly) flat.
     """
@@ -193,7 +193,7 @@ def straightened(part: PartMesh) -> PartMesh:
 
 
 def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
-    """Raise `InputError` unless `straightened` has left `part` the volume that it had as `curved` by gmsh.
+    """Raise `InputError` unless `straightened` kept the volume that gmsh's `curved` part has.
 
     Else cells are too long for a thin curved wall, and the link would not have its mass.
     """

@@ -63,7 +63,7 @@ def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: ob
 
 
 def allow(seconds: float) -> None:
-    """Let a process that reads a part go on for so many s of processor time from now on."""
+    """Allow a process that reads a part the given seconds of processor time from now on."""
     if not _is_apart:
         return
     with suppress(KeyError, ValueError):

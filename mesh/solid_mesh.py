@@ -49,7 +49,7 @@ class Surface:
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
-    """The boundary facets of this process (b,), ascending, the cell of each (b,), and which facet of it it is (b,)."""
+    """Return the boundary facets (b,) of this process, ascending, their cells (b,) and local numbers in them (b,)."""
     mesh.topology.create_connectivity(2, 3)
     mesh.topology.create_connectivity(3, 2)
     facets = np.sort(np.asarray(exterior_facet_indices(mesh.topology), dtype=np.int64))

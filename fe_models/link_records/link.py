@@ -168,7 +168,7 @@ class Modes(Record):
 
     @property
     def are_default(self) -> bool:
-        """Whether their number is left to the program."""
+        """Whether the program selects their number."""
         return self.count is None and self.indices is None
 
 

@@ -29,7 +29,7 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> ModeSet:
-    """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of it.
+    """Return modes in a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of the basis.
 
     Those that stand for eigenmodes, then as many of each family as loads brought, if the link couples them no more than
     that. K (n, n) is XᵀKX; `families` and `is_static` are of the columns of X.

@@ -79,7 +79,7 @@ class FixedInterfaceFlexibility:
 def fixed_interfaces(
     flexibility: Flexibility, families: Sequence[Family], interfaces: Mapping[str, Array]
 ) -> FixedInterfaceFlexibility:
-    """Held at all interfaces but the root, in the directions of `families`; rows B (6, 3 owned) of each interface."""
+    """Fix all interfaces but the root in the directions of `families`; rows B (6, 3 owned) of each interface."""
     moving = sorted({k for family in families for k in COMPONENTS[family]})
     return FixedInterfaceFlexibility(
         flexibility, np.concatenate([B[moving] for name, B in interfaces.items() if name != ROOT])

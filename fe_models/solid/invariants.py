@@ -19,7 +19,7 @@ from .supports import Flexibility
 
 
 def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
-    """Integrals of the part alone, of modes (3 owned, n); collective. Over its volume: no spin inertia is left out."""
+    """Return the integrals of the part alone, of modes (3 owned, n), with spin inertia of the volume; collective."""
     n, x = modes.shape[1], model.x
     Phi = modes.reshape(-1, 3, n)
     M_Phi = (model.mass @ modes).reshape(-1, 3, n)

@@ -93,7 +93,7 @@ class Flexibility:
 
     @property
     def rank(self) -> int:
-        """Number of independent displacements that the supports leave."""
+        """Number of independent displacements that the supports allow."""
         total = 3 * self.model.V.dofmap.index_map.size_global - self.model.comm.allreduce(int(self.clamped.sum()))
         return int(total + self.W.shape[1] - (0 if self.B is None else len(self.B)))
 

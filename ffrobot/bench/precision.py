@@ -120,11 +120,11 @@ class Deadline(Watcher):
 
     @property
     def passed(self) -> bool:
-        """Whether the time is up; it counts from the first step on."""
+        """Whether the budget is exceeded; time counts from the first step."""
         return self.began is not None and time.perf_counter() - self.began > self.budget
 
     def advance(self, t: float, end: float) -> bool:
-        """False when the time is up."""
+        """Return False if the budget is exceeded."""
         self.began = self.began or time.perf_counter()
         return self.display.advance(t, end) and not self.passed
 

@@ -215,7 +215,7 @@ class Designs:
         return {one.point: one.failure for one in self._designs.values() if not one.completed}
 
     def problem(self, *points: Point) -> str:
-        """Return the error of the scene or a link file if it exists at all of `points`, before any run; else ""."""
+        """Return the error of the scene or a link file that all `points` have, before any run; "" if there is none."""
         text = ""
         for point in points:
             try:

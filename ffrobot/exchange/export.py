@@ -136,7 +136,7 @@ def export_file(
 
 
 def write_content(target: Path, content: Content, *, force: bool) -> None:
-    """Write all files, refusing to overwrite others; identical ones, left by an interrupted command, may stay."""
+    """Write all files without overwriting others; identical ones of an interrupted command may exist."""
     if isinstance(content, str | bytes):
         data = content.encode() if isinstance(content, str) else content
         check_new_file(target, replace=force or holds(target, data))

@@ -87,7 +87,7 @@ CONSTANT = 1e-9  # of the largest value: differences of less are round-off
 
 
 class Quantity(NamedTuple):
-    """Values (P,) in the unit of the title, nan where there is no pose; whether more of it is better."""
+    """Values (P,) in the unit of the title, NaN where a pose is impossible; whether larger is better."""
 
     title: str
     values: Array

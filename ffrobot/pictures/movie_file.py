@@ -48,7 +48,7 @@ def _moving_analysis(results: Results, wanted: str | None) -> str:
 
 
 def movie_outputs(time: NDArray[np.float64], seconds: float) -> Indices:
-    """The outputs (m,) that the frames of a movie of so many seconds show: equally far apart in `time` (T,), all of it.
+    """Return the outputs (m,) that a movie of the given seconds shows: evenly spaced over `time` (T,).
 
     A movie shows the latest output not after its own time, as often as need be.
     """
@@ -63,7 +63,7 @@ Draw = Callable[[Results, str, Indices, float | None, list[str]], Iterator[Frame
 
 
 def make_movie(results_path: Path, path: Path, options: MovieOptions | None, draw: Draw) -> list[str]:
-    """Write a movie (.gif, .mp4) of a results file, whose frames `draw` draws; notes on what is not drawn as it is.
+    """Write a movie (.gif, .mp4) of a results file with frames by `draw`; return notes on what is simplified.
 
     Raises `InputError` where the results cannot be read, have no such analysis or none that goes through time, or for
     another suffix; `SolveError` where the movie cannot be made or written.

@@ -28,7 +28,7 @@ NAMED = re.compile(r'((?:.*?(?:trajectory|joint|body|link|motor) )?)("[^"]+"|[^:
 
 
 def folded(lines: Iterable[str]) -> Iterator[str]:
-    """One line for those that differ in a name only: `trajectory "a", "b" ends at 1 s`."""
+    """Join lines that differ in a name only: `trajectory "a", "b" ends at 1 s`."""
     names: dict[tuple[str, str], dict[str, None]] = {}
     for line in lines:
         before, name, after = NAMED.fullmatch(line).groups()  # type: ignore[union-attr]
@@ -57,7 +57,7 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
 
 
 def plain_table(*headers: str, names: int = 2) -> Table:
-    """Columns without lines: the first ones are `names`, which are left and fold where they must, numbers are right."""
+    """Return a table without lines: the first `names` columns are left-aligned and fold, the others are numbers."""
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)

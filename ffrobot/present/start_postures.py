@@ -80,7 +80,7 @@ UNITS = {"revolute": ("°", 180 / np.pi), "prismatic": (" m", 1.0)}
 
 
 def chosen_posture(results: Results, model: Model) -> str:
-    """Describe the start posture (joints, branch) chosen for a path that leaves it open; "" where given."""
+    """Describe the start posture (joints, branch) that the program chose; "" if the scene specifies it."""
     scene = results.scene
     initial = scene.get("initial", {})
     named = any(initial.get(key) for key in ("angles", "joints", "branch"))

@@ -132,7 +132,7 @@ def _labelled(label: str, texts: Iterable[str]) -> Iterator[str]:
 
 
 def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
-    """Wrap texts by label into the lines left on the screen: first those of each label, then a count of the rest.
+    """Wrap texts by label into the remaining lines of the screen: the first of each label, then a count of the rest.
 
     The first of all ends early where it has more lines than the first of another label leaves. Vibrations come last.
     """

@@ -31,7 +31,7 @@ FORMAT_VERSION = 1
 
 
 def write_results(solution: Solution, path: Path) -> None:
-    """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
+    """Write every analysis of a solution to `path`, completely or not at all. Raises `SolveError` if that fails."""
     write_atomically(path, sealed(results_image(solution)), "results file")
 
 

@@ -175,7 +175,7 @@ def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> Lo
 
 
 def with_structure(body: LoadedBody, placed: Sequence[PlacedLayout]) -> LoadedBody:
-    """Add mass and stiffness of patches to a link or a piece of it, as its layouts ask."""
+    """Add mass and stiffness of patches to a link or a piece of it, according to its layouts."""
     if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body
     from ..actuation.patches.structure import patched_body, structure_effect_of

@@ -153,7 +153,7 @@ Notes = tuple[str, ...]
 
 
 def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, Notes]:
-    """Give the scene shapers for its own frequencies, and paths stretched to be `fastest`; returned with findings.
+    """Return the scene with shapers for its frequencies and paths stretched to be `fastest`, and remarks.
 
     `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """

@@ -328,7 +328,7 @@ _TERMS = {
 
 
 def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
-    """One line for each thing that a planar scene leaves out."""
+    """Yield one line for each effect that a planar scene omits."""
     of = {name: body.spatial for name, body in bodies.items()}
     for name, body in bodies.items():
         if body.modal is None:

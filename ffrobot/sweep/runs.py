@@ -230,7 +230,7 @@ def perform_under_mpi(run: SweepRun) -> Row | None:
 
 
 def finished_row(folder: Path) -> Row | None:
-    """The row that an earlier run left in `folder`, if it came to its end and can be read."""
+    """Return the row that a completed earlier run wrote to `folder`; None if there is none."""
     with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
         data = json.loads((folder / ROW).read_text(encoding="utf-8"))
         return Row(**(data | {key: tuple(data.get(key, ())) for key in ("values", "imported")}))

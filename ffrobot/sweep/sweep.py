@@ -65,7 +65,7 @@ class Sweep:
 
     @property
     def table(self) -> Path:
-        """The file that all rows end in."""
+        """Path of the table with all rows."""
         return self.folder / "table.csv"
 
     @property
@@ -203,7 +203,7 @@ def _files(sweep: Sweep, run: SweepRun) -> RunFiles:
 
 
 def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
-    """Raise `InputError` where the scene or a link file is wrong with these values, before hundreds of runs fail of it.
+    """Raise `InputError`, before any run, if the scene or a link file is invalid with these values.
 
     What needs the whole scene, or its results, is not seen.
     """
@@ -228,7 +228,7 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
 
 
 def claim_folder(sweep: Sweep) -> None:
-    """Start the folder of a sweep, or take up the same one; a folder of another sweep is left alone.
+    """Start or resume the folder of a sweep. Raises `InputError` for a folder of another sweep.
 
     One that grows is the same with whatever keys and points.
     """

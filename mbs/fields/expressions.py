@@ -47,7 +47,7 @@ _WORDS = [*_NAMES, *_FUNCTIONS, "where"]
 
 
 class ExpressionError(ValueError):
-    """An expression violates the grammar; the message gives the position, from 1, and the remedy."""
+    """Signals an expression that violates the grammar; the message has the position, from 1, and the remedy."""
 
     def __init__(self, text: str, position: int, problem: str, hint: str = "") -> None:
         start = max(0, position - 40)

@@ -104,7 +104,7 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
 
 
 def merged(instants: Array) -> Array:
-    """The instants, s, in their order and each once: those that differ by round-off are one."""
+    """Return the instants, s, in ascending order; those that differ by round-off are one."""
     every = np.unique(instants)
     return as_floats(every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))])
 
@@ -158,7 +158,7 @@ def law_within(distance: float, limits: PathLimits, profile: Profile, smoothness
 
 
 def check_durations(durations: Sequence[float], total: float) -> None:
-    """Raise `ValueError` where parts of a motion (s) are negligibly short beside its `total`, s."""
+    """Raise `ValueError` if a part of a motion (s) is negligibly short against its `total`, s."""
     if not SHORTEST * total < min(durations) <= max(durations) < inf:
         raise ValueError(
             f"expected limits and times that fit each other in size, found a motion of {total:.3g} s with parts of"

@@ -143,7 +143,7 @@ def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tupl
 
 
 def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
-    """Coefficients in powers of t − left break, highest first."""
+    """Return coefficients in powers of t − left break, highest first."""
     from scipy.interpolate import PPoly
 
     h = np.diff(breaks)[:, None]

@@ -75,7 +75,7 @@ def shape_of(curve: PPoly, counts: Sequence[int]) -> list[list[_core.TimeFunctio
 def invert(
     servo: Servo, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
 ) -> Inversion:
-    """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] until nothing above `tolerance` is left between the breaks.
+    """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] until the error between breaks is below `tolerance`.
 
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
     """

@@ -72,7 +72,7 @@ def _shapes(servo: Servo, times: Array) -> tuple[Array, Booleans]:
 
 
 def cause_in_posture(servo: Servo) -> str:
-    """Why links that bend leave an output without a posture, and the cure, where postures are it; else ""."""
+    """Return why bent links leave the output without a posture, and a remedy; "" for other causes."""
     if servo.doubt:
         return f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
     return shape_in_redundant_loops(servo.model, MultibodySystem(servo.model).integrated.rows)

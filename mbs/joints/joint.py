@@ -205,7 +205,7 @@ class JointRecord(Record):
     # What a motor and a gear add; joints that can have them override this.
 
     def has_motor(self, default: bool) -> bool:
-        """Whether a motor drives it; `default` where the scene leaves that open."""
+        """Whether a motor drives the joint; `default` if the scene does not specify it."""
         return False
 
     @property
@@ -220,7 +220,7 @@ class JointRecord(Record):
 
     @property
     def given_gear_ratio(self) -> float | None:
-        """Gear ratio; None where the scene gives none."""
+        """Gear ratio; None if the scene specifies none."""
         return getattr(self, "gear_ratio", None) if "gear_ratio" in self.model_fields_set else None
 
     @property

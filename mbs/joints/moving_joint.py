@@ -70,7 +70,7 @@ class MovingJoint(JointRecord):
         return ranges
 
     def has_motor(self, default: bool) -> bool:
-        """Whether motors drive it; `default` where the scene leaves that open."""
+        """Whether motors drive the joint; `default` if the scene does not specify it."""
         return default if self.motor is None else self.motor
 
     @property

@@ -137,7 +137,7 @@ def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
 
 
 def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
-    """Return the coordinates of joints and modes that the condition leaves free."""
+    """Return the coordinates of joints and modes that are free in the condition."""
     joints = [name for name in mechanism.inputs if name.startswith("joint/")]
     if condition == LOCKED:  # motors behind compliant gears stand still, too
         names = [*joints, *(name for name in mechanism.outputs if name.startswith("motor/"))]

@@ -233,7 +233,7 @@ class Statics:
         return as_floats(np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes)
 
     def unstable_ways(self, q: Array) -> Iterator[str]:
-        """A warning where the equilibrium q (n_q,) is left at the slightest push.
+        """Return a warning if the equilibrium q (n_q,) is unstable.
 
         There the forces that lead back have a derivative with a negative eigenvalue on what the rows leave free.
         """

@@ -80,7 +80,7 @@ def with_prescribed_motors(model: Model) -> Model:
 
 
 def refuse_prescribed_motors(model: Model, analysis: Analysis) -> None:
-    """Raise `InputError` where compliant gears leave an analysis nothing to do with trajectories of motors."""
+    """Raise `InputError` for trajectories of motors with compliant gears in analyses that cannot follow them."""
     if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" with trajectories of'
@@ -109,7 +109,7 @@ def _output(node: Node) -> tuple[JointRecord, str, Section]:
 
 
 def compliance(node: Node) -> tuple[TwistSpring, float] | None:
-    """Spring and damping (N·m·s/rad, N·s/m) of the gear in the joint that carries a body; None of a rigid one."""
+    """Return spring and damping (N·m·s/rad, N·s/m) of the gear in a body's inboard joint; None if it is rigid."""
     joint = node.joint
     if not isinstance(joint, GearedJoint) or joint.stiffness is None:
         return None

@@ -144,7 +144,7 @@ def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multiplie
 
 
 def rotor_torques(model: Model, states: States, times: Array) -> Array:
-    """J u̇ (T, bodies) N·m about the axis of each rotor, by the body that the joint carries."""
+    """Return J u̇ (T, bodies), N·m, about the axis of each rotor, by the body outboard of its joint."""
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
     places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))

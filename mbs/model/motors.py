@@ -79,7 +79,7 @@ def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Arr
 
 
 class InCore(NamedTuple):
-    """A body's axes and origin in the frame that the core has of it, which is elsewhere: where it suits joints."""
+    """Axes and origin of a body in the core's frame, whose place suits the joints."""
 
     axes: Array
     origin: Array

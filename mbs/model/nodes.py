@@ -37,7 +37,7 @@ class Section(NamedTuple):
 
 @struct
 class Node:
-    """A body on the joint that carries it."""
+    """A body with its inboard joint."""
 
     body: Body  # its constants
     # that carries it; where the scene has none a free one at the origin, in planar scenes a planar one

@@ -131,7 +131,7 @@ def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarke
 
 
 def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
-    """The constants of a body in the plane. Raises `AcrossError` where it bends otherwise, or twists."""
+    """Return the constants of a body in 2D. Raises `AcrossError` if it bends out of the plane or twists."""
     planar, normal = _core.PlanarData(), axes[2]
     along = float(normal @ data.spin_axis)
     planar.mass, planar.first_moment = data.mass, np.ascontiguousarray(axes[:2] @ data.first_moment)

@@ -80,7 +80,7 @@ def _posture(model: Model, q: Array, start: Array) -> StartPosture:
 
 
 def chosen_start(model: Model) -> StartPosture | None:
-    """The start that `initial.branch` names, the nearest to the guess of those that do; None where it names none.
+    """Return the start on `initial.branch` nearest to the guess; None if the scene names no branch.
 
     Raises `InputError` where no start is so.
     """

@@ -46,7 +46,7 @@ def row_sizes(model: Model) -> Array:
 
 
 def solve_posture(model: Model, t: float, q: Array, locked: Booleans | None = None) -> Array | None:
-    """Q (n_q,) moved onto C(q, t) = 0 by least steps of joints not `locked` (n_v,); None where it does not converge."""
+    """Move q (n_q,) onto C(q, t) = 0 by least steps of joints not `locked` (n_v,); None without convergence."""
     solved, is_met = solve_postures(model, np.array([t]), q[None], locked)
     return solved[0] if is_met[0] else None
 

@@ -66,7 +66,7 @@ def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, time
 def left_slopes(
     model: Model, motion: PrescribedMotion, modes: tuple[Array, Array, Array], times: Array, near: Array
 ) -> tuple[Array, Array, Array]:
-    """M, D and K (T, n + motors, n): derivatives by p̈, ṗ and p of the forces left on modes, and of motors' torques.
+    """Return M, D, K (T, n + motors, n): derivatives of residual modal forces and motor torques by p̈, ṗ and p.
 
     `modes` p, ṗ and p̈ (T, n). Without motors there are n rows.
     """

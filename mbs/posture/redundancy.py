@@ -36,7 +36,7 @@ TELLS = 0.02  # share of a motion left free that joints must have at all times t
 
 
 def resolved(model: Model, end: float) -> Model:
-    """The robot with a row for each freedom that its paths leave, from 0 to `end` (s), by the scene's `redundancy`.
+    """Return the robot with a row for each redundant freedom from 0 to `end` (s), by the scene's `redundancy`.
 
     Raises `InputError` where the criterion has nothing to resolve, `SolveError` where it leads nowhere.
     """

@@ -137,7 +137,7 @@ def _end(target: TimeFunction, end: float, breaks: Sequence[float]) -> float:
 
 
 def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Tools, points on paths, tips that carry no joint, and payloads' points, each once; else the last point.
+    """Yield tools, points on paths, free tips and payloads' points; if there are none, the last point.
 
     `points`: labels by body.
     """

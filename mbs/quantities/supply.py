@@ -80,7 +80,7 @@ def gear_motions(run: Run) -> Mapping[str, GearMotion]:
 
 @kept
 def behind_gears(run: Run) -> Run:
-    """Return the run with motors ahead of compliant gears by the required twist; unchanged if gears give in it."""
+    """Return the run with motors ahead of compliant gears by the required twist; unchanged if it has this twist."""
     gears = gear_motions(run)
     if not gears:
         return run

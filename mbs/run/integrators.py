@@ -173,7 +173,7 @@ def beyond_round_off(tolerance: float, round_off: float) -> str:
 
 
 def unmet(choice: Choice, run: _core.TreeRun) -> str:
-    """Return what the integrator saw when steps became too short without a cause in loads or positions."""
+    """Return what the integrator found if steps became too short without a cause in loads or positions."""
     if run.last_step == 0:
         return (
             "the first step would be too short to change the time: accelerations or frequencies are that large;"

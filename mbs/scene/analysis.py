@@ -119,7 +119,7 @@ class Analysis(Referring):
             yield Need("kind", self.kind, "trajectory")
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """Keys and functions of time that have to exist at all `times`, with so many derivatives."""
+        """Keys and functions of time that must exist at all `times`, and the number of derivatives."""
         yield from ()
 
     def problems(self, among: Surroundings) -> Iterator[str]:

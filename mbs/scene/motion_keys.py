@@ -46,7 +46,7 @@ class Shaper(Record):
 
     @property
     def asks_robot(self) -> bool:
-        """Whether its frequencies are yet to be found."""
+        """Whether the frequencies of the robot have to be computed first."""
         return self.kind != "none" and self.frequency is None
 
     def shape(self, motion: Piecewise) -> Piecewise:

@@ -46,7 +46,7 @@ class Topology:
 
 
 def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
-    """The topology of `joints` between `bodies`: trees grow from the ground, then from each body left, in their order.
+    """Return the topology of `joints` between `bodies`: trees from the ground, then from each unconnected body.
 
     A tree takes the joint of the lowest rank, and the first among such, of all between it and the rest (Prim, Bell
     Syst. Tech. J. 36, 1957).

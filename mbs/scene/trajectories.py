@@ -176,7 +176,7 @@ class Trajectory(MotionKeys):
 
     @cached_property
     def path(self) -> Piecewise | None:
-        """Polynomial motion of the point or joint; None where expressions give it."""
+        """Polynomial motion of the point or joint; None for expressions."""
         if self.via is not None:
             return self.through(self._places[:, :3])
         if self.waypoints is None:

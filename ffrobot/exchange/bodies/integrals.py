@@ -153,7 +153,7 @@ def slopes(S: Array) -> tuple[Array, Array]:
 
 
 def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
-    """Adjust modal masses to those that the mode shapes allow; returns the integrals and the changes made.
+    """Adjust modal masses to those of the mode shapes; returns the integrals and the changes made.
 
     Files of few digits give M_e otherwise than the masses and shapes beside it do. Where nothing has inertia about the
     axis, so that no section can account for that, ∫ρΦᵀΦ of these is taken.

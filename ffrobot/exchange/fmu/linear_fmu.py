@@ -47,7 +47,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
 
 
 def c_table(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...], str]:
-    """A header file with the matrices instead, of all instants of a schedule; otherwise as `linear_fmu`."""
+    """Return a C header with the matrices, of all instants of a schedule; arguments as of `linear_fmu`."""
     unit, models, remarks, name = _unit(path, analysis)
     return _header(unit, models), _what(name, unit), tuple(remarks), name
 

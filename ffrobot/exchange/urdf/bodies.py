@@ -16,7 +16,7 @@ from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint
 
 @dataclass(eq=False)
 class MergedLinks:
-    """Links that move as one: `top` carries the others, and its axes are those of the body, unless it is flexible.
+    """Links that move as one: `top` carries the others; the body has its axes, unless it is flexible.
 
     Attributes:
         top: name of the link.

@@ -176,7 +176,7 @@ FORBIDDEN = str.maketrans({"/": "_", ".": "_"})
 
 
 class Names:
-    """Names in one list, each once: the same for the same original, as `common.keys.check_name` allows them.
+    """Unique names in one list: the same for the same original, valid by `common.keys.check_name`.
 
     Attributes:
         changed: originals whose name is another one now.

@@ -79,7 +79,7 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
 
 
 def mesh_path(filename: str, urdf: Path) -> Path | None:
-    """Find the file of a mesh; `package://NAME/…` is sought beside and above the URDF. None where missing."""
+    """Find the file of a mesh; `package://NAME/…` is searched beside and above the URDF. None if missing."""
     kind, _, rest = filename.rpartition("://")
     folders = urdf.absolute().parents
     if kind != "package":

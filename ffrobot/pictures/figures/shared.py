@@ -157,7 +157,7 @@ def bending_points(results: Results, analysis: str | None = None) -> list[str]:
 
 
 def both_ways(limit: float | list[float]) -> tuple[float, ...]:
-    """The limits of patches, one for all or one each, in both directions, each once."""
+    """Return the distinct limits of patches, V, with both signs."""
     return tuple(sorted({sign * float(one) for one in np.atleast_1d(limit) for sign in (-1.0, 1.0)}))
 
 

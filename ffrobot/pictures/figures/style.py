@@ -76,7 +76,7 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
 
 
 def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
-    """Style of the k-th curve, of so many `points`: sparse markers and dashes keep curves that coincide apart.
+    """Return the style of the k-th curve with `points` points: sparse markers and dashes distinguish equal curves.
 
     A curve that is `alone` has none: on one that rings they look like samples.
     """
@@ -112,7 +112,7 @@ def literal(figure: Figure) -> Figure:
 
 
 def legend(axes: Axes) -> None:
-    """A legend below the axes, where it hides nothing, in as many columns as its texts leave room for.
+    """Draw a legend below the axes, in as many columns as fit.
 
     One curve needs none.
     """

@@ -237,7 +237,7 @@ FOLDS = (
 
 
 def folded(charts: Sequence[Chart]) -> list[tuple[str, list[Chart]]]:
-    """Charts by the part of the page that they are in; parts without any are left out."""
+    """Group charts by the part of the page; empty parts are omitted."""
     parts: dict[str, list[Chart]] = {title: [] for title in (*(title for title, _ in FOLDS), "Bodies and energies")}
     for chart in charts:
         fits = (title for title, starts in FOLDS if chart.name.startswith(starts))

@@ -178,7 +178,7 @@ Diagram = Annotated[Bars | Parallel | Progress | Band | Points, Field(discrimina
 
 
 def wrapped(label: str, letters: int) -> list[str]:
-    """A label in lines of about so many letters, broken at blanks and behind dots of names, not within its unit."""
+    """Wrap a label to lines of about the given length, at blanks and after dots of names, not within its unit."""
     whole = re.sub(r"\([^()]*\)$", lambda unit: unit[0].replace(" ", "\u00a0"), label)
     lines = textwrap.wrap(whole.replace(".", ".\u200b "), letters, break_long_words=False, break_on_hyphens=False)
     return [line.replace("\u200b ", "").replace("\u200b", "").replace("\u00a0", " ") for line in lines]

@@ -192,7 +192,7 @@ class Picture:
 
 
 def draw_pictures(pictures: Sequence[Picture]) -> None:
-    """Draw into PNG files, in a process of its own, which VTK ends where OpenGL is missing.
+    """Draw PNG files in a separate process, which VTK ends if OpenGL is missing.
 
     Raises `SolveError` where PyVista is not installed or cannot draw on this machine.
     """
