@@ -60,7 +60,7 @@ class ActuationPoints(Record):
         return [(key, place) for key in ALONG for place in getattr(self, key)]
 
     def references(self) -> Iterator[Reference]:
-        """The body, and the places on it that are named."""
+        """Yield references to the body and to its named points."""
         yield Reference("body", self.body)
         for key, place in self.places:
             if isinstance(place, str):

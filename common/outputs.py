@@ -67,7 +67,7 @@ def check_file_name(text: str) -> Path:
 def check_regular(path: Path) -> None:
     """Raise `InputError` where a pipe, a device or a socket is at `path`: reading it may never end.
 
-    What is not there, and folders, are for others to refuse.
+    Missing files, and folders, are accepted here.
     """
     with suppress(OSError, ValueError):
         mode = path.stat().st_mode

@@ -83,7 +83,7 @@ class _Assembled:
             return self.node[instance][number]
         except KeyError:
             where = f" of instance {instance}" if instance else ""
-            raise InputError(f"{of}{where}: expected nodes that are there, found node {number}") from None
+            raise InputError(f"{of}{where}: expected existing nodes, found node {number}") from None
 
     def _regions(self) -> dict[str, Integers]:
         members: dict[str, list[int]] = {}
@@ -92,7 +92,7 @@ class _Assembled:
             if place is not None:
                 members.setdefault(name, []).append(place)
             elif number not in self.scopes[instance].scope.others:
-                raise InputError(f"*ELSET {name}{scope}: expected elements that are there, found element {number}")
+                raise InputError(f"*ELSET {name}{scope}: expected existing elements, found element {number}")
         return {name: np.array(cells, dtype=np.int64) for name, cells in members.items()}
 
     def _node_sets(self) -> dict[str, Integers]:

@@ -38,7 +38,7 @@ class Keyword:
                 yield entries, line.place
 
     def option(self, name: str) -> str:
-        """A required option. Raises `InputError` where it is not there."""
+        """Return a required option. Raises `InputError` if it is missing."""
         if not self.options.get(name):
             raise InputError(f"{self}: expected {name}=…, found none")
         return self.options[name]
@@ -141,7 +141,7 @@ class Sets:
     def numbers(self, name: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
         """Yield (instance, number, place) of the members of a set, including those of nested sets.
 
-        Raises `InputError` for a set in it that is not there, or contains itself.
+        Raises `InputError` for a set in it that is missing or contains itself.
         """
         for instance, entry, place in self.members[name]:
             if isinstance(entry, int):

@@ -113,7 +113,7 @@ class SmoothFace:
 def named_faces(source: Source, tables: PartTables) -> PartMesh:
     """The part of `source`, placed, with its faces named and tagged.
 
-    Raises `InputError`, with the faces that the part has, where a face is not there, or two overlap.
+    Raises `InputError`, with the faces that the part has, if a face is missing or two overlap.
     """
     part, geometry, path = source.part, tables.geometry, tables.path
     boundary = PartBoundary.of(part)

@@ -81,7 +81,7 @@ def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -
     """The lines of a deck, those of included files in place of the line that includes them.
 
     `include` gets the lines that follow, and a line: the name of the file that this includes, None if it does not.
-    Raises `InputError` for a file that is not there, includes itself, or is nested too deeply.
+    Raises `InputError` for a file that is missing, includes itself, or is nested too deeply.
     """
 
     def of(file: Path, within: tuple[Path, ...]) -> Iterator[Line]:

@@ -67,7 +67,7 @@ class Inspection:
 def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
     """Read or mesh the part in `file`; its `unit` where that is known.
 
-    Raises `InputError` for a file that is not there or cannot be read or meshed, and an unsound mesh.
+    Raises `InputError` for a file that is missing or cannot be read or meshed, and for an unsound mesh.
     """
     if not file.is_file():
         raise InputError(f"{file}: expected a STEP file or a mesh, found no such file")

@@ -177,7 +177,7 @@ def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
         for name, sets in mesh.cell_sets.items():
             rows = np.asarray(sets[k] if k < len(sets) and sets[k] is not None else [], dtype=np.int64)
             if np.any((rows < 0) | (rows >= len(block.data))):
-                raise ValueError(f"cells of the set {name} that are not there")
+                raise ValueError(f"missing cells in the set {name}")
             members[name] = rows
         yield {name: rows for name, rows in members.items() if rows.size}
 

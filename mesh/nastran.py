@@ -74,7 +74,7 @@ class _Row:
 def cards(path: Path) -> Iterator[Card]:
     """The cards of a deck's bulk data, of included files too.
 
-    Raises `InputError` for an included file that is not there, a line that goes on with none, and replicated cards (=).
+    Raises `InputError` for a missing included file, a line that continues no card, and replicated cards (=).
     """
     rows = [_row(line) for line in _bulk(path)]
     ends: dict[str, int] = {}
@@ -291,7 +291,7 @@ class _Deck:
     @staticmethod
     def _place(place: dict[int, int], node: int, card: Card) -> int:
         if node not in place:
-            raise InputError(f"{card}: expected grid points that are there, found {node}")
+            raise InputError(f"{card}: expected existing grid points, found {node}")
         return place[node]
 
     def _points(self) -> Array:
@@ -334,7 +334,7 @@ class _Deck:
     def _point(self, number: int, asked: Card) -> Array:
         """(3,) of a grid point, in the basic system."""
         if number not in self.grids:
-            raise InputError(f"{asked}: expected grid points that are there, found {number}")
+            raise InputError(f"{asked}: expected existing grid points, found {number}")
         card = self.grids[number]
         given = np.array([[card.real(k) for k in (2, 3, 4)]])
         return self._frame(card.whole(1, self.system), card).points(given)[0]

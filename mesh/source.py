@@ -163,11 +163,11 @@ def _check_nodes(raw: RawMesh, cells: Integers, where: str) -> None:
         if np.any(outside):
             first = int(np.argmax(outside)) + 1
             raise InputError(
-                f"{where}: expected {what} of the {len(raw.points)} nodes of the file, found {np.sum(outside)} of "
-                f"{len(nodes)} with nodes that are not there, number {first} the first"
+                f"{where}: expected {what} with nodes 1 to {len(raw.points)} of the file, found {np.sum(outside)} of "
+                f"{len(nodes)} with others, first in number {first}"
             )
     if any(np.any((group < 0) | (group >= len(raw.points))) for group in raw.point_groups.values()):
-        raise InputError(f"{where}: expected sets of the nodes of the file, found nodes that are not there")
+        raise InputError(f"{where}: expected sets of nodes of the file, found missing nodes")
     with np.errstate(over="ignore"):
         lost = ~np.isfinite(np.sum(raw.points[np.unique(cells)] ** 2, axis=1))
     if np.any(lost):

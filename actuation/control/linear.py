@@ -112,7 +112,7 @@ class Linear(InstantAnalysis):
     refers_to = (("points", "body"),)
 
     def references(self) -> Iterator[Reference]:
-        """What is measured, too."""
+        """Yield references to what is measured, too."""
         yield from super().references()
         for k, sensor in enumerate(self.sensor, 1):
             yield from under(f"sensor no. {k}", sensor.references())

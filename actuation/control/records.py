@@ -142,7 +142,7 @@ class JointPid(ControllerRecord):
         return tuple(dict.fromkeys((*self.proportional, *self.derivative, *self.integral)))
 
     def references(self) -> Iterator[Reference]:
-        """The joints, and the side of their gears."""
+        """Yield references to the joints and to the side of their gears."""
         for name in self.joints:
             yield Reference("", name, "joint")
             if self.side == "motor":
@@ -424,7 +424,7 @@ class Placement(Record):
         return self
 
     def references(self) -> Iterator[Reference]:
-        """The link and its patches."""
+        """Yield references to the link and its patches."""
         yield Reference("placement.body", self.body)
         yield Reference("placement.body", self.body, "patched body")
         if self.pzt is not None:

@@ -308,7 +308,7 @@ class PztLayout(Record):
         return len(self.centers) if self.centers is not None else (self.count or 0)
 
     def references(self) -> Iterator[Reference]:
-        """The link, and the points of it whose deflections weigh."""
+        """Yield references to the link and to its points with `point_weights`."""
         yield Reference("body", self.body)
         yield Reference("body", self.body, "flexible body")
         for point in self.point_weights or ():

@@ -61,7 +61,7 @@ def changes_for(
 
 
 def may_repeat(keys: Sequence[Key]) -> bool:
-    """Whether runs with other values of `keys` can take the same steps: where analyses end, for example, steps end."""
+    """Whether runs with other values of `keys` can take the same steps; keys of analyses change them."""
     return not any(key[0] == "analysis" for key in keys)
 
 

@@ -141,8 +141,8 @@ Method = Literal["differences", "repeated steps", "one-sided", "none"]
 class Entry:
     """∂response/∂key with the estimate of its error, both in SI units, NaN where there is none.
 
-    `method`: one of `Method`; `step`: the largest that was taken; `notes`: what to mind; `unresolved`: the part of the
-    error that outputs are too far apart for, which no other step lessens.
+    `method`: one of `Method`; `step`: the largest one used; `notes`: restrictions; `unresolved`: the part of the error
+    due to the distance of outputs, which no other step reduces.
     """
 
     derivative: float

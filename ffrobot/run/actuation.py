@@ -124,7 +124,7 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
         parts *= 2
     if bent > BETWEEN * parts:
         raise InputError(
-            f"{key}: expected voltages that turn at most some {MOST_PARTS // 80} times where patches have hysteresis,"
+            f"{key}: expected no more than about {MOST_PARTS // 80} reversals of voltages on patches with hysteresis,"
             f" found more from {first:g} to {last:g} s: shorten the analyses"
         )
     return times, values

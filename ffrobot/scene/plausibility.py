@@ -197,8 +197,8 @@ def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -
     """Yield a remark if that many outputs may take more than half of the `available` bytes."""
     if (needed := outputs * bodies * OUTPUT) > available / 2:
         yield (
-            f"{label}: {outputs} outputs may take {needed / 1e9:.2g} GB of memory, of {available / 1e9:.2g} GB that"
-            " there are: a larger output_step takes less, and steps of the integrator do not depend on it"
+            f"{label}: {outputs} outputs may take {needed / 1e9:.2g} GB of memory, of {available / 1e9:.2g} GB in"
+            " total: a larger output_step needs less and does not change the steps of the integrator"
         )
 
 

@@ -31,7 +31,7 @@ class SceneKeys(MechanismKeys):
         return frozenset(reference.name for reference in named if reference.kind == "joint")
 
     def references(self) -> Iterator[Reference]:
-        """All that records of the scene refer to, with their full keys."""
+        """Yield all references of the scene's records, with their full keys."""
         yield from super().references()
         for layout in self.pzt:
             yield from under(f'pzt "{layout.label}"', layout.references())

@@ -39,7 +39,7 @@ class OrientationLaw:
         return _core.TurningLaw(kind, list(self.functions), reference)
 
     def sample(self, times: Array) -> Array:
-        """A (T, 3, 3), columns its axes; of a direction z is along it, by the smallest turn."""
+        """Return triads A (T, 3, 3), axes in columns; of a direction by the smallest turn that brings z onto it."""
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
     def rates(self, times: Array) -> tuple[Array, Array]:

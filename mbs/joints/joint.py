@@ -60,7 +60,7 @@ Angles = tuple[Quantity, Quantity, Quantity]
 class LoopEquation(NamedTuple):
     """One equation of a loop-closing joint, between axes 0, 1, 2 of its inner triad (`f`) and outer triad (`g`).
 
-    "point": three components of the way; "slide": the way along f; "dot": f and g are square.
+    "point": three components of the displacement; "slide": that along f; "dot": f and g are perpendicular.
     """
 
     kind: Literal["point", "slide", "dot"]
@@ -154,7 +154,7 @@ class JointRecord(Record):
         return body_of(first), body_of(second)
 
     def references(self) -> Iterator[Reference]:
-        """The points it joins."""
+        """Yield references to the points that it joins."""
         for k, side in enumerate(self.between):
             yield from loaded_reference(f"between[{k}]", side)
 

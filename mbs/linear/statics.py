@@ -251,7 +251,7 @@ class Statics:
         what = (
             f'"{node.body.name}" buckles' if bends else f'joint "{node.joint.name}" leaves it; start near another one'
         )
-        yield f"the equilibrium is unstable: at the slightest push {what}"
+        yield f"the equilibrium is unstable: after any disturbance {what}"
 
     def _at_rest(self, q: Array) -> tuple[_core.ForcesAtRest, Array]:
         """What the core finds at q (n_q,), and C_v (rows, n_v) in natural sizes."""

@@ -82,7 +82,7 @@ def _posture(model: Model, q: Array, start: Array) -> StartPosture:
 def chosen_start(model: Model) -> StartPosture | None:
     """Return the start on `initial.branch` nearest to the guess; None if the scene names no branch.
 
-    Raises `InputError` where no start is so.
+    Raises `InputError` if no start is on it.
     """
     wanted = model.scene.initial.branch
     if not wanted:
@@ -132,7 +132,7 @@ def branch_names(model: Model, q: Array) -> dict[str, Word]:
 
 
 def in_words(branch: Mapping[str, Word]) -> str:
-    """A line of [initial]."""
+    """Return the line of [initial] for a branch: `branch = { elbow = "up" }`."""
     return toml_line("branch", branch)
 
 

@@ -164,7 +164,7 @@ class MechanismKeys(Record):
         return points[-1] if points else None
 
     def references(self) -> Iterator[Reference]:
-        """All that records of the scene refer to, with their full keys."""
+        """Yield all references of the scene's records, with their full keys."""
         for joint in self.joint:
             yield from under(joint.label, joint.references())
         for tool in self.tool:

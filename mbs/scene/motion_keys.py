@@ -151,7 +151,7 @@ class MotionKeys(Referring):
         return self._shaped(path_of(self._legs_of_table(waypoints)))
 
     def through(self, places: Array) -> Piecewise:
-        """The motion through the places of `via` (k + 1, n), m or rad, or some of their components."""
+        """Return the motion through the points of `via` (k + 1, n), m or rad, or some of their components."""
         return self._shaped(path_of(self._legs(places)))
 
     def _shaped(self, motion: Piecewise) -> Piecewise:

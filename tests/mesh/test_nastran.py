@@ -121,7 +121,7 @@ def test_nodes_on_edges(read, card, cells, edges):
         (PLAIN.replace("GRID,2,,0", "GRID,2,,0,0,0,,,,0", 1), "line 2: expected 8 fields in a line at most, found 11"),
         (PLAIN + "GRID,99,,0,0,0,0,0,0\n,1,1,1\n", "expected 8 fields of a grid point at most, found 11"),
         (HEAD + PLAIN + "BEGIN SUPER=1\n", "expected one BEGIN BULK, found another"),
-        (PLAIN.replace("GRID,2,,", "GRID,2000,,"), r"CHEXA, line \d+: expected grid points that are there, found 2"),
+        (PLAIN.replace("GRID,2,,", "GRID,2000,,"), r"CHEXA, line \d+: expected existing grid points, found 2"),
         (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected midside grid points on all edges or none, found 1"),
         (PLAIN.replace("-0.1", "-0.x", 1), 'GRID, line 1: expected a finite number, found "-0.x"'),
         (fixed(POINTS, CELLS, wide=True).replace("*       -0.05           \n", "", 1), "line 1: .* continues this one"),

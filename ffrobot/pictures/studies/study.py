@@ -258,7 +258,7 @@ def study_files(path: Path) -> list[Path]:
 
 
 def read_study(path: Path) -> Study:
-    """Raises `InputError` where the file is none, or damaged."""
+    """Read a study file. Raises `InputError` if it is none, or damaged."""
     try:
         data = json.loads(path.read_bytes())
     except OSError as error:
