@@ -115,6 +115,8 @@ CELLS = {
     r"leaves ([\d.]+) mm RMS": ("two_link_rest_to_rest", "run", "`pd`", 0, 1.0),
     r"put the tool \*\*([\d.]+) mm\*\*": ("arm_6r", "run", "joints locked", 1, 1.0),
     r"gears ([\d.]+) mm": ("arm_6r", "gears", "motors on", 1, 1.0),
+    r"vibrates by ([\d.]+) mm": ("arm_6r", "behind gears", "swift.toml", 1, 1.0),
+    r"shaper leaves \*\*([\d.]+) mm": ("arm_6r", "behind gears", "shaped.toml", 1, 1.0),
 }
 
 
