@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array, as_floats
-from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_response
+from ..pictures.studies.study import (
+    DesignAxis,
+    Diagram,
+    Numbers,
+    Parallel,
+    Progress,
+    State,
+    StudyTable,
+    axis_of_response,
+)
 from ..results.verdict import Verdict
 from .designs import number
 from .evaluations import Evaluated, Optimality
@@ -43,7 +52,7 @@ def parallel(
 ) -> Parallel:
     """Return a line for each design over the variables of `space` and the `responses` that are known, with limits."""
     points = [space.point(one.place) for one in designs]
-    axes: list[Axis] = []
+    axes: list[DesignAxis] = []
     for variable in space.variables:
         first = space.keys.index(variable.keys[0])
         for k in range(len(variable.keys) if variable.is_catalogue else 1):
@@ -77,17 +86,17 @@ def _best_so_far(problem: DesignProblem, designs: Sequence[Evaluated], values: S
     return numbers(problem.sense * np.minimum.accumulate(kept))
 
 
-def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> Axis:
+def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> DesignAxis:
     if not variable.is_catalogue:
         keys: dict[str, Any] = {"low": variable.low, "high": variable.high, "logarithmic": variable.logarithmic}
-        return Axis(label=variable.name, values=tuple(map(float, values)), **keys)
+        return DesignAxis(label=variable.name, values=tuple(map(float, values)), **keys)
     name, column = ".".join(variable.keys[k]), list(dict.fromkeys(row[k] for row in variable.rows))
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in column):
         return axis_of_response(name, tuple(map(float, column))).model_copy(
             update={"values": tuple(map(float, values))}
         )
     numbered = tuple(float(column.index(value)) for value in values)
-    return Axis(label=name, values=numbered, low=-0.5, high=len(column) - 0.5, names=tuple(map(str, column)))
+    return DesignAxis(label=name, values=numbered, low=-0.5, high=len(column) - 0.5, names=tuple(map(str, column)))
 
 
 SHARE = 0.01  # of a limit: the change for which prices are printed

@@ -7,9 +7,9 @@ from ffrobot.pictures.report import write_report
 from ffrobot.pictures.studies.figures import draw
 from ffrobot.pictures.studies.study import (
     LOOKS,
-    Axis,
     Band,
     Bars,
+    DesignAxis,
     Parallel,
     Points,
     Progress,
@@ -43,8 +43,10 @@ def folder(tmp_path_factory):
     """One diagram of each kind."""
     folder = tmp_path_factory.mktemp("studies")
     axes = (
-        Axis(label="joint.1.gear_ratio", values=(10.0, 20.0, 50.0, 100.0), low=10.0, high=1000.0, logarithmic=True),
-        Axis(label="link", values=(0.0, 1.0, 1.0, 0.0), low=-0.5, high=1.5, names=("<thin>", "thick")),
+        DesignAxis(
+            label="joint.1.gear_ratio", values=(10.0, 20.0, 50.0, 100.0), low=10.0, high=1000.0, logarithmic=True
+        ),
+        DesignAxis(label="link", values=(0.0, 1.0, 1.0, 0.0), low=-0.5, high=1.5, names=("<thin>", "thick")),
         axis_of_response("mass (kg)", MASSES, limit=2.8),
     )
     designs = Parallel(name="designs", title="4 designs", axes=axes, states=STATES)

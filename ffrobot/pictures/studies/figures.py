@@ -16,7 +16,7 @@ from ...common.arrays import Array, as_floats
 from ..figures.plot import image_of, write_figure
 from ..figures.style import legend, literal, new_axes, style
 from ..projection import COLORS
-from .study import LOOKS, Axis, Band, Bars, Diagram, Look, Parallel, Points, Progress, floats, wrapped
+from .study import LOOKS, Band, Bars, DesignAxis, Diagram, Look, Parallel, Points, Progress, floats, wrapped
 
 
 def write_diagrams(diagrams: Sequence[Diagram], folder: Path) -> list[Path]:
@@ -179,7 +179,7 @@ def _line(axes: Axes, places: Array, look: Look, opacity: float) -> None:
         axes.plot(x[-1], places[x[-1]], look.marker, color=look.color, markersize=4)
 
 
-def _axis(axes: Axes, k: int, axis: Axis) -> None:
+def _axis(axes: Axes, k: int, axis: DesignAxis) -> None:
     """A vertical line with ticks at its left and its name above; a limit as a mark to the side that is forbidden."""
     axes.plot([k, k], [0.0, 1.0], color="black", linewidth=0.8, clip_on=False)
     for place, text in axis.ticks:

@@ -71,7 +71,7 @@ class Bars(Drawing):
     signed: bool = False
 
 
-class Axis(Record):
+class DesignAxis(Record):
     """One axis of parallel coordinates from `low` to `high`, with the value of every design.
 
     `limit` is what a response may not exceed (`sense` 1) or fall below (−1); `names` of a catalog's rows, whose values
@@ -113,7 +113,7 @@ def floats(values: Numbers) -> Array:
     return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
-def axis_of_response(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> Axis:
+def axis_of_response(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> DesignAxis:
     """The axis of a response, with room for all its values and its limit."""
     shown = np.array([value for value in (*values, limit) if value is not None] or [0.0])
     low, high = float(shown.min()), float(shown.max())
@@ -124,14 +124,14 @@ def axis_of_response(label: str, values: Numbers, limit: float | None = None, se
     else:
         room = ROOM * (high - low) or ROOM * abs(high) or 1.0
         low, high = low - room, high + room
-    return Axis(label=label, values=values, low=low, high=high, logarithmic=logarithmic, limit=limit, sense=sense)
+    return DesignAxis(label=label, values=values, low=low, high=high, logarithmic=logarithmic, limit=limit, sense=sense)
 
 
 class Parallel(Drawing):
     """Parallel coordinates (Inselberg 1985): a line for each design over variables, responses and limits."""
 
     kind: Literal["parallel"] = "parallel"
-    axes: tuple[Axis, ...]
+    axes: tuple[DesignAxis, ...]
     states: tuple[State, ...]
     best_label: str = "best"
 
