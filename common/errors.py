@@ -97,10 +97,16 @@ def blaming_file(problem: Callable[[Exception], str], where: str = "") -> Iterat
 
 
 ELSEWHERE = {
-    "inverse": "pcid", "inverse-dynamics": "pcid", "dynamics": "forward", "simulate": "forward",
-    "simulation": "forward", "modal": "linear", "eigenvalue": "linear", "equilibrium": "static",
+    "inverse": "pcid",
+    "inverse-dynamics": "pcid",
+    "dynamics": "forward",
+    "simulate": "forward",
+    "simulation": "forward",
+    "modal": "linear",
+    "eigenvalue": "linear",
+    "equilibrium": "static",
     "control": "closed-loop",
-}  # fmt: skip
+}
 """Names that other programs and books use, and those of this program."""
 
 

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     import h5py
 
-LABELS: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "axis": ("x", "y", "z"),
-    "quaternion": ("w", "x", "y", "z"),
-    "stress": ("xx", "yy", "zz", "yz", "xz", "xy"),
-    "level": ("position", "velocity", "acceleration"),
-})  # fmt: skip
+LABELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "axis": ("x", "y", "z"),
+        "quaternion": ("w", "x", "y", "z"),
+        "stress": ("xx", "yy", "zz", "yz", "xz", "xy"),
+        "level": ("position", "velocity", "acceleration"),
+    }
+)
 """Names of columns by what they are of; others are numbered from 1."""
 
 

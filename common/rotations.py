@@ -70,8 +70,12 @@ def _value(m: int, x: Array) -> Array:
 def _closed(m: int, x: Array) -> Array:
     """c_m of x = φ² away from 0."""
     phi = np.sqrt(x)
-    of_m = (np.cos, lambda phi: np.sin(phi) / phi, lambda phi: (1 - np.cos(phi)) / x,
-            lambda phi: (phi - np.sin(phi)) / (x * phi))  # fmt: skip
+    of_m = (
+        np.cos,
+        lambda phi: np.sin(phi) / phi,
+        lambda phi: (1 - np.cos(phi)) / x,
+        lambda phi: (phi - np.sin(phi)) / (x * phi),
+    )
     return as_floats(of_m[m](phi))
 
 

@@ -49,7 +49,7 @@ _NAMES = {
     ".scene.scene": ("Scene",),
     ".smooth.smoothing": ("smooth_motion",),
     ".design.studies": ("optimise", "sensitivity", "trade_off", "uncertainty"),
-}  # fmt: skip
+}
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [

@@ -28,10 +28,16 @@ from .common.interrupts import SIGNALS, EndOfCommand, end_process, end_with_pare
 from .common.python_files import imported_files
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
-    "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write",
-    "ffrobot.results.resume", "ffrobot.present.console",
-    "ffrobot.present.start_postures", "ffrobot.present.summary", "ffrobot.fe_models.link",
-)  # fmt: skip
+    "ffrobot.cli",
+    "ffrobot.run.solve",
+    "ffrobot.run.inputs",
+    "ffrobot.results.write",
+    "ffrobot.results.resume",
+    "ffrobot.present.console",
+    "ffrobot.present.start_postures",
+    "ffrobot.present.summary",
+    "ffrobot.fe_models.link",
+)
 KEPT = ("ffrobot.", "scipy.")  # packages of which the next run finds what one has loaded
 
 

@@ -20,10 +20,17 @@ from .source import MeshBlocks, RawMesh
 
 # Types of cells with their nodes.
 _SOLIDS = {
-    "TE4": (4, "tetra"), "T10": (10, "tetra10"), "HE8": (8, "hexahedron"), "H20": (20, "hexahedron20"),
-    "H27": (27, "hexahedron27"), "PE6": (6, "wedge"), "P15": (15, "wedge15"), "P18": (18, "wedge18"),
-    "PY5": (5, "pyramid"), "P13": (13, "pyramid13"),
-}  # fmt: skip
+    "TE4": (4, "tetra"),
+    "T10": (10, "tetra10"),
+    "HE8": (8, "hexahedron"),
+    "H20": (20, "hexahedron20"),
+    "H27": (27, "hexahedron27"),
+    "PE6": (6, "wedge"),
+    "P15": (15, "wedge15"),
+    "P18": (18, "wedge18"),
+    "PY5": (5, "pyramid"),
+    "P13": (13, "pyramid13"),
+}
 _SURFACES = {"TR3": (3, 3), "TR6": (6, 3), "TR7": (7, 3), "QU4": (4, 4), "QU8": (8, 4), "QU9": (9, 4)}  # and corners
 _LINES = {"SE2": 2, "SE3": 3, "SE4": 4}
 # MED's nodes in VTK's order: those on faces are those of the lower face, of the four around it, of the upper face.

@@ -124,9 +124,15 @@ class Runs:
 
 @contextmanager
 def runs_of(
-    command: str, scene: AnyPath, output: AnyPath | None, *, processes: int = 1, retry: bool = False,
-    allow_python: Sequence[AnyPath] = (), watcher: Watcher | None = None,
-) -> Iterator[Runs]:  # fmt: skip
+    command: str,
+    scene: AnyPath,
+    output: AnyPath | None,
+    *,
+    processes: int = 1,
+    retry: bool = False,
+    allow_python: Sequence[AnyPath] = (),
+    watcher: Watcher | None = None,
+) -> Iterator[Runs]:
     """Runs of a scene file in the folder `output`, or in a temporary one; no output replaces an input.
 
     Raises `InputError` under mpirun.

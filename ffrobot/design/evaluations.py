@@ -326,11 +326,14 @@ def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> O
     limits, bounds = np.full(len(problem.limits), np.nan), np.full(place.size, np.nan)
     limits[reached], bounds[low], bounds[high] = of_limits, -of_low, of_high
     return Optimality(
-        limits, bounds, _largest(scaled[0, free] + multipliers @ gradients),
+        limits,
+        bounds,
+        _largest(scaled[0, free] + multipliers @ gradients),
         gap=float(of_limits @ np.maximum(-excess[reached], 0.0)),
         gradient_error=_largest((slopes.error * np.abs(factors))[0, free]),
-        violation=problem.violation(design.readings), kinks=slopes.kinks,
-    )  # fmt: skip
+        violation=problem.violation(design.readings),
+        kinks=slopes.kinks,
+    )
 
 
 def _largest(values: Array) -> float:

@@ -65,9 +65,14 @@ class SearchFunctions:
     """
 
     def __init__(
-        self, differentiation: Differentiation, start: Evaluated, tell: Callable[[str], None], *,
-        judged: bool, excess: bool,
-    ) -> None:  # fmt: skip
+        self,
+        differentiation: Differentiation,
+        start: Evaluated,
+        tell: Callable[[str], None],
+        *,
+        judged: bool,
+        excess: bool,
+    ) -> None:
         self._differentiation, self._tell, self._judged, self._excess = differentiation, tell, judged, excess
         self._evaluations = differentiation.evaluations
         variables, count = self._evaluations.space.variables, len(self._evaluations.problem.responses)
@@ -192,9 +197,14 @@ def _slsqp(steps: SearchFunctions) -> str:
     steps.shortest = SHORTEST
     limits = {"type": "ineq", "fun": lambda x: -steps.excesses(x), "jac": lambda x: -steps.excess_gradients(x)}
     done = minimize(
-        steps.objective, steps.start, jac=steps.objective_gradient, method="SLSQP", bounds=steps.bounds,
-        constraints=[limits] if steps.has_limits else [], options={"ftol": FTOL, "maxiter": ITERATIONS},
-    )  # fmt: skip
+        steps.objective,
+        steps.start,
+        jac=steps.objective_gradient,
+        method="SLSQP",
+        bounds=steps.bounds,
+        constraints=[limits] if steps.has_limits else [],
+        options={"ftol": FTOL, "maxiter": ITERATIONS},
+    )
     return "" if done.success else f"SLSQP: {done.message}"
 
 
@@ -203,10 +213,14 @@ def _trust_constr(steps: SearchFunctions) -> str:
     limits = NonlinearConstraint(steps.excesses, -np.inf, 0.0, jac=steps.excess_gradients)
     low, high = steps.bounds.T
     done = minimize(
-        steps.objective, steps.start, jac=steps.objective_gradient, method="trust-constr",
-        bounds=Bounds(low, high, keep_feasible=np.isfinite(low)), constraints=[limits] if steps.has_limits else [],
+        steps.objective,
+        steps.start,
+        jac=steps.objective_gradient,
+        method="trust-constr",
+        bounds=Bounds(low, high, keep_feasible=np.isfinite(low)),
+        constraints=[limits] if steps.has_limits else [],
         options={"gtol": GTOL, "xtol": XTOL, "maxiter": ITERATIONS},
-    )  # fmt: skip
+    )
     return "" if done.status in (1, 2) else f"trust-constr: {done.message}"
 
 
@@ -271,9 +285,14 @@ def search_from(
 
 
 def _pass(
-    optimizer: str, differentiation: Differentiation, best: Evaluated, tell: Callable[[str], None], *,
-    judged: bool, excess: bool = False,
-) -> tuple[Evaluated, str]:  # fmt: skip
+    optimizer: str,
+    differentiation: Differentiation,
+    best: Evaluated,
+    tell: Callable[[str], None],
+    *,
+    judged: bool,
+    excess: bool = False,
+) -> tuple[Evaluated, str]:
     """The best design that an optimizer comes to from `best`, and why it ended where that is not at an optimum."""
     steps = SearchFunctions(differentiation, best, tell, judged=judged, excess=excess)
     message = ""
@@ -311,9 +330,11 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
         """Return scaled responses (1 + m, S) of S places (n, S), or of one (n); infinite where designs fail."""
         designs = evaluations.at([tuple(map(float, place)) for place in places.reshape(count, -1).T])
         failed = [np.inf] * len(problem.responses)
-        return np.array([problem.scaled(one.values) if one.completed else failed for one in designs]).reshape(
-            -1, len(problem.responses)
-        ).T  # fmt: skip
+        return (
+            np.array([problem.scaled(one.values) if one.completed else failed for one in designs])
+            .reshape(-1, len(problem.responses))
+            .T
+        )
 
     def on_improvement(x: Array, convergence: float) -> None:
         tell(f"differential evolution, {evaluations.designs.count} runs")

@@ -39,9 +39,17 @@ EVERY = 500  # combinations of rows: more are sought among
 
 
 def find_optimum(
-    runner: Runs, vary: Sequence[str], minimise: str | None, maximise: str | None, subject_to: Sequence[str],
-    method: str, starts: int, seed: int, runs: int, tolerance: float,
-) -> Optimum:  # fmt: skip
+    runner: Runs,
+    vary: Sequence[str],
+    minimise: str | None,
+    maximise: str | None,
+    subject_to: Sequence[str],
+    method: str,
+    starts: int,
+    seed: int,
+    runs: int,
+    tolerance: float,
+) -> Optimum:
     """Optimize a scene: see `ffrobot.optimise`."""
     path, problem = runner.path, read_problem(minimise, maximise, subject_to)
     space = read_space(path, vary)
@@ -274,11 +282,14 @@ class Front(Finding):
     def _curve(self) -> Points:
         response, against = self.values.T
         return Points(
-            name="front", title=f"{self.responses[0]} against {self.responses[1]}",
-            x_label=with_unit(self.responses[1], self.units[1]), y_label=with_unit(self.responses[0], self.units[0]),
-            x=floats(against), y=floats(response),
+            name="front",
+            title=f"{self.responses[0]} against {self.responses[1]}",
+            x_label=with_unit(self.responses[1], self.units[1]),
+            y_label=with_unit(self.responses[0], self.units[0]),
+            x=floats(against),
+            y=floats(response),
             sure=tuple(bool(one.converged and one.feasible) for one in self.points),
-        )  # fmt: skip
+        )
 
 
 def _state(one: FrontPoint) -> str:
@@ -289,9 +300,15 @@ SAME = 1e-6  # of the second response: ends of a front that are one design
 
 
 def find_front(
-    runner: Runs, vary: Sequence[str], minimise: str, against: str, points: int, subject_to: Sequence[str], runs: int,
+    runner: Runs,
+    vary: Sequence[str],
+    minimise: str,
+    against: str,
+    points: int,
+    subject_to: Sequence[str],
+    runs: int,
     tolerance: float,
-) -> Front:  # fmt: skip
+) -> Front:
     """Compute a Pareto front: see `ffrobot.trade_off`."""
     path, problem = runner.path, read_problem(minimise, None, subject_to)
     space, other = read_space(path, vary), parse_response(against, "--against")

@@ -71,11 +71,14 @@ def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple
     values = [one.values[0] if one.completed else np.nan for one in designs]
     unit = next((one.readings[0].unit for one in designs if one.completed), "")
     return Progress(
-        name="convergence", title=f"{problem.objective.text}, design by design",
+        name="convergence",
+        title=f"{problem.objective.text}, design by design",
         y_label=with_unit(problem.objective.text, unit),
-        values=numbers(values), states=states, best=_best_so_far(problem, designs, values),
+        values=numbers(values),
+        states=states,
+        best=_best_so_far(problem, designs, values),
         logarithmic=axis_of_response("", numbers(values)).logarithmic,
-    )  # fmt: skip
+    )
 
 
 def _best_so_far(problem: DesignProblem, designs: Sequence[Evaluated], values: Sequence[float]) -> Numbers:

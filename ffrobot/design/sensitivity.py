@@ -221,9 +221,19 @@ def _relative(error: float, base: Base, g: int, k: int) -> float:
 
 
 COLUMNS = (
-    "response", "value", "unit", "time", "key", "key_value", "derivative", "error", "percent_per_percent", "method",
-    "step", "notes",
-)  # fmt: skip
+    "response",
+    "value",
+    "unit",
+    "time",
+    "key",
+    "key_value",
+    "derivative",
+    "error",
+    "percent_per_percent",
+    "method",
+    "step",
+    "notes",
+)
 HEADING = ("key", "value", "% per %", "derivative", "error", "by")
 HOW = {
     "repeated steps": "repeated steps: differences of runs with the same time steps",

@@ -98,10 +98,15 @@ Tolerance = FiniteRange(1e-10, 1e-3)
 
 @_checked
 def sensitivity(
-    scene: AnyPath, of: Responses, to: Annotated[Sequence[str], "KEY,KEY …"], output: AnyPath | None = None, *,
-    step: Annotated[float, FiniteRange(1e-6, 0.2)] = 0.01, tolerance: Annotated[float | None, Tolerance] = None,
+    scene: AnyPath,
+    of: Responses,
+    to: Annotated[Sequence[str], "KEY,KEY …"],
+    output: AnyPath | None = None,
+    *,
+    step: Annotated[float, FiniteRange(1e-6, 0.2)] = 0.01,
+    tolerance: Annotated[float | None, Tolerance] = None,
     **how: Unpack[RunOptions],
-) -> "Sensitivity":  # fmt: skip
+) -> "Sensitivity":
     """Derivatives of scalar responses with respect to keys of a scene and its links: `ffrobot sensitivity`.
 
     Args:
@@ -134,12 +139,20 @@ def sensitivity(
 
 @_checked
 def optimise(
-    scene: AnyPath, vary: Ranges, output: AnyPath | None = None, *,
-    minimise: Annotated[str | None, "RESPONSE"] = None, maximise: Annotated[str | None, "RESPONSE"] = None,
-    subject_to: Limits = (), method: Method = "auto", starts: Annotated[int, IntRange(1, 1000)] = 1,
-    seed: Annotated[int, IntRange(0, 2**32 - 1)] = 0, runs: MostRuns = 1000,
-    tolerance: Annotated[float, Tolerance] = 1e-8, **how: Unpack[RunOptions],
-) -> "Optimum":  # fmt: skip
+    scene: AnyPath,
+    vary: Ranges,
+    output: AnyPath | None = None,
+    *,
+    minimise: Annotated[str | None, "RESPONSE"] = None,
+    maximise: Annotated[str | None, "RESPONSE"] = None,
+    subject_to: Limits = (),
+    method: Method = "auto",
+    starts: Annotated[int, IntRange(1, 1000)] = 1,
+    seed: Annotated[int, IntRange(0, 2**32 - 1)] = 0,
+    runs: MostRuns = 1000,
+    tolerance: Annotated[float, Tolerance] = 1e-8,
+    **how: Unpack[RunOptions],
+) -> "Optimum":
     """Find the design with the smallest or largest objective within limits: `ffrobot optimise`.
 
     Args:
@@ -184,11 +197,18 @@ def optimise(
 
 @_checked
 def trade_off(
-    scene: AnyPath, vary: Ranges, output: AnyPath | None = None, *,
-    minimise: str, against: Annotated[str, "RESPONSE"], points: Annotated[int, IntRange(3, 1000)] = 8,
-    subject_to: Limits = (), runs: MostRuns = 1000, tolerance: Annotated[float, Tolerance] = 1e-8,
+    scene: AnyPath,
+    vary: Ranges,
+    output: AnyPath | None = None,
+    *,
+    minimise: str,
+    against: Annotated[str, "RESPONSE"],
+    points: Annotated[int, IntRange(3, 1000)] = 8,
+    subject_to: Limits = (),
+    runs: MostRuns = 1000,
+    tolerance: Annotated[float, Tolerance] = 1e-8,
     **how: Unpack[RunOptions],
-) -> "Front":  # fmt: skip
+) -> "Front":
     """Pareto front: smallest first response for `points` values of a second one: `ffrobot optimise … --against`.
 
     Args:
@@ -224,11 +244,17 @@ def trade_off(
 
 @_checked
 def uncertainty(
-    scene: AnyPath, of: Annotated[Sequence[str], "RESPONSE|HISTORY"], spread: Spreads, output: AnyPath | None = None,
+    scene: AnyPath,
+    of: Annotated[Sequence[str], "RESPONSE|HISTORY"],
+    spread: Spreads,
+    output: AnyPath | None = None,
     *,
-    samples: Annotated[int, "N"] = 200, seed: Annotated[int, IntRange(0, 2**63 - 1)] = 0,
-    by: Literal["samples", "gradients"] = "samples", indices: bool = False, **how: Unpack[RunOptions],
-) -> "Uncertainty":  # fmt: skip
+    samples: Annotated[int, "N"] = 200,
+    seed: Annotated[int, IntRange(0, 2**63 - 1)] = 0,
+    by: Literal["samples", "gradients"] = "samples",
+    indices: bool = False,
+    **how: Unpack[RunOptions],
+) -> "Uncertainty":
     """Statistics of responses and histories for uncertain keys: `ffrobot uncertainty`.
 
     Args:

@@ -219,10 +219,12 @@ class Uncertainty(Finding):
         else:
             series = [Series(values=numbers(100.0 * self.shares[g, order]))]
         return Bars(
-            name=f"ranking_{file_name(self.responses[g])}", title=self.responses[g],
+            name=f"ranking_{file_name(self.responses[g])}",
+            title=self.responses[g],
             x_label="Sobol index (%)" if self.indices else "share of the variance (%)",
-            labels=tuple(".".join(self.spreads[k].key) for k in order), series=tuple(series),
-        )  # fmt: skip
+            labels=tuple(".".join(self.spreads[k].key) for k in order),
+            series=tuple(series),
+        )
 
     def _band(self, band: HistoryBand) -> Band:
         low, median, high = band.statistics.quantiles

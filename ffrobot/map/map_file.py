@@ -22,10 +22,19 @@ from .pose_map import STATUS, PoseMap
 FORMAT, FORMAT_VERSION = "ffrobot-map", 1
 TABLE, FILE = "table.csv", "map.h5"
 UNITS = {
-    "frequency": "Hz", "compliance": "m/N, rad/N, m/(N·m), rad/(N·m)", "stiffness": "N/m", "least_stiffness": "N/m",
-    "direction": "", "response": "m/N", "sag": "m", "torque": "N·m or N", "torque_share": "", "place": "m",
-    "manipulability": "", "robot": "m",
-}  # fmt: skip
+    "frequency": "Hz",
+    "compliance": "m/N, rad/N, m/(N·m), rad/(N·m)",
+    "stiffness": "N/m",
+    "least_stiffness": "N/m",
+    "direction": "",
+    "response": "m/N",
+    "sag": "m",
+    "torque": "N·m or N",
+    "torque_share": "",
+    "place": "m",
+    "manipulability": "",
+    "robot": "m",
+}
 NOT_IN_TABLE = ("compliance", "response", "robot")
 
 

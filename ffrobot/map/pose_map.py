@@ -280,9 +280,11 @@ def _request(plan: MapPlan) -> dict[str, Any]:
     asked = {
         "scene": str(plan.scene.absolute()),
         "axes": [[axis.name, axis.values.tolist()] for axis in plan.axes],
-        "point": plan.point, "keeps_orientation": plan.keeps_orientation, "count": plan.count,
+        "point": plan.point,
+        "keeps_orientation": plan.keeps_orientation,
+        "count": plan.count,
         "frequencies": plan.frequencies.tolist(),
-    }  # fmt: skip
+    }
     return {"asked": asked, "inputs": fingerprints(read_tables(plan.scene), plan.scene)}
 
 

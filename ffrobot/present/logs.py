@@ -62,9 +62,14 @@ def _allow_python(context: click.Context, parameter: click.Parameter, paths: tup
 
 
 python_option = click.option(
-    "--allow-python", metavar="PATH", multiple=True, type=_THERE, expose_value=False, callback=_allow_python,
+    "--allow-python",
+    metavar="PATH",
+    multiple=True,
+    type=_THERE,
+    expose_value=False,
+    callback=_allow_python,
     help="Run Python files that the scene names from here too [its own folder]; repeatable.",
-)  # fmt: skip
+)
 """Of commands that solve scenes."""
 
 

@@ -30,8 +30,16 @@ OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "{0}/position", 
 QUATERNION = ("qw", "qx", "qy", "qz")
 TURN = 1.0  # rad, of steps next to one of a whole turn, and of that from a whole turn
 UNIT = re.compile(r"(.+?)[ _]*(?:\[(\S+)\]|\((\S+)\))")
-FACTORS = {"rad": 1.0, "deg": math.pi / 180, "degree": math.pi / 180, "degrees": math.pi / 180, "°": math.pi / 180,
-           "m": 1.0, "cm": 1e-2, "mm": 1e-3}  # fmt: skip
+FACTORS = {
+    "rad": 1.0,
+    "deg": math.pi / 180,
+    "degree": math.pi / 180,
+    "degrees": math.pi / 180,
+    "°": math.pi / 180,
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+}
 """Units behind the names of columns."""
 MANY, GAP = 20, 20.0  # intervals of a table with a usual step; how many times this a gap is
 ABRUPT = 3.0  # times the accelerations of a record: what its spline needs next to an end, where it rests

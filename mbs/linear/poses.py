@@ -22,7 +22,7 @@ from .joint_conditions import (
     frequency_response,
     joint_conditions,
     translational_stiffness,
-)  # fmt: skip
+)
 from .linearisation import LinearEquations, LinearMechanism, labelled
 from .statics import Statics
 
@@ -119,9 +119,12 @@ class PoseEvaluator:
         stiffness, d = translational_stiffness(C), len(self.space.translations)
         along, least, direction = stiffness or (np.zeros(d), 0.0, np.full(d, np.nan))
         return {
-            "frequency": frequency, "compliance": C, "stiffness": along, "least_stiffness": np.array(least),
+            "frequency": frequency,
+            "compliance": C,
+            "stiffness": along,
+            "least_stiffness": np.array(least),
             "direction": direction,
-        }  # fmt: skip
+        }
 
 
 def _segments(model: Model, point: str) -> list[tuple[Section, Section]]:

@@ -48,9 +48,12 @@ def projected(body: Body) -> Body:
         point: np.concatenate([ALONG, 1.0 - ALONG])[:, None, None] * K for point, K in kept.stiffening.K_points.items()
     }
     stiffening = replace(
-        kept.stiffening, K_s=K_s, K_x=_about(center, K_s, kept.stiffening.K_x), K_points=MappingProxyType(K_points),
+        kept.stiffening,
+        K_s=K_s,
+        K_x=_about(center, K_s, kept.stiffening.K_x),
+        K_points=MappingProxyType(K_points),
         S_turned=_keeping_shapes(kept.stiffening.S_turned),
-    )  # fmt: skip
+    )
     return replace(planar, stiffening=stiffening)
 
 

@@ -57,8 +57,12 @@ class Initial(Referring):
     "negative", the sign of the coordinate within ±180°. Of those the nearest to the guess."""
 
     refers_to = (
-        ("angles", "body"), ("rates", "body"), ("joints", "joint"), ("joint_rates", "joint"), ("branch", "joint")
-    )  # fmt: skip
+        ("angles", "body"),
+        ("rates", "body"),
+        ("joints", "joint"),
+        ("joint_rates", "joint"),
+        ("branch", "joint"),
+    )
     _named: dict[str, frozenset[str]] = PrivateAttr(default_factory=dict)
 
     def named(self, table: Literal["joints", "joint_rates"]) -> frozenset[str]:

@@ -48,9 +48,11 @@ class Unit:
 def model_description(unit: Unit, generator: str) -> bytes:
     """The file, in UTF-8; value references are 0, 1, … of states, derivatives, inputs, outputs."""
     abilities = {
-        "modelIdentifier": unit.identifier, "canNotUseMemoryManagementFunctions": "true",
-        "canGetAndSetFMUstate": "true", "providesDirectionalDerivative": "true",
-    }  # fmt: skip
+        "modelIdentifier": unit.identifier,
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    }
     model, f, u, is_sampled = unit.model, len(unit.states), len(unit.inputs), unit.model.step > 0.0
     stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
     kinds = {
@@ -87,9 +89,13 @@ def forward_description(unit: ForwardUnit, identifier: str, name: str, analysis:
     about = "motion from the initial state under piecewise constant inputs; gravity and friction act as in the scene"
     root = _root(name, unit.data.guid, about, generator)
     _add(
-        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
-        canNotUseMemoryManagementFunctions="true", canGetAndSetFMUstate="true",
-    )  # fmt: skip
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canHandleVariableCommunicationStepSize="true",
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true",
+    )
     experiment = {"startTime": "0", "stopTime": f"{analysis.last_time:g}", "stepSize": f"{analysis.output_step:g}"}
     unknowns: dict[int, list[int]] = {len(unit.inputs) + k: [] for k in range(1, len(unit.outputs) + 1)}
     groups = {"inputs": unit.inputs, "outputs": unit.outputs}

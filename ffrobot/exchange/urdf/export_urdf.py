@@ -91,8 +91,13 @@ def conversion_losses(
     yield from _of_keys(tree, size)
     if list(scene.gravity) != GRAVITY:
         yield f"gravity {list(scene.gravity)} left out: `ffrobot import` takes {GRAVITY}"
-    tables = {"[[trajectory]]": scene.trajectory, "[[load]]": scene.load, "[[pzt]]": scene.pzt,
-              "[initial]": scene.initial.model_fields_set, "[[analysis]]": scene.analysis}  # fmt: skip
+    tables = {
+        "[[trajectory]]": scene.trajectory,
+        "[[load]]": scene.load,
+        "[[pzt]]": scene.pzt,
+        "[initial]": scene.initial.model_fields_set,
+        "[[analysis]]": scene.analysis,
+    }
     if left := [name for name, entries in tables.items() if entries]:
         yield f"left out: {', '.join(left)}"
 

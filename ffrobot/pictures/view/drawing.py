@@ -31,9 +31,17 @@ AXIS = 0.003  # of the size of the robot: radius of axes
 ROUND = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # ends of color bars, times a power of ten
 SHOWN = {"deflection": ("deflection (mm)", 1e3), "von_mises": ("von Mises stress (MPa)", 1e-6)}
 BAR = {
-    "vertical": False, "height": 0.05, "width": 0.4, "position_x": 0.3, "position_y": 0.02, "fmt": "%.4g",
-    "color": "black", "title_font_size": 16, "label_font_size": 14, "n_labels": 5,
-}  # fmt: skip
+    "vertical": False,
+    "height": 0.05,
+    "width": 0.4,
+    "position_x": 0.3,
+    "position_y": 0.02,
+    "fmt": "%.4g",
+    "color": "black",
+    "title_font_size": 16,
+    "label_font_size": 14,
+    "n_labels": 5,
+}
 BAR_ROOM = 0.12  # of the height, at the bottom
 CORNER = (0.82, 0.0, 1.0, 0.18)  # of the picture, where the directions are: most robots stand on its left
 LINE, VERTEX = 3, 1  # VTK's numbers of cells
