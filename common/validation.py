@@ -35,10 +35,7 @@ class Record(BaseModel):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Return the message for a key of `others` records that this one does not have; empty without one.
-
-        Nothing where it is to be called an unknown key.
-        """
+        """Return the message for a key that only `others` have; empty to call it an unknown key."""
         return ""
 
     @classmethod

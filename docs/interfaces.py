@@ -28,12 +28,12 @@ FUNCTIONS = (
     "smooth_motion", "sensitivity", "optimise", "trade_off", "uncertainty", "write_study", "plot_results",
     "write_report", "view_file", "write_movie",
 )  # fmt: skip
-CLASSES = ("Results", "ModalBody", "Watcher")
+CLASSES = ("Results", "Scene", "ModalBody", "Watcher")
 RETURNED = (
     LinkOutcome, Verdict, AnalysisVerdict, LinearModel, Fit, ResponseFit, PoseComparison, Sensitivity, Optimum, Front,
     Uncertainty, Smoothed,
 )  # fmt: skip
-ERRORS = ("InputError", "SolveError", "FfrobotWarning")
+ERRORS = ("FfrobotError", "InputError", "SolveError", "FfrobotWarning")
 
 COMMANDS = """# Commands
 
@@ -92,14 +92,15 @@ def python_page() -> str:
     parts.append("## Returned objects\n")
     parts += map(_class, RETURNED)
     parts.append("## Errors\n")
-    parts += [f"### {name}\n\n{_markdown(getattr(ffrobot, name))}\n" for name in ERRORS]
+    parts += [_class(getattr(ffrobot, name)) for name in ERRORS]
     return "\n".join(parts)
 
 
 def members(one: type) -> dict[str, str]:
-    """Docstrings of public methods and properties by name, inherited ones too."""
+    """Docstrings of the program's public methods and properties by name, inherited ones too."""
     found = {}
-    for name in dir(one):
+    own = {name for base in one.__mro__ if base.__module__.startswith("ffrobot.") for name in vars(base)}
+    for name in sorted(own):
         value = inspect.getattr_static(one, name)
         is_method = inspect.isfunction(value) or isinstance(value, classmethod | staticmethod)
         if (name.startswith("_") and name != "__getitem__") or not (

@@ -68,7 +68,7 @@ class Datasets:
         self.close()
 
     def close(self) -> None:
-        """Close the HDF5 file; datasets can then no longer be read."""
+        """Close the HDF5 file; its datasets cannot be read afterwards."""
         self._file.close()
 
     def keys(self) -> list[str]:

@@ -121,11 +121,11 @@ class MechanismKeys(Record):
 
     @property
     def edges(self) -> list[Edge]:
-        """The joints for a spanning forest.
+        """Joints of the spanning forest, ranked by where loops are cut.
 
-        Loops are cut at spherical joints, then where nothing acts along the joint, first of all where [initial] has no
-        value, then where friction or loads do, then where there is a rotor or a trajectory. The tree needs the
-        coordinates of motors without rotors, and those that analyses read.
+        Loops are cut first at spherical joints, then at joints without forces (those without a value in [initial]
+        before the others), with friction or loads, and last with a rotor or a trajectory. Motors without rotors, and
+        joints whose coordinates analyses read, belong to the tree.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
