@@ -193,13 +193,13 @@ class PatchFeasibility:
 
     @property
     def factor(self) -> Array:
-        """Required over available torque, slew rate or current (k,); the patch suffices up to 1."""
+        """Ratio (k,) of required to available torque, slew rate or current; the patch suffices up to 1."""
         rates = np.maximum(self.slew / self.slew_limit, self.current / self.current_limit)
         return np.maximum(self.required_moment / self.available_moment, rates)
 
     @property
     def mode_factor(self) -> Array:
-        """Required over available modal force (n,); above 1 no voltages within limits reach it, even alone.
+        """Ratio (n,) of required to available modal force; above 1 no voltages within limits reach it, even alone.
 
         Infinite where no patch reaches the mode, 0 where nothing is required of it.
         """

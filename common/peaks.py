@@ -47,5 +47,5 @@ def shares(time: Array) -> Array:
 
 
 def root_mean_square(time: Array, values: Array) -> float:
-    """Return the root mean square over time of `values` (T,)."""
+    """Return the root mean square over time of `values` (T,), in their unit."""
     return float(np.sqrt(shares(time) @ values**2)) if len(values) else 0.0

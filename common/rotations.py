@@ -27,7 +27,7 @@ def skew(vectors: Array) -> Array:
 
 
 def exponential(vectors: Array) -> Array:
-    """Exp φ~ (…, 3, 3) of rotation vectors φ (…, 3)."""
+    """Return rotation matrices exp φ~ (…, 3, 3) of rotation vectors φ (…, 3), rad."""
     return np.eye(3) + _of_skew(vectors, 1, 2)
 
 

@@ -38,7 +38,7 @@ class Averages:
     density: Array  # (k,) mean density in kg/m³
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
-        """Translation and rotation (k, 3, n) of `modes` (3 (owned + ghosts), n); collective."""
+        """Return translation, m, and rotation, rad, (k, 3, n) of `modes` (3 (owned + ghosts), n); collective."""
         n = modes.shape[1]
         moments = model.total(self.weights @ modes.reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
         translation = moments[:, 0] / self.area[:, None, None]

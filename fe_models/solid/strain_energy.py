@@ -112,7 +112,7 @@ def strain_energy(model: SolidModel, modes: Array) -> Array:
 
 
 def internal_forces(model: SolidModel, fields: Array) -> Array:
-    """Return K u (3 owned, k) of displacements `fields` (3 (owned + ghosts), k), from strains; collective."""
+    """Return K u (3 owned, k), N, of displacements, m, `fields` (3 (owned + ghosts), k), from strains; collective."""
     k = fields.shape[1]
     nodes = node_map(model.V)
     total = np.zeros((fields.shape[0] // 3, 3 * k))

@@ -229,7 +229,7 @@ class Front(Finding):
 
     @property
     def values(self) -> Array:
-        """Values (N, 2) of both responses."""
+        """Values (N, 2) of both responses, SI units."""
         return np.array([(one.response, one.against) for one in self.points])
 
     @property

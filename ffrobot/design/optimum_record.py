@@ -161,7 +161,7 @@ class Optimum(Finding):
 
     @property
     def limits(self) -> Array:
-        """Values (m,) of the limited responses."""
+        """Values (m,) of the limited responses, SI units."""
         return np.array([reading.value for reading in self.best.readings[1:]])
 
     @property

@@ -134,7 +134,7 @@ def shape_nodes(analysis: Fcid) -> Array:
 
 
 def sampled(shape: Shape, times: Array) -> Array:
-    """p, ṗ and p̈ (3, T, n) of all bodies."""
+    """Return p, ṗ and p̈ (3, T, n), √kg·m and s, of all bodies."""
     functions = [function for of_body in shape for function in of_body]
     samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
     return np.ascontiguousarray(np.moveaxis(samples, 0, -1))

@@ -143,7 +143,7 @@ class Servo:
         return self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
-        """Modal forces r (N, n) that motors do not supply; NaN where no posture is found. Raises `Stopped`."""
+        """Modal forces r (N, n), N/√kg, that motors do not supply; NaN without a posture. Raises `Stopped`."""
         r, near = np.zeros_like(p), self.postures(times)
         for k in range(0, len(times), MOST_STATES):
             if not self.goes_on():

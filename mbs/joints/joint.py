@@ -183,11 +183,11 @@ class JointRecord(Record):
         return (second, first) if backwards else (first, second)
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""
+        """Return coordinates (…, k), rad or m, with the sides exchanged: of the first on the second."""
         return -coordinates
 
     def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
-        """Rate (…, k) of `turned_around(coordinates)` while the coordinates have this rate (…, k)."""
+        """Return the rate (…, k), rad/s or m/s, of `turned_around(coordinates)` for this rate (…, k)."""
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:

@@ -117,7 +117,7 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
-    """Generalized forces (T, n_v) by which friction in all joints resists."""
+    """Return friction (T, n_v), N·m or N, in all joints."""
     return _of_frictions(model.tree, v, Friction.resistance) + model.along_cut.resistance(q, v)
 
 

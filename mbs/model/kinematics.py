@@ -132,7 +132,7 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Φ over Φ_r (6, n) and the position (3,) of a section; six K (n, n) where it moves to second order."""
+    """Return Φ over Φ_r (6, n) and the position (3,), m, of a section; six K (n, n) if it moves to second order."""
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]

@@ -47,7 +47,7 @@ class States(Protocol):
 
     @property
     def v(self) -> Array:
-        """Velocities (T, n_v)."""
+        """Velocities (T, n_v), rad/s, m/s."""
 
     @property
     def a(self) -> Array:
@@ -92,7 +92,7 @@ class MotionForces:
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
-        """Return reaction wrenches of all joints about their outer sides, at q (T, n_q), without what does work.
+        """Return reactions, N and N·m, of all joints about their outer sides, at q (T, n_q); no forces that do work.
 
         What drives, loads and brakes joints along their coordinates does the rest.
         """

@@ -111,7 +111,7 @@ def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Arr
 
 
 class SplitForces(NamedTuple):
-    """τ (T, k) by joint, EᵀF_p (T, n_v) and multipliers λ_c (T, constraint equations of loops)."""
+    """τ (T, k), N·m or N, by joint, EᵀF_p (T, n_v) and multipliers λ_c (T, constraint equations of loops)."""
 
     moments: dict[str, Array]
     left: Array

@@ -243,7 +243,7 @@ class AlongCut:
         self._kinematics = Kinematics(tree.nodes, rows=[one.row for one in cut]) if cut else None
 
     def measured(self, q: Array) -> tuple[Array, Array]:
-        """γ (T, cut) at q (T, n_q), angles within ±π, and G (T, cut, n_v)."""
+        """γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v)."""
         if self._kinematics is None:
             return np.zeros((len(q), 0)), np.zeros((len(q), 0, self._n_v))
         return self._kinematics.constraints(q, np.zeros(len(q)))
@@ -258,7 +258,7 @@ class AlongCut:
         return force
 
     def damping(self, q: Array) -> Array:
-        """D (n_v, n_v) of viscous friction at q (n_q,)."""
+        """D (n_v, n_v), N·m·s/rad or N·s/m, of viscous friction at q (n_q,)."""
         D = np.zeros((self._n_v, self._n_v))
         gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:

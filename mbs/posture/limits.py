@@ -97,7 +97,7 @@ def _is_sampled(node: Node) -> bool:
 def limited_coordinates(
     model: Model, times: Array, q: Array, v: Array, *, every: bool
 ) -> Iterator[tuple[JointRecord, int, Array]]:
-    """Coordinates (T,) that the core does not watch, of joints with limits: in the tree, and where loops are cut.
+    """Yield coordinates (T,), rad or m, of joints with limits that the core does not watch, in the tree and at cuts.
 
     `every`: of the tree all.
     """

@@ -31,7 +31,7 @@ JOLT = 0.01  # of the largest deformation: where more begins to ring at once, mo
 
 
 class ModesInMotion(NamedTuple):
-    """Modal coordinates p and p̈ (T, n) of one flexible body."""
+    """Modal coordinates p, √kg·m, and p̈, √kg·m/s², (T, n) of one flexible body."""
 
     body: Body
     p: Array

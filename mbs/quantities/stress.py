@@ -107,7 +107,7 @@ class Recovery:
 
 
 def mode_displacement(p: Array) -> Recovery:
-    """Return the recovery from modal coordinates p (T, n) of the file alone."""
+    """Return the recovery from modal coordinates p (T, n), √kg·m, of the file alone."""
     return Recovery(METHODS[0], p, (), np.zeros((len(p), 0)))
 
 

@@ -71,14 +71,14 @@ class ShapeIntegrals:
 
     @property
     def I_bar(self) -> Array:
-        """Return (3, 3, n) ∫ρ x_k Φ_l dV at [k, l], from the symmetric part in J_l and the other part in C_r0."""
+        """Return (3, 3, n) ∫ρ x_k Φ_l dV, √kg·m, at [k, l], from the symmetric part in J_l and the rest in C_r0."""
         trace = np.einsum("aan->n", self.inertia_slope) / 4
         symmetric = trace * np.eye(3)[:, :, None] - self.inertia_slope / 2
         return symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
 
     @property
     def gyroscopic(self) -> Array:
-        """G_r (3, 3, n)."""
+        """G_r (3, 3, n), √kg·m."""
         I_bar = self.I_bar
         return np.asarray(2 * (np.einsum("ccn,ab->abn", I_bar, np.eye(3)) - I_bar.transpose(1, 0, 2)))
 
@@ -89,7 +89,7 @@ class ShapeIntegrals:
 
     @property
     def translational_mass(self) -> Array:
-        """Modal masses (n, n) ∫ρ Φᵀ Φ dV of translation: M_e without the rotation of sections."""
+        """Modal masses (n, n), relative, ∫ρ Φᵀ Φ dV of translation: M_e without the rotation of sections."""
         return np.asarray(-0.5 * self.centrifugal_slope[:3].sum(axis=0))
 
     @property
