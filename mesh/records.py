@@ -85,10 +85,10 @@ class BeamGeometry(Record):
 
 
 class BeamMesh(Record):
-    """Element boundaries: `elements` of them as equal as the steps of the section allow, or the list of `nodes`."""
+    """Element boundaries: `elements`, of equal length between steps of the section, or the list of `nodes`."""
 
     elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] | None = None
-    """Number of elements, as equal as the steps of the section allow; or give `nodes`."""
+    """Number of elements, of equal length between steps of the section; alternative to `nodes`."""
     nodes: Annotated[tuple[float, ...], Field(min_length=2)] | None = None
     """Element boundaries, m from the root: 0 first, `length` last."""
 

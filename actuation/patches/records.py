@@ -111,7 +111,7 @@ class PztLayout(Record):
     electrodes: Literal["driven", "open", "shorted"] = "driven"
     """Electrodes of the patches: driven by voltages, not connected, or connected with each other."""
     shunt: Positive | None = None
-    """Resistor across the electrodes of each patch, Ω, in the place of a voltage."""
+    """Resistor across the electrodes of each patch, Ω, instead of a voltage."""
     electrode_spacing: Annotated[Positive | None, IN_SPACE] = None
     """Spacing of interdigitated electrodes, m; the field per volt is its inverse; default: thickness of a layer."""
 

@@ -25,8 +25,8 @@ class MovingJoint(JointRecord):
     motor: bool | None = None
     """Presence of motors; by default in open chains only, and not in spherical and free joints."""
     position_limit: Annotated[Range | tuple[Range, ...] | None, Spelled(Range, as_written)] = None
-    """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts; a warning says when and how far it is
-    exceeded."""
+    """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts beyond it; a warning has
+    time and size of the excess."""
     moment_limit: Limit | None = None
     """Largest torque, N·m (sliding: force, N), at the joint: after the gear."""
     speed_limit: Limit | None = None

@@ -295,7 +295,7 @@ def message_of(mistake):
 
 def main():
     head = (
-        "# What the program says to common mistakes\n\n"
+        "# Messages for common mistakes\n\n"
         "Each is one change in the files of `cases/two_link`; the tests make it and compare the message.\n\n"
         "| mistake | message |\n|---|---|\n"
     )
