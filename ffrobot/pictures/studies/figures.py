@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import Locator, LogLocator, MaxNLocator
 
 from ...common.arrays import Array, as_floats
 from ..figures.plot import image_of, write_figure
@@ -47,6 +47,7 @@ def draw(diagram: Diagram) -> Figure:
 
 
 MOST = 15  # the largest
+TICKS = 7  # intervals of an axis at most
 WIDTH, BAR, REST = 5.0, 0.22, 0.8  # inches: of the figure, of a bar, of title and axis
 ROOM = 0.2  # of the axis, beside the longest bars: for their numbers
 
@@ -182,7 +183,8 @@ def _line(axes: Axes, places: Array, look: Look, opacity: float) -> None:
 def _axis(axes: Axes, k: int, axis: DesignAxis) -> None:
     """A vertical line with ticks at its left and its name above; a limit as a mark to the side that is forbidden."""
     axes.plot([k, k], [0.0, 1.0], color="black", linewidth=0.8, clip_on=False)
-    for place, text in axis.ticks:
+    for value, text in _ticks(axis):
+        place = float(axis.place(np.array(value)))
         axes.plot([k - 0.02, k], [place, place], color="black", linewidth=0.6, clip_on=False)
         box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0.0, "pad": 0.5}
         axes.text(k - 0.035, place, text, ha="right", va="center", fontsize=6, bbox=box)
@@ -191,6 +193,23 @@ def _axis(axes: Axes, k: int, axis: DesignAxis) -> None:
         place = float(axis.place(np.array(axis.limit)))
         axes.plot([k, k + 0.1], [place, place], color="black", linewidth=1.6)
         axes.plot(k + 0.1, place, **_beyond(axis.sense))
+
+
+def _ticks(axis: DesignAxis) -> list[tuple[float, str]]:
+    """Round numbers within the axis, or the rows of a catalog, and their texts."""
+    if axis.names:
+        return [(float(k), name) for k, name in enumerate(axis.names)]
+    locators: list[Locator] = [MaxNLocator(TICKS, steps=[1, 2, 5, 10])]
+    if axis.logarithmic:
+        is_long = axis.high > 1e3 * axis.low
+        locators.insert(0, LogLocator(subs=[1.0] if is_long else [1.0, 2.0, 5.0]))
+    room = 1e-9 * (axis.high - axis.low)
+    inside = (
+        [x for x in locator.tick_values(axis.low, axis.high) if axis.low - room <= x <= axis.high + room]
+        for locator in locators
+    )
+    values = next((values for values in inside if len(values) > 1), [])
+    return [(float(x), f"{x:.6g}") for x in values]
 
 
 def _beyond(sense: int) -> dict[str, Any]:

@@ -43,7 +43,6 @@ State = Literal["best", "kept", "exceeded", "failed"]
 
 ROOM = 0.05  # of an axis, beyond the least and the largest value
 DECADES = 2.0  # responses, all of one sign, that span more are drawn by their logarithms
-TICKS = 5  # about so many
 
 
 class Drawing(Record):
@@ -97,15 +96,6 @@ class DesignAxis(Record):
     def places(self) -> Array:
         """Positions (n,) of all designs on the axis; NaN for failed ones."""
         return self.place(floats(self.values))
-
-    @property
-    def ticks(self) -> list[tuple[float, str]]:
-        """Places of round numbers within the axis, or of the rows of a catalog, and their texts."""
-        if self.names:
-            return [(float(self.place(np.array(float(k)))), name) for k, name in enumerate(self.names)]
-        values = _round_logarithms(self.low, self.high) if self.logarithmic else np.array([])
-        values = values if values.size > 1 else _round_numbers(self.low, self.high)
-        return [(float(self.place(value)), f"{value:.6g}") for value in values]
 
 
 def floats(values: Numbers) -> Array:
@@ -182,23 +172,6 @@ def wrapped(label: str, letters: int) -> list[str]:
     whole = re.sub(r"\([^()]*\)$", lambda unit: unit[0].replace(" ", "\u00a0"), label)
     lines = textwrap.wrap(whole.replace(".", ".\u200b "), letters, break_long_words=False, break_on_hyphens=False)
     return [line.replace("\u200b ", "").replace("\u200b", "").replace("\u00a0", " ") for line in lines]
-
-
-def _round_numbers(low: float, high: float) -> Array:
-    """Multiples of 1, 2 or 5 times a power of ten."""
-    rough = (high - low) / TICKS
-    power = 10.0 ** np.floor(np.log10(rough))
-    step = power * min((1.0, 2.0, 5.0, 10.0), key=lambda round_one: abs(np.log(round_one * power / rough)))
-    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-    return as_floats(step * np.arange(first, last + 1.0) + 0.0)  # no negative zero
-
-
-def _round_logarithms(low: float, high: float) -> Array:
-    """1, 2 and 5 times powers of ten; powers alone where these are enough."""
-    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
-    several = (powers[:, None] * np.array([1.0, 2.0, 5.0])).ravel()
-    inside = [values[(values >= low * (1 - 1e-9)) & (values <= high * (1 + 1e-9))] for values in (powers, several)]
-    return as_floats(inside[0] if len(inside[0]) >= TICKS - 1 else inside[1])
 
 
 StudyName = Literal["sensitivity", "optimum", "front", "uncertainty"]
