@@ -1,6 +1,7 @@
 """Run time against error of a scene, measured: `ffrobot bench`.
 
-precision    solves within a budget of time, a reference, every integrator at every tolerance; error of mesh and modes
+precision    solves within a budget of time, a reference, every integrator at every tolerance
+axes         errors of mesh, number of modes and time integration
 campaign     what runs in which order, what is written and printed
 """
 

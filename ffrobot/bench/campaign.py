@@ -26,6 +26,7 @@ from ..present.lines import print_table
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
+from .axes import measure_axes
 from .precision import (
     INTEGRATORS,
     KINDS,
@@ -35,7 +36,6 @@ from .precision import (
     Row,
     find_analysis,
     find_reference,
-    measure_axes,
     measure_points,
 )
 
