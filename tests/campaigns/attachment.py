@@ -13,6 +13,8 @@ estimates it to be, without knowing the reference. Arms that bend by more than
 from __future__ import annotations
 
 import time
+from dataclasses import replace
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -21,11 +23,12 @@ from record import options, record
 
 import ffrobot
 from ffrobot.common.arrays import Array
-from ffrobot.run.modal_error import modal_errors
+from ffrobot.mbs.model.truncation import loaded_points, with_fewer_modes
 from ffrobot.run.mode_choice import reported_modes
-from ffrobot.run.mode_search import difference
+from ffrobot.run.mode_search import Errors, difference
+from ffrobot.run.prepare import with_bodies
 from ffrobot.run.solution import Solution
-from ffrobot.run.solve import solve_scene
+from ffrobot.run.solve import run_analyses, solve_scene
 from ffrobot.run.watcher import Watcher
 
 AIM = 2e-3  # of each quantity's peak
@@ -34,6 +37,29 @@ INTEGRATED = 2e-6  # below it errors are those of time integration
 LARGEST = 0.05  # deflection over length
 SMOOTH = "(10*(t/{T})**3-15*(t/{T})**4+6*(t/{T})**5)"
 MATERIALS = {"steel": (2.1e11, 7850.0), "aluminium": (7e10, 2700.0)}
+
+
+PART = 2 / 3  # of the eigenmodes of each link in the solve that is compared with
+
+
+def modal_errors(solution: Solution) -> Errors | None:
+    """Differences to a solve with two thirds of the eigenmodes, by kind; None without attachment modes."""
+    bodies = {name: body.spatial for name, body in solution.bodies.items() if body.spatial.n_modes}
+    whole = {name: body for name, body in bodies.items() if body.attachment_modes and body.reduction is None}
+    if not bodies or whole.keys() != bodies.keys() or any(body.n_eigenmodes < 2 for body in whole.values()):
+        return None
+    scene = solution.scene
+    fewer = {
+        name: with_fewer_modes(body, ceil(PART * body.n_eigenmodes), loaded_points(scene, name))
+        for name, body in whole.items()
+    }
+    unsolved = replace(with_bodies(solution, fewer), failure=None, earlier={})
+    coarse = run_analyses(unsolved, Watcher())
+    return {
+        name: difference(reported_modes(result), reported_modes(coarse.analyses[name]))
+        for name, result in solution.analyses.items()
+        if name in coarse.analyses and result.status == coarse.analyses[name].status == "completed"
+    }
 
 
 def random_arm(rng: np.random.Generator) -> dict[str, Any]:
