@@ -20,8 +20,8 @@ class PrismaticJoint(GearedJoint):
     In planar scenes the second side keeps the angle of the initial guess.
 
     Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a mass J
-    N² along it; the turning of the rotor by the first side is omitted. Between the gear of a motor and the second body a
-    spring `stiffness` (N/m; default: rigid) and a damper `damping` (N·s/m).
+    N² along it; the turning of the rotor by the first side is omitted. Between the gear of a motor and the second body
+    a spring `stiffness` (N/m; default: rigid) and a damper `damping` (N·s/m).
     """
 
     type: Literal["prismatic"]

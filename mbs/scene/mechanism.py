@@ -157,7 +157,7 @@ class MechanismKeys(Record):
 
     @property
     def motor_joints(self) -> tuple[AnyJoint, ...]:
-        """Joints with motors: by default all that move in an open chain, and none in a closed loop."""
+        """Joints with motors: by default all that move in open chains, and none in kinematic loops."""
         default = self.topology.is_open_chain
         return tuple(joint for joint in self.joint if joint.has_motor(default))
 
