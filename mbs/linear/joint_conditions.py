@@ -161,7 +161,8 @@ def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> Complex
 def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
     N, K, D = free = free_coordinates(mechanism, condition)
     modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
-    compliance = {point: _compliance(K, _moved(mechanism.of_tool(point), N)) for point in mechanism.points}
+    largest = np.sqrt(np.diag(np.linalg.inv(mechanism.M)))
+    compliance = {point: _compliance(K, _moved(mechanism.of_tool(point), N, largest)) for point in mechanism.points}
     return JointCondition(modes, compliance, free)
 
 
@@ -179,10 +180,13 @@ def free_directions(R: Array) -> Array:
     return null_space(R / np.where(sizes > 0.0, sizes, 1.0), DEPENDENT)
 
 
-def _moved(J: Array, N: Array) -> Array:
-    """J N, (k, m); 0 where its terms cancel or N is zero but for round-off, as before the joints that are free."""
-    moved, zero = J @ N, 64.0 * np.finfo(float).eps * np.abs(N).max(axis=0, initial=0.0)
-    round_off = np.maximum(RIGID**2 * (np.abs(J) @ np.abs(N)), np.abs(J).sum(axis=1, keepdims=True) * zero)
+def _moved(J: Array, N: Array, largest: Array) -> Array:
+    """J N, (k, m); 0 where its terms cancel or N is zero but for round-off, as before the joints that are free.
+
+    `largest` (f,) is what any N of unit kinetic amplitude may have along each coordinate.
+    """
+    moved, zero = J @ N, 64.0 * np.finfo(float).eps * (np.abs(J) @ largest)
+    round_off = np.maximum(RIGID**2 * (np.abs(J) @ np.abs(N)), zero[:, None])
     return np.where(np.abs(moved) > round_off, moved, 0.0)
 
 
