@@ -28,7 +28,7 @@ def load_once() -> None:
         import_module(module)
 
 
-def run(arguments: list[str], folder: Path, patience: float = PATIENCE) -> tuple[int, str]:
+def run(arguments: list[str], folder: Path, cpu_time: int = CPU_TIME) -> tuple[int, str]:
     """`ffrobot ARGUMENTS` in a forked process: exit code, negative for a signal, and what it wrote to stderr."""
     told = folder / "stderr.txt"
     child = os.fork()
@@ -39,7 +39,7 @@ def run(arguments: list[str], folder: Path, patience: float = PATIENCE) -> tuple
             os.setsid()
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            resource.setrlimit(resource.RLIMIT_CPU, (CPU_TIME, CPU_TIME))
+            resource.setrlimit(resource.RLIMIT_CPU, (cpu_time, cpu_time))
             os.dup2(os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             sys.argv = ["ffrobot", *arguments]
@@ -56,7 +56,7 @@ def run(arguments: list[str], folder: Path, patience: float = PATIENCE) -> tuple
         finally:
             os._exit(code)
     began = time.monotonic()
-    while time.monotonic() - began < patience:
+    while time.monotonic() - began < PATIENCE:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
             text = told.read_text(encoding="utf-8", errors="replace") if told.exists() else ""

@@ -120,8 +120,8 @@ class Campaign:
         began = time.monotonic()
         code, told = run(["solve", "scene.toml", "-o", "r.h5"], folder, 600)
         seconds = time.monotonic() - began
-        (folder / "r.h5").rename(folder / "scene.results.h5")
         print(f"{folder.name}: {seconds:.2f} s, exit code {code} {told.strip()[:200]}", flush=True)
+        (folder / "r.h5").rename(folder / "scene.results.h5")
         return Case(folder.name, folder, files, seconds)
 
     def one(self, number: int) -> None:
