@@ -198,6 +198,8 @@ post_actuation | s | after the path
 unmet | | of the equations, between nodes
 without_patches | m, rad | off the path by torques alone
 is_needed | | whether that is more than the tolerance
+path_tolerance | m | by which coordinates of points may be off the path
+tolerance_price | V/m | by how much less the least voltage is per path_tolerance
 [ tracking/]
 voltage_price/* | 1/V | by how much less the objective is per volt of limit
 slew_price/* | s/V | by how much less the objective is per unit of limit

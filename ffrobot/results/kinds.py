@@ -58,12 +58,16 @@ def _least_voltage(group: h5py.Group) -> str:
     is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
     is_one &= not any("range" in one.attrs for one in group["pzt"].values())
     size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
+    if np.isfinite(price := about.get("tolerance_price", np.nan)):
+        less = f" with path_tolerance, {1e-3 * price:.3g} V less per mm of it"
+        size += less if about["least_voltage"] else ": torques alone stay within path_tolerance"
     return f"; least voltage {size}{alone}"
 
 
 def _needless_patches(about: About, is_judged: bool) -> Iterator[str]:
     if is_judged and not about.get("is_needed", True):
-        yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
+        of = "path_tolerance" if about.get("path_tolerance") else "the tolerance, relative to its length"
+        yield f"patches are not needed: torques alone stay on the path within {of}"
 
 
 def _first_gains(about: About, is_judged: bool) -> Iterator[str]:

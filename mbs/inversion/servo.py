@@ -96,16 +96,11 @@ class Servo:
 
     def slowed(self, factor: float) -> Servo:
         """Return the path in `factor` times the time, by quintic Hermite pieces."""
-        from scipy.interpolate import BPoly, PPoly
-
         times = self.end * np.linspace(0.0, 1.0, PIECES + 1)
         inside = times.clip(TINY * self.end, (1.0 - TINY) * self.end)  # outside it rests
 
         def slower(function: TimeFunction) -> TimeFunction:
-            values = function.sample(inside).T / factor ** np.arange(3.0)
-            curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(factor * times, values))
-            slow = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
-            return slow.held(0.0, factor * self.end)
+            return through(factor * times, function.sample(inside) / factor ** np.arange(3.0)[:, None])
 
         rows = tuple(_with_functions(row, slower) for row in self.model.rows)
         model = replace(self.model, rows=rows)
@@ -215,6 +210,15 @@ def make_servo(
             )
         near[k] = q
     return replace(servo, near=near)
+
+
+def through(times: Array, values: Array) -> TimeFunction:
+    """Quintic Hermite pieces through values, rates and accelerations (3, T) at `times` (T,), s; outside at rest."""
+    from scipy.interpolate import BPoly, PPoly
+
+    curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(times, values.T))
+    pieces = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
+    return pieces.held(float(times[0]), float(times[-1]))
 
 
 def _with_functions(row: ConstraintRow, change: Callable[[TimeFunction], TimeFunction]) -> ConstraintRow:

@@ -17,7 +17,8 @@ from ..inversion.stable_inversion import invert
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from ..run.context import Context
 from .intervals import OUT_OF_REACH, settled, start_breaks
-from .transition import Transition
+from .path_error import Tolerance, rows_of_points, slopes_by_error
+from .transition import Tracked, Transition
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6
@@ -28,11 +29,15 @@ INVERTED = 1e-6  # tolerance of stable inversion
 
 @struct
 class Bounds:
-    """Voltages (k,) V that zeros (k,) 1/s need at least, the largest first, at the `times` (k,) s when they count."""
+    """Voltages (k,) V that zeros (k,) 1/s need at least, the largest first, at the `times` (k,) s when they count.
+
+    `relief` (k,) V/m: by how much less for a larger path tolerance; zero where no point has a path.
+    """
 
     zeros: ComplexArray
     times: Array
     voltages: Array
+    relief: Array
 
 
 def bounds_of_zeros(
@@ -42,7 +47,8 @@ def bounds_of_zeros(
 
     Rest at the start requires ∫ e^{−st} ℓᵀB V dt = −ζ of each zero in the right half plane, with its left eigenvector ℓ
     and ζ = ℓᵀ(y − y_rest) of stable inversion there: |V| ≥ |ζ| Re s / Σ|ℓᵀB|; likewise the others at the end.
-    Vibrations (`LIGHT`) are left out. Raises `SolveError` where motors alone have no bounded motion.
+    A path error e takes off up to |ℓᵀM⁻¹(∂r/∂e + s ∂r/∂ė + s² ∂r/∂ë)| e_max. Vibrations (`LIGHT`) are left out.
+    Raises `SolveError` where motors alone have no bounded motion.
     """
     end = float(linear.times[-1])
     pre, post = decay_times(linear, end, needs_future=True)
@@ -50,22 +56,28 @@ def bounds_of_zeros(
     inverted = invert(servo, linear, pre, post, INVERTED, lambda _: True)
     if inverted.status != "completed":
         raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {inverted.status}")
-    zeros, times, shares = [], [], []
+    zeros, times, shares, reliefs = [], [], [], []
     for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
         still = np.zeros((1, len(rest)))
         dynamics = linear_dynamics(servo, np.array([t]), rest[None], still, still)
         s, left = np.linalg.eig(first_order(dynamics, 0, servo.scale).T)
         y = np.concatenate([servo.scale * (inverted.curve(t) - rest), inverted.curve(t, 1)])
         B = np.linalg.solve(dynamics.M[0], asked.Phi_V) * unit
+        off = np.zeros((3, 1, len(rows_of_points(servo))))
+        slopes = slopes_by_error(servo, np.array([t]), (rest[None], still, still), off)[:, 0, : len(rest)]
+        by_error = np.linalg.solve(dynamics.M[0], slopes)
         counts = (sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)
         for k in np.flatnonzero(counts):
             reach = float(np.abs(left[len(rest) :, k] @ B).sum())
             zeros.append(s[k])
             times.append(t)
-            shares.append(abs(left[:, k] @ y) * abs(s[k].real) / reach if reach else np.inf)
-    voltages = np.array(shares) * float(unit.max())
+            relieved = np.abs(left[len(rest) :, k] @ np.tensordot(s[k] ** np.arange(3), by_error, 1)).sum()
+            required = max(0.0, float(abs(left[:, k] @ y) * abs(s[k].real) - asked.allowed * relieved))
+            shares.append(required / reach if reach else np.inf)
+            reliefs.append(relieved / reach if reach else 0.0)
+    voltages, relief = np.array(shares) * float(unit.max()), np.array(reliefs) * float(unit.max())
     order = np.argsort(-voltages)
-    return Bounds(np.array(zeros, dtype=complex)[order], np.array(times)[order], voltages[order])
+    return Bounds(np.array(zeros, dtype=complex)[order], np.array(times)[order], voltages[order], relief[order])
 
 
 def enough_time(servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float) -> float:
@@ -102,20 +114,44 @@ def enough_path_time(
     return float(servo.end * np.exp(_enough(share_with, share, min(orders, default=4.0))))
 
 
-def check_within_reach(servo: Servo, linear: Linearisation, bounds: Bounds | None, share: float) -> None:
+def enough_tolerance(
+    servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float, relief: float
+) -> float:
+    """The path tolerance (m) that voltages within limits need; NaN if not found.
+
+    The least voltage falls about linearly with it, by less than `relief` (shares per m).
+    """
+    if asked.gears is not None or not relief:
+        return np.nan
+    breaks = start_breaks(-around[0], servo.end, servo.end + around[1], intervals // 2)
+    given = asked.tolerance or Tolerance(0.0)
+
+    def share_with(more: float) -> float:
+        wider = replace(given, error=given.error + more)
+        return float(np.exp(_share(servo, replace(asked, tolerance=wider), breaks) - 1.0))
+
+    return given.error + _enough(share_with, float(np.exp(share - 1.0)), relief)
+
+
+def check_within_reach(asked: Transition, linear: Linearisation, bounds: Bounds | None, share: float) -> None:
     """Raise `SolveError` where a lower bound of the least voltage exceeds the limits by the factor `share`.
 
     What would do follows from how the bound of the zero falls: as e^{−s t}, and as T^−m.
     """
     if share <= OUT_OF_REACH:
         return
-    zeros = linear.zeros[[0, -1]]
+    servo = asked.driven
+    zeros, limit = linear.zeros[[0, -1]], asked.units.max()
     rate, found = slowest(zeros), f"at least {share:.3g} times the limits"
     if bounds is not None and len(bounds.voltages):
         rate = abs(float(bounds.zeros[0].real))
         found += f"; the zero at {bounds.zeros[0].real:.4g} 1/s alone requires {bounds.voltages[0]:.4g} V"
     order = min((order for order in path_orders(servo.functions, servo.end) if order > 1), default=4.0)
     would = [f"{1e3 * np.log(share) / rate:.3g} ms more of pre_actuation and post_actuation"] if rate else []
+    if bounds is not None and bounds.relief.any() and asked.gears is None:
+        of_zeros = bounds.relief > 0.0
+        error = float(((bounds.voltages - limit) / bounds.relief)[of_zeros].max()) + asked.allowed
+        would.append(f"a path_tolerance of more than {1e3 * error:.3g} mm")
     would += [
         f"the same path in {servo.end * share ** (1 / order):.3g} s instead of {servo.end:g} s",
         f"patches that bend the links {share:.3g} times as much per volt",
@@ -124,6 +160,14 @@ def check_within_reach(servo: Servo, linear: Linearisation, bounds: Bounds | Non
         f"{servo.where}: patches cannot carry the robot: they would need {found}. Any of these comes near:"
         f" {'; '.join(would)}"
     )
+
+
+def price_of_tolerance(asked: Transition, least: Tracked) -> float:
+    """V/m, by how much less the least voltage is for a larger path tolerance; NaN without one."""
+    if asked.tolerance is None:
+        return float("nan")
+    prices = least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2
+    return float(prices * asked.units.max())
 
 
 def slowest(zeros: ComplexArray) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ..inversion.stable_inversion import PROBES, cut, halved
-from .problem import TOLERANCE, track
+from .problem import NO_SHARE, track
+from .steps import TOLERANCE
 from .transition import Tracked, Transition
 
 GRADING = 2.5  # of breaks to both ends: tanh
@@ -56,7 +57,7 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
     breaks = tracked.voltage.x
     times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
     motion = [tracked.curve(times, k) for k in range(3)]
-    r, tau = asked.driven.forces(times, *motion)
+    r, tau = asked.driven_at(times, tracked.error).forces(times, *motion)
     r = r - tracked.voltage(times) @ asked.Phi_V.T
     unmet = np.abs(r).max(axis=1) / float(np.abs(asked.driven.scale**2 * motion[0]).max())
     beyond = (np.abs(tau[:, : len(asked.limits.torque)]) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
@@ -95,6 +96,7 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
             finer = track(asked, breaks, None, calm)
         if not finer.converged:
             break
-        change = abs(finer.share / tracked.share - 1.0)
-        tracked = replace(finer, doubt=2 * change + finer.added / finer.share)
+        least = max(finer.share, NO_SHARE)
+        change = abs(finer.share - tracked.share) / least
+        tracked = replace(finer, doubt=2 * change + finer.added / least)
     return tracked, change <= SETTLED

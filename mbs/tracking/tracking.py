@@ -2,7 +2,7 @@
 
 The problem, its discretization and its solver are in `mbs.tracking.problem`. First comes the least voltage with which
 patches can do it; where that is within their limits, the motion of least effort follows. What each zero asks for, and
-what would do beyond limits, is in `tracking_advice`; a simulation under torques alone shows whether patches are needed.
+what would do beyond limits, is in `advice`; a simulation under torques alone shows whether patches are needed.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
@@ -40,7 +40,9 @@ from .advice import (
     check_within_reach,
     enough_path_time,
     enough_time,
+    enough_tolerance,
     far_patches,
+    price_of_tolerance,
     rough_ends,
     singular_times,
     slowest,
@@ -48,6 +50,7 @@ from .advice import (
 from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
 from .intervals import SETTLED, refined, settled, start_breaks
+from .path_error import Tolerance, displaced_along, rows_of_points
 from .problem import track
 from .transition import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights
 
@@ -56,7 +59,9 @@ SNAP = 4.5  # power of time with which a path begins whose fourth derivative is 
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
 RESERVE = 1e-9  # of the limits of voltages
+NONE = 1e-4  # of the limits: voltages that motors alone do without
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
+ALLOWED = 1.01  # of the path tolerance: what a replay may use of it
 REPLAYED = 1e-5  # tolerance of torques alone, at most
 
 Around = NotNegative | Literal["auto"]
@@ -90,6 +95,10 @@ class Tracking(TimedAnalysis):
     """Duration of actuation before the path begins, s; "auto" takes it from the zero dynamics."""
     post_actuation: Around = 0.0
     """Duration of actuation after the path, s; "auto" takes it from the zero dynamics."""
+    path_tolerance: Positive | None = None
+    """Largest error of each coordinate of a point on its path, m; by default the path is followed exactly."""
+    tolerance_time: Positive | None = None
+    """Time T_e, s, that limits the error's acceleration to path_tolerance/T_e². Default: 5 ms."""
     weights: EffortWeights = EffortWeights.model_construct()
     """Sizes that count alike in the effort."""
     intervals: Annotated[int, Field(ge=8, le=2000)] = 64
@@ -109,15 +118,11 @@ class Tracking(TimedAnalysis):
         before, after = (0.0 if value == "auto" else value for value in (self.pre_actuation, self.post_actuation))
         return output_times(self.end, self.output_step, before, after)
 
-    @classmethod
-    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Return the message for a key of other kinds, with the plan for path errors."""
-        if key == "path_tolerance":
-            return (
-                'expected no "path_tolerance": this kind follows its path exactly; torques without voltages plan a path'
-                ' error with kind = "motors-only" and `redefined`'
-            )
-        return super().refuse_key(key, others)
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.tolerance_time is not None and self.path_tolerance is None:
+            raise ValueError('expected the key "tolerance_time" only with path_tolerance, found it alone')
+        return self
 
     def needs(self) -> Iterator[Need]:
         """The trajectories and patches that the analysis requires."""
@@ -183,6 +188,8 @@ class TrackedPath(AroundPath):
     unmet: float  # see `Tracked`
     bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
     prices: Mapping[str, Mapping[str, Array]]  # `Tracked.prices` by kind, then by body, of torques by joint
+    path_tolerance: float  # m, by which coordinates of points may be off their path
+    tolerance_price: float  # V/m, by how much less the least voltage is for a larger path tolerance; NaN without one
     # m or rad, how far off the path the same torques alone are at most; NaN where not found
     without_patches: float = float("nan")
     is_needed: bool = True  # whether that is more than the tolerance times the path's way
@@ -235,12 +242,31 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     first, last = -around[0], end + around[1]
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
     rate, weights = slowest(linear.zeros[[0, -1]]), _weights(servo, analysis, limits)
-    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage", is_free, rate, gears)
+    allowed = _tolerance(servo, analysis)
+    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage", is_free, rate, gears, allowed)
     meshes = (
         with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
         for k in (1, 2)
     )
     return _Posed(servo, linear, around, asked, *meshes)
+
+
+def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
+    """How far points may be off their paths. Raises `InputError` where that makes no sense."""
+    if (error := analysis.path_tolerance) is None:
+        return None
+    if isinstance(servo, GearedServo):
+        raise InputError(
+            f'{servo.where}: expected either rigid gears or no "path_tolerance", found compliant gears with one: their'
+            " motors would need torques that jump with its acceleration"
+        )
+    times = as_floats(np.linspace(0.0, servo.end, len(servo.near_times)))
+    rows = [servo.model.rows[k] for k in rows_of_points(servo)]
+    way = max((float(np.ptp(row.target.sample(times)[0])) for row in rows if row.target), default=0.0)
+    if error >= way:
+        found = f"{error:g} m for a path of {way:.3g} m" if rows else "trajectories of joints or angles only"
+        raise InputError(f"{servo.where}: path_tolerance: expected a point whose path is longer, found {found}")
+    return Tolerance(error) if analysis.tolerance_time is None else Tolerance(error, analysis.tolerance_time)
 
 
 def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
@@ -289,13 +315,13 @@ def _check_reach(posed: _Posed, least: Tracked | None) -> None:
     shares = [] if posed.bounds is None else (posed.bounds.voltages / posed.asked.units.max()).tolist()
     shares += [] if least is None else [least.surely]
     if posed.asked.is_limited:
-        check_within_reach(posed.servo, posed.linear, posed.bounds, max(shares, default=0.0))
+        check_within_reach(posed.asked, posed.linear, posed.bounds, max(shares, default=0.0))
 
 
 def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
     """The motion of least effort or what else is wanted; of the least voltage where limits do not allow that."""
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
-    if _is_beyond(posed, least):
+    if _is_beyond(posed, least) or (posed.asked.tolerance is not None and least.share < NONE):
         objective = "least-voltage"
     limits = posed.asked.limits  # torques reach beyond them between Gauss points, voltages by rounding
     within = replace(limits.patches, range=limits.patches.range * (1.0 - RESERVE))
@@ -326,8 +352,11 @@ def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracke
         if np.isfinite(more := enough_time(*given)):
             would.append(f"{1e3 * more:.3g} ms more of pre_actuation and post_actuation")
         if np.isfinite(longer := enough_path_time(*given)):
-            would.append(f"the same path in {longer:.3g} s instead of {analysis.end:g} s")
-        yield f"patches cannot do it within their limits. Any of these would do: {'; '.join(would)}; or more patches"
+            would.append(f"the same path in {longer:.3g} s")
+        relief = 0.0 if posed.bounds is None else float(posed.bounds.relief.max(initial=0.0)) / limits.max()
+        if np.isfinite(wider := enough_tolerance(*given, relief)):
+            would.append(f"{1e3 * wider:.3g} mm of path_tolerance")
+        yield f"patches cannot do it within their limits. Any of these would do: {'; '.join(would)}"
     if least.doubt > 3 * SETTLED:
         yield (
             f"the least voltage, {least.share * posed.asked.units.max():.3g} V, did not settle on finer meshes: it may"
@@ -360,7 +389,8 @@ def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> Trac
     off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, of_links).values())
     inside = run.time[(run.time >= 0.0) & (run.time <= analysis.end)]
     way = max(float(np.ptp(target.sample(inside)[0])) for row in around.held.rows if (target := row.target))
-    return replace(around, without_patches=off, is_needed=off > analysis.tolerance * way)
+    permitted = max(analysis.tolerance * way, ALLOWED * around.path_tolerance)
+    return replace(around, without_patches=off, is_needed=off > permitted)
 
 
 def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
@@ -378,6 +408,8 @@ def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
 
 def _around(context: Context, posed: _Posed, tracked: Tracked, least: Tracked, objective: Objective) -> TrackedPath:
     """The actuation of a path by the motion `tracked`."""
+    if posed.asked.tolerance is not None and least.share < NONE:
+        least = replace(least, share=0.0)
     most = float(posed.asked.units.max())
     return TrackedPath(
         pre_actuation=posed.around[0],
@@ -390,6 +422,8 @@ def _around(context: Context, posed: _Posed, tracked: Tracked, least: Tracked, o
         held=posed.servo.model,
         unmet=tracked.unmet,
         bounds=posed.bounds,
+        path_tolerance=posed.asked.allowed,
+        tolerance_price=price_of_tolerance(posed.asked, least),
         prices={
             kind: context.model.by_motor(of)
             if kind == "torque"
@@ -404,6 +438,7 @@ def _outcome(analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, c
     how, steps = Choice("collocation", "interior-point method"), len(curve.x) - 1
     statistics = Statistics("completed", how, steps=steps, evaluations=tracked.iterations)
     times = times.clip(voltage.x[0], voltage.x[-1])
+    servo = servo if tracked.error is None else displaced_along(servo, tracked.error)
     run = outcome_along(curve, servo, analysis, model, statistics, times)
     assert run.prescribed is not None
     between = {body: type(voltage)(c, voltage.x) for body, c in _by_body(context, voltage.c).items()}

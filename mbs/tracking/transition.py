@@ -15,6 +15,7 @@ from ..model.amplifiers import Amplifiers
 from ..run.record import GearCurve
 from .geared import Gears
 from .interior_point import Minimum
+from .path_error import Tolerance, displaced_at, rows_of_points
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -58,11 +59,28 @@ class Transition:
     is_free: bool = False
     rate: float = 0.0
     gears: Gears | None = None  # those that give; V then begins and ends at zero, with its rate
+    tolerance: Tolerance | None = None  # within which points may leave their path; e = ė = 0 at both ends
 
     @property
     def order(self) -> int:
         """Of the derivative of V that is linear between breaks."""
         return 0 if self.gears is None else 2
+
+    def driven_at(self, times: Array, error: PPoly | None) -> Servo:
+        """The robot at ascending `times` (T,), s, on its path with this error, m."""
+        if error is None:
+            return self.driven
+        return displaced_at(self.driven, times, np.array([error(times, order) for order in range(3)]))
+
+    @property
+    def allowed(self) -> float:
+        """Largest path error, m."""
+        return 0.0 if self.tolerance is None else self.tolerance.error
+
+    @property
+    def errors(self) -> int:
+        """Number of coordinates with a path error."""
+        return 0 if self.tolerance is None else len(rows_of_points(self.driven))
 
     @property
     def is_limited(self) -> bool:
@@ -86,7 +104,11 @@ class Transition:
             "current": (both * of.current, both * rate * of.capacitance),
             "torque": (both * self.limits.torque, both * np.full_like(self.limits.torque, weights.torque)),
         }
-        return {name: np.where(np.isfinite(limit), limit, size) for name, (limit, size) in pairs.items()}
+        ranges = {name: np.where(np.isfinite(limit), limit, size) for name, (limit, size) in pairs.items()}
+        if self.tolerance is not None:
+            each = both * np.ones(self.errors)
+            ranges |= {"error": self.tolerance.error * each, "curving": self.tolerance.acceleration * each}
+        return ranges
 
 
 @struct
@@ -110,6 +132,7 @@ class Tracked:
     found: Minimum | None = None
     added: float = 0.0  # what the effort adds to the objective "least-…"
     gears: Mapping[str, GearCurve] = field(default_factory=dict)  # by joint, behind which motors are
+    error: PPoly | None = None  # e(t), m, of points that may leave their path
     # of the share, relative: twice its change by the last finer intervals, and what the effort may add
     doubt: float = np.inf
 

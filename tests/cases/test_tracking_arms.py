@@ -77,6 +77,30 @@ def test_replay_follows_the_path(scene):
         assert about["motor_work"] + about["patch_work"] == pytest.approx(dissipated, rel=2e-3)  # by 2 ms
 
 
+def test_replay_stays_within_the_path_tolerance(scene):
+    """Half the voltage for 0.3 mm, and none for 1 mm: then the torques alone carry the arm."""
+    changes = ("limit = 200.0", "limit = 100.0"), ("tolerance = 1e-4", "tolerance = 1e-5\npath_tolerance = 3e-4")
+    with ffrobot.solve(scene(*changes)) as results:
+        about, error = results.attributes("carried/tracking"), results["carried/trajectories/tip/error"]
+        assert about["objective"] == "effort"
+        assert about["path_tolerance"] == 3e-4
+        assert f"{1e-3 * about['tolerance_price']:.3g} V less per mm of it" in results.verdict["carried"].answer
+        assert 0.99 * 3e-4 < np.abs(error).max() < 3e-4 * (1 + 1e-6)
+        assert np.abs(error[[0, -1]]).max() < 1e-9
+        assert off_path(results, "replay") < 1e-2 * 3e-4
+        modal, rate = (results[f"replay/bodies/arm/{name}"] for name in ("modal", "modal_velocity"))
+        assert np.abs(rate[-1]).max() < 1e-4 * np.abs(rate).max()
+        assert np.abs(modal[-1]).max() < 1e-4 * np.abs(modal).max()
+    changes = ("limit = 200.0", "limit = 100.0"), ("tolerance = 1e-4", "tolerance = 1e-4\npath_tolerance = 1e-3")
+    with ffrobot.solve(scene(*changes)) as results:
+        about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
+        assert about["least_voltage"] == 0.0
+        assert results.peak("carried/pzt/arm/required_voltage")[0] < 1e-4
+        assert "least voltage 0 V: torques alone stay within path_tolerance" in verdict.answer
+        assert "patches are not needed: torques alone stay on the path within path_tolerance" in verdict.advice
+        assert about["without_patches"] < 1e-3 * 1.01
+
+
 def test_limits_that_are_too_small(scene):
     """The least voltage is found all the same, and said."""
     path = scene(("limit = 200.0", "limit = 100.0"))
@@ -91,9 +115,11 @@ def test_limits_that_are_too_small(scene):
         assert f"{about['least_voltage']:.3g} V instead of 100 V" in warning
     more = float(re.search(r"; (\S*) ms more", warning)[1]) / 1e3
     longer = re.search(r"the same path in (\S*) s", warning)[1]
+    wider = float(re.search(r"; (\S*) mm of path_tolerance", warning)[1]) / 1e3
     keys = f"tolerance = 1e-4\npre_actuation = {more}\npost_actuation = {more}\noutput_step = 1e-4"
     for changes in (
         [("output_step = 0.002\ntolerance = 1e-4", keys)],
+        [("tolerance = 1e-4", f"tolerance = 1e-4\npath_tolerance = {wider}")],
         [("/0.6", f"/{longer}"), ("end = 0.6", f"end = {longer}"), ("output_step = 0.002", f"output_step = {longer}")],
     ):
         with ffrobot.solve(scene(("limit = 200.0", "limit = 100.0"), *changes)) as results:
@@ -222,7 +248,11 @@ def off_path_of_first(results):
         ([(GEAR[0], GEAR[1].replace("true", "false"))], "stiffness: expected a joint with a motor|as many motors"),
         ([('apply = "joints+pzt"', 'apply = "points"')], 'apply: expected "joints" or "joints\\+pzt"'),
         ([("tolerance = 1e-4", 'objective = "speed"')], "objective"),
-        ([("tolerance = 1e-4", "path_tolerance = 1e-4")], 'expected no "path_tolerance": this kind follows its path'),
+        ([("tolerance = 1e-4", "path_tolerance = 0.0")], "path_tolerance: expected a number greater than 0, found 0"),
+        ([("tolerance = 1e-4", "path_tolerance = 1.0")], "path is longer, found 1 m for a path of 0.765 m"),
+        ([("tolerance = 1e-4", "path_tolerance = 1e-4\ntolerance_time = 0.0")], "tolerance_time: expected .*found 0"),
+        ([("tolerance = 1e-4", "tolerance_time = 0.01")], '"tolerance_time" only with path_tolerance, found it alone'),
+        ([GEAR, ("tolerance = 1e-4", "path_tolerance = 1e-4")], "rigid gears or no .*found compliant gears with one"),
         ([("tolerance = 1e-4", "pre_actuation = -0.1")], "pre_actuation: expected .*found -0.1"),
         ([("tolerance = 1e-4", "weights = { rate = -1.0 }")], "weights.rate: expected .*found -1.0"),
     ],

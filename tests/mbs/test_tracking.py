@@ -19,11 +19,12 @@ from ffrobot.fe_models.link_source import link_keys
 from ffrobot.mbs.analysis.fcid import sampled
 from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.stable_inversion import invert
-from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
+from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise, shape_along
 from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.quantities.supply import motor_moments
-from ffrobot.mbs.tracking.advice import bounds_of_zeros
+from ffrobot.mbs.tracking.advice import bounds_of_zeros, price_of_tolerance
 from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
+from ffrobot.mbs.tracking.path_error import Tolerance, displaced_at, slopes_by_error
 from ffrobot.mbs.tracking.problem import track
 from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
 from ffrobot.run.solve import prepare_scene, solve_scene
@@ -176,6 +177,77 @@ def test_least_effort_of_the_paper():
     assert np.abs(found.voltage(0.68) - expected).max() < 3e-4
 
 
+def within_tolerance(servo, problem, error):
+    """The least voltage with the torques of section 3 of the notes: 1.2 times their quasi-static peak."""
+    times = np.linspace(0.0, servo.end, 201)
+    peaks = np.abs(servo.quasi_static(times, shape_along(servo, times))).max(axis=0)
+    problem = replace(problem, limits=replace(problem.limits, torque=1.2 * peaks), is_free=True)
+    return replace(problem, tolerance=Tolerance(error))
+
+
+def breaks_of_the_notes(T):
+    return 0.5 * T * (1.0 + np.tanh(2.0 * np.linspace(-1.0, 1.0, 65)) / np.tanh(2.0))
+
+
+@pytest.mark.parametrize(
+    ("modes", "T", "error", "expected"),
+    [
+        (4, 0.5, 1e-4, 252.4214),  # checkpoint 6 of ../shared/tracking_gears_notes.md, which bounds e at breaks alone
+        (4, 0.5, 6e-4, 127.6563),
+        (6, 0.6, 3e-4, 63.6748),
+        (3, 0.6, 2e-4, 91.4569),
+        (6, 0.6, 1e-3, 0.0),  # section 4: motors alone
+        pytest.param(6, 1.0, 1e-5, 17.863, marks=pytest.mark.nightly),
+        pytest.param(6, 0.5, 3e-4, 191.810, marks=pytest.mark.nightly),
+        pytest.param(4, 0.6, 3e-4, 67.561, marks=pytest.mark.nightly),
+    ],
+)
+def test_least_voltage_within_a_path_tolerance(modes, T, error, expected):
+    servo, Phi_V = strip(modes, T)
+    problem = within_tolerance(servo, asked(servo, Phi_V, (0.0, T), "least-voltage", 100.0, V_ref=100.0), error)
+    found = track(problem, breaks_of_the_notes(T), None, 1e-3)
+    assert found.converged
+    assert 100.0 * found.share == pytest.approx(expected, rel=1e-2, abs=1e-3)
+    e, e_dot, e_ddot = (found.error(np.linspace(0.0, T, 5001), order) for order in range(3))
+    assert np.abs(e).max() < error * (1 + 1e-8)
+    assert np.abs(e_ddot).max() < error / 0.005**2 * (1 + 1e-8)
+    assert max(np.abs([e[[0, -1]], T * e_dot[[0, -1]]]).ravel()) < 1e-9 * error
+
+
+def test_path_tolerance_of_the_paper():
+    """Section 4: a micrometer is much where links are stiff; two coordinates."""
+    servo, Phi_V = arm(2, 5, 0.7)
+    problem = within_tolerance(servo, asked_of_arm(servo, Phi_V, "least-voltage", 100.0, is_free=True), 1e-6)
+    found = track(problem, breaks_of_the_notes(0.7), None, 1e-3)
+    assert 100.0 * found.share == pytest.approx(40.634, rel=1e-2)
+
+
+def test_price_of_a_path_tolerance():
+    """By how much the least voltage changes with it, against its difference; 259.7 V/mm from exact tracking on."""
+    servo, Phi_V = strip(4, 0.5)
+    least = []
+    for error in (1e-4, 0.95e-4, 1.05e-4):
+        problem = within_tolerance(servo, asked(servo, Phi_V, (0.0, 0.5), "least-voltage", 100.0, V_ref=100.0), error)
+        least.append(track(problem, breaks_of_the_notes(0.5), None, 1e-4))
+    price = price_of_tolerance(problem, least[0])
+    assert price == pytest.approx(100.0 * (least[1].share - least[2].share) / 1e-5, rel=1e-2)
+    exact = track(replace(problem, tolerance=None), breaks_of_the_notes(0.5), None, 1e-4)
+    assert 100.0 * (exact.share - least[0].share) / 1e-4 == pytest.approx(259.7e3, rel=1e-2)
+
+
+def test_slopes_by_path_errors():
+    """Forces on a displaced path, a millionth of the arm's size away, against their derivatives."""
+    servo = arm(2, 5, 0.7)[0]
+    times, generator = np.linspace(0.05, 0.65, 5), np.random.default_rng(3)
+    motion = [servo.mode_sizes * 1e-3 * generator.normal(size=(5, 4)) * 10.0**k for k in range(3)]
+    off = np.zeros((3, 5, 2))
+    slopes = slopes_by_error(servo, times, motion, off)
+    change = 1e-6 * generator.normal(size=off.shape) * np.array([1.0, 10.0, 100.0])[:, None, None]
+    before, after = (np.hstack(displaced_at(servo, times, of).forces(times, *motion)) for of in (off, change))
+    expected = np.einsum("otfk,otk->tf", slopes, change)
+    assert np.abs(after - before - expected).max() < 1e-4 * np.abs(expected).max()
+
+
 def test_bounds_of_zeros():
     """Section 7: what the slowest zeros ask for at least; less than what is needed."""
     servo, Phi_V = strip(4, 0.5)
@@ -184,6 +256,11 @@ def test_bounds_of_zeros():
     assert found.voltages.max() == pytest.approx(200.90, abs=1e-2)
     assert found.zeros[found.voltages.argmax()].real == pytest.approx(-64.405, abs=1e-3)
     assert found.voltages.max() < 200.0 * track(problem, graded(0.0, 0.5, 64)).share
+    # (P2) of ../shared/tracking_gears_notes.md: a path tolerance lowers the bound by 500 to 526 V/mm
+    assert ((found.relief > 499e3) & (found.relief < 527e3)).any()
+    within = bounds_of_zeros(servo, replace(problem, tolerance=Tolerance(1e-4)), linearise(servo, 0.5), (0.0, 0.0),
+                             np.full(4, 200.0))  # fmt: skip
+    assert within.voltages.max() == pytest.approx((found.voltages - 1e-4 * found.relief).max())
     servo, Phi_V = arm(4, 10, 1.0)
     problem = asked_of_arm(servo, Phi_V, "least-voltage", 200.0, is_free=True)
     found = bounds_of_zeros(servo, problem, linearise(servo, 1.0), (0.0, 0.0), np.full(20, 200.0))

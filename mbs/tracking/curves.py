@@ -1,13 +1,14 @@
-"""Voltages whose derivative of some order is linear between breaks: V itself, or V̈ where gears give."""
+"""Curves whose derivative of some order is linear between breaks: V itself, V̈ where gears give, ë of a path error."""
 
 from __future__ import annotations
 
+from itertools import product
 from math import factorial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
 from ...common.structs import struct
 from ..inversion.collocation import GAUSS
 
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 
 @struct
-class Voltages:
-    """V(t) of m patches on intervals between `breaks` (N + 1,), s, with a linear derivative of `order`.
+class Curves:
+    """V(t) of m patches, or e(t), on intervals between `breaks` (N + 1,), s, with a linear derivative of `order`.
 
     On an interval V follows from that derivative at both ends, and from V and the lower derivatives where it begins.
     """
@@ -56,3 +57,33 @@ class Voltages:
         for k in range(-derivative, self.order - derivative):
             by.append((h * x) ** k / factorial(k) if k >= 0 else 0.0 * one)
         return np.stack([one * of for of in by], axis=2)
+
+
+@struct
+class Unknowns:
+    """Curves of `count` patches or coordinates among the `width` unknowns z of an interval.
+
+    `places` (order + 2,) are those of what they follow from, in the order of `Curves.parts`.
+    """
+
+    curves: Curves
+    count: int
+    places: Indices
+    width: int
+
+    def by_z(self, xi: Array, derivative: int = 0) -> Array:
+        """A derivative at shares ξ (S,) of intervals by z: (N, S, count, width)."""
+        parts, each = self.curves.parts(xi, derivative), np.arange(self.count)
+        by_z = np.zeros((*parts.shape[:2], self.count, self.width))
+        for k, place in enumerate(self.places):
+            by_z[:, :, each, place + each] = parts[:, :, k, None]
+        return by_z
+
+    def squares(self, weights: Array, derivative: int) -> Array:
+        """Quadratic forms (N, width, width) of Σ weights |derivative|², with weights (N, 4) at the Gauss points."""
+        parts, each = self.curves.parts(GAUSS.c, derivative), np.arange(self.count)
+        squares = np.einsum("Ns,Nsa,Nsb->abN", weights, parts, parts)
+        found = np.zeros((len(parts), self.width, self.width))
+        for (i, first), (j, second) in product(enumerate(self.places), repeat=2):
+            found[:, first + each, second + each] += squares[i, j][:, None]
+        return found
