@@ -113,6 +113,19 @@ def _tip_errors(results: Results) -> Iterator[FigureRecord]:
     yield from _histories(("tip_error",), "tip position error", curves, "error (mm)", scale=1e3)
 
 
+def _path_errors(results: Results) -> Iterator[FigureRecord]:
+    """Of paths that points may leave by a tolerance."""
+    for analysis in results.analyses:
+        part = f"{analysis}/tracking"
+        limit = results.attributes(part).get("path_tolerance", 0.0) if results.has(part) else 0.0
+        for name in results.names(f"{analysis}/trajectories") if limit else ():
+            group = f"{analysis}/trajectories/{name}"
+            of_points = ((k, c) for k, c in enumerate(_components(results, group)) if c in AXES)
+            curves = [Curve(data=f"{group}/error[{k}]", label=c) for k, c in of_points]
+            title, limits = f"path error of {name}, {analysis}", both_ways(1e3 * limit)
+            yield from _histories(("path_error", analysis, name), title, curves, "error (mm)", scale=1e3, limits=limits)
+
+
 def _angles(results: Results) -> Iterator[FigureRecord]:
     for body in members(results, "bodies"):
         curves = curves_of(results, f"bodies/{body}/angle")
@@ -318,6 +331,7 @@ MAIN: Figures = (
     _configurations,
     _paths,
     _tip_errors,
+    _path_errors,
     _actuators,
     _largest_deflections,
     _stresses,
