@@ -1,9 +1,10 @@
-"""Random arms with compliant gears on paths from rest to rest: torques and voltages, and how far replays are off.
+"""Random arms on paths from rest to rest, behind compliant gears or within a path tolerance: voltages and replays.
 
-    python tests/campaigns/geared_arms.py [--count 30] [--seed 62] [--first 0]
+    python tests/campaigns/tracked_arms.py [--count 30] [--seed 62] [--first 0] [--tolerance 1e-4]
 
-One or two links in the plane, or a rod on a waist and a shoulder in 3D; 2 to 6 modes, payloads, gears of 10 to 80 Hz.
-A line for each: least voltage, largest distance of the replay from the path (m), time of the processor; or the reason.
+One or two links in the plane, or a rod on a waist and a shoulder in 3D; 2 to 6 modes, payloads. With `--tolerance` (m)
+gears are rigid, else they have 10 to 80 Hz. A line for each: least voltage, largest distance of the replay from the
+planned motion (m), intervals and Newton steps, time of the processor; or the reason.
 """
 
 import sys
@@ -20,7 +21,7 @@ sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("", "cases",
 from test_tracked_robots import ORIGIN, geared, in_3d, patches, revolute, scene, septic, strip
 
 
-def random_arm(rng):
+def random_arm(rng, tolerance):
     """What it is, and its tables."""
     links, space = int(rng.integers(1, 3)), "plane" if rng.random() < 0.7 else "3D"
     f, payload = float(rng.uniform(10, 80)), float(rng.choice([0.0, rng.uniform(0.02, 0.2)]))
@@ -50,21 +51,25 @@ def random_arm(rng):
     if payload:
         tables["payload"] = [{"point": tip, "mass": payload, "center": ORIGIN[: len(tables["gravity"])]}]
     tables["analysis"][0]["tolerance"] = 1e-4
+    if tolerance:
+        tables["analysis"][0]["path_tolerance"] = tolerance
+        return f"{what}, payload {payload:.2f} kg", tables
     return f"{what}, {f:.0f} Hz, payload {payload:.2f} kg", geared(tables, f, **inertias)
 
 
 def main():
-    asked = options(__doc__, count=30, seed=62, first=0).parse_args()
+    asked = options(__doc__, count=30, seed=62, first=0, tolerance=0.0).parse_args()
     warnings.simplefilter("ignore")
     for number in range(asked.first, asked.first + asked.count):
-        what, tables = random_arm(np.random.default_rng([asked.seed, number]))
+        what, tables = random_arm(np.random.default_rng([asked.seed, number]), asked.tolerance)
         model, began = ffrobot.make_scene(**tables), time.process_time()
         try:
             with ffrobot.solve(model) as results:
                 point = f"points/{model.trajectory[0].point}/position"
                 off = float(np.abs(results[f"replay/{point}"] - results[f"carried/{point}"]).max())
-                about = results.attributes("carried/tracking")
+                about, of_run = (results.attributes(f"carried{part}") for part in ("/tracking", ""))
                 found = f"{about['least_voltage']:.4g} V, {about['objective']}, replay off by {off:.2g} m"
+                found += f", {of_run['steps']} intervals, {of_run['evaluations']} steps"
         except ffrobot.FfrobotError as error:
             found = f"{type(error).__name__}: {error}"
         print(f"{number}: {what}: {found}; {time.process_time() - began:.1f} s", flush=True)
