@@ -30,7 +30,7 @@ from ...mbs.run.record import Run
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
-from .controllers import Controller, PythonControl, make_controllers
+from .controllers import ComputedTorqueControl, Controller, PythonControl, make_controllers
 from .linear import voltages_at
 from .linear_model import LinearModel, state_space
 from .loop import (
@@ -217,12 +217,14 @@ def loops_about(
 
     Beside them the controllers at the start, or at each time (s) of an observer's schedule.
     """
-    is_asked_in_order = any(isinstance(controller, PythonControl) for controller in controllers)
-    latest = 0 if is_asked_in_order else max(len(setup.times) - LONGEST, 0)
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
 
     acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
     inner = cache(partial(find_feedback, acting, asked, readings))
+    # Computed torque alone changes along the path; a user's function is asked in order
+    is_asked_in_order = any(isinstance(controller, PythonControl) for controller in asked)
+    changes = not is_asked_in_order and any(isinstance(controller, ComputedTorqueControl) for controller in asked)
+    latest = max(len(setup.times) - LONGEST, 0) if changes else 0
 
     def at(t: float, first: int) -> Feedback | None:
         law = inner(first)

@@ -272,6 +272,25 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
         other.state_spaces("loop")
 
 
+def test_a_function_beside_an_observer_is_asked_in_order_for_margins():
+    def damped(setup):
+        expected, rate = iter(range(1000)), setup.columns("joint/O/rate")
+
+        def at_sample(k, y):
+            assert k == next(expected)
+            return -4.0 * y[rate]
+
+        return at_sample
+
+    python = {"kind": "python", "python": damped}
+    stiff = PID | {"derivative": {}}
+    keys = {"sensor": [ENCODER], "observer": KALMAN, "sample_time": T / 5}
+    keys |= {"disturbance": [{"point": "w.rim", "y": "1"}]}
+    found = [ffrobot.solve(wheel(controller=of, **keys)) for of in ([stiff, python], [PID])]
+    margins = [results.attributes("loop/control")["gain_margin"] for results in found]
+    assert margins[0] == pytest.approx(margins[1], rel=1e-2)
+
+
 def scheduled_arm(count):
     rod = {"mass": 1.0, "inertia": 0.02, "center": [0.25, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
     observer = {"kind": "scheduled", "count": count, "process": {"joint/a": 0.5, "joint/b": 0.3}}
