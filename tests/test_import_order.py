@@ -38,6 +38,7 @@ FLOORS = {
         "run",
         "results",
         "present",
+        "milling",
         "map",
         "exchange",
         "pictures",

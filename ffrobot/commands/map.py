@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..common.errors import InputError
-from ..present.logs import logging_options, python_option
+from ..present.logs import FILE, logging_options, python_option
 from .options import output_option, processes_option, protect, scene_argument
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 @click.option(
     "--response", metavar="FIRST:LAST:COUNT", help="Frequency response of the point, with these frequencies (Hz)."
 )
+@click.option("--milling", metavar="CUTTER.toml", type=FILE, help="Milling process: stable depths of cut.")
 @click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
 @processes_option("Number of parallel processes.")
 @output_option("DIR", "Folder of the map [SCENE.map next to the input].")
@@ -44,6 +45,7 @@ def map_(
     orientation: str,
     modes: int,
     response: str | None,
+    milling: Path | None,
     figures: bool,
     processes: int,
     output: Path | None,
@@ -59,11 +61,12 @@ def map_(
     """  # noqa: D301 (click wants the backspace itself)
     from ..map.map_file import TABLE, print_map, write_map
     from ..map.pose_map import make_map, plan_map
+    from ..milling.process import read_milling
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
 
     folder = output or scene_file.with_suffix(".map")
-    protect(files_of(scene_file))
+    protect([*files_of(scene_file), *([milling] if milling else [])])
     plan = plan_map(
         scene=scene_file,
         over=over,
@@ -72,6 +75,7 @@ def map_(
         orientation=orientation,
         count=modes,
         frequencies=_frequencies(response),
+        milling=read_milling(milling) if milling else None,
     )
     with Display() as display:
         made = make_map(plan, processes, display)

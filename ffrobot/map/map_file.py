@@ -34,8 +34,12 @@ UNITS = {
     "place": "m",
     "manipulability": "",
     "robot": "m",
+    "milling_depth": "m",
+    "milling_best_depth": "m",
+    "milling_feed": "",
+    "milling_lobes": "m",
 }
-NOT_IN_TABLE = ("compliance", "response", "robot")
+NOT_IN_TABLE = ("compliance", "response", "robot", "milling_lobes")
 
 
 def torque_share(poses: PoseMap) -> Array:
@@ -85,7 +89,7 @@ def _columns(poses: PoseMap, name: str, values: Array) -> dict[str, Array]:
         return {name: values}
     labels = {"torque": poses.motors, "torque_share": poses.motors}.get(name)
     if labels is None:
-        is_vector = name.rpartition("/")[2] in ("place", "sag", "stiffness", "direction")
+        is_vector = name.rpartition("/")[2] in ("place", "sag", "stiffness", "direction", "milling_feed")
         labels = tuple("xyz" if is_vector else map(str, range(1, values.shape[1] + 1)))
     return {f"{name} {label}": column for label, column in zip(labels, values.T, strict=False)}
 
@@ -133,6 +137,8 @@ def quantities(poses: PoseMap) -> dict[str, Quantity]:
         if (response := values.get(f"joints_{condition}/response")) is not None:
             peak = 1e3 * response.max(axis=(1, 2))
             table[f"response_{condition}"] = Quantity(f"largest response, {words} (mm/N)", peak, False)
+        if (depth := values.get(f"joints_{condition}/milling_depth")) is not None:
+            table[f"milling_{condition}"] = Quantity(f"stable depth of cut, {words} (mm)", 1e3 * depth, True)
     reach = np.nanmax(np.linalg.norm(values["place"], axis=1))
     deflection = 1e3 * _beyond(ROUND_OFF * reach, np.linalg.norm(values["sag"], axis=1))
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)

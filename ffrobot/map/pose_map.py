@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from ..mbs.linear.linearisation import labelled
 from ..mbs.linear.poses import PoseEvaluator
 from ..mbs.posture.workspace import GridAxis, Postures, grid_postures
 from ..mbs.scene.space import SPACES
+from ..milling.process import Milling, stable_depths
 from ..run.inputs import changed, fingerprints, read_tables
 from ..run.solution import Solution
 from ..run.solve import prepare_scene
@@ -105,6 +107,7 @@ class MapPlan:
         keeps_orientation: whether the body of the point keeps the orientation of the start.
         count: natural frequencies of each pose.
         frequencies: (F,) Hz of the frequency response.
+        milling: process whose stable depths it has.
     """
 
     scene: Path
@@ -114,6 +117,7 @@ class MapPlan:
     count: int
     frequencies: Array
     folder: Path
+    milling: Milling | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -141,6 +145,7 @@ def plan_map(
     orientation: str = "auto",
     count: int = 3,
     frequencies: Array | None = None,
+    milling: Milling | None = None,
 ) -> MapPlan:
     """Raises `InputError` for a scene, a grid or a point that is wrong, and for a folder of something else."""
     check_folder(folder)
@@ -158,6 +163,7 @@ def plan_map(
         count=count,
         frequencies=omega,
         folder=folder,
+        milling=milling,
     )
 
 
@@ -191,7 +197,12 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     if not good.any():
         raise SolveError(f"{plan.scene}: no pose of the grid is within reach and the limits of the joints")
     evaluator = PoseEvaluator(
-        solution.model, postures.q[int(good.argmax())], plan.point, count=plan.count, omega=2 * np.pi * plan.frequencies
+        solution.model,
+        postures.q[int(good.argmax())],
+        plan.point,
+        count=plan.count,
+        omega=2 * np.pi * plan.frequencies,
+        judge=None if plan.milling is None else partial(stable_depths, plan.milling),
     )
     if kept is None:
         _claim(plan, request, postures)
@@ -284,6 +295,7 @@ def _request(plan: MapPlan) -> dict[str, Any]:
         "keeps_orientation": plan.keeps_orientation,
         "count": plan.count,
         "frequencies": plan.frequencies.tolist(),
+        **({} if plan.milling is None else {"milling": plan.milling.model_dump(mode="json")}),
     }
     return {"asked": asked, "inputs": fingerprints(read_tables(plan.scene), plan.scene)}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..scene.space import SPACES
 from .joint_conditions import (
     COMPLIANT,
     LOCKED,
+    FreeCoordinates,
     JointCondition,
     free_coordinates,
     frequency_response,
@@ -27,6 +28,8 @@ from .linearisation import LinearEquations, LinearMechanism, labelled
 from .statics import Statics
 
 NONE = np.zeros(0)
+Judge = Callable[[FreeCoordinates, Array], Mapping[str, Array]]
+"""Further findings, by name, of free coordinates and of rows J (d, f) of the point's translations along s."""
 FREE = 1e-12  # of the largest stiffness: less lets the robot move
 
 
@@ -39,12 +42,21 @@ class PoseEvaluator:
     """
 
     def __init__(
-        self, model: Model, q: Array, point: str, *, count: int = 0, omega: Array = NONE, others: Sequence[str] = ()
+        self,
+        model: Model,
+        q: Array,
+        point: str,
+        *,
+        count: int = 0,
+        omega: Array = NONE,
+        others: Sequence[str] = (),
+        judge: Judge | None = None,
     ) -> None:
         """`q` (n_q,) is any posture of `model`; `count` frequencies are kept, and responses at `omega` (F,), rad/s.
 
-        `others`: further points of `linear_equations`.
+        `others`: further points of `linear_equations`. `judge` makes further findings of each condition.
         """
+        self._judge = judge
         self.model = with_compliance(without_paths(model))
         self.space, self.point, self._count, self._omega = SPACES[model.scene.space], point, count, omega
         self._linear, self._statics = LinearEquations(self.model, self._all(q), [point, *others]), Statics(self.model)
@@ -74,6 +86,10 @@ class PoseEvaluator:
             if len(self._omega):
                 response = frequency_response(found_there.free, mechanism.of_tool(self.point), self._omega)
                 values[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
+            if self._judge is not None:
+                J = mechanism.of_tool(self.point)[: len(self.space.translations)]
+                more = self._judge(found_there.free, J)
+                values |= {f"joints_{condition}/{name}": value for name, value in more.items()}
         places = tree.places(q[None])
         values["robot"] = np.array([[places.at(end).r[0] for end in pair] for pair in self.segments])
         return values

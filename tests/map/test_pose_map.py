@@ -20,7 +20,11 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.map import pose_map
 from ffrobot.map.map_file import print_map, quantities, torque_share, write_map
 from ffrobot.map.pose_map import make_map, plan_map
+from ffrobot.mbs.linear.joint_conditions import free_coordinates
+from ffrobot.mbs.linear.poses import PoseEvaluator
+from ffrobot.milling.process import read_milling
 from ffrobot.pictures.studies.pose_map import draw_map
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 ARM = """name = "arm"
@@ -324,3 +328,26 @@ moment_limit = 3.0
         second = 9.81 * (2.0 * 0.3 + 0.6) * np.cos(0.5) + elbow
         np.testing.assert_allclose(found.values["torque"].T, [0 * elbow, -second, -elbow], atol=1e-9)
         np.testing.assert_allclose(torque_share(found).T, [0 * elbow, second / 5.0, elbow / 3.0], atol=1e-9)
+
+
+def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
+    """1/(2 max Re ν) of C̄ G, with G solved for line by line, of the worst of twelve feeds."""
+    scene = arm.with_name("damped.toml")
+    scene.write_text(ARM.replace("stiffness = 3000.0", "stiffness = 3000.0\ndamping = 3.0"))
+    keys = {"teeth": 2, "tangential": 6e8, "radial": 2e8, "entry": 0.0, "exit": 2.0, "highest": 40.0}
+    (tmp_path / "cutter.toml").write_text(tomli_w.dumps(keys))
+    milling = read_milling(tmp_path / "cutter.toml")
+    found = mapped(scene, tmp_path / "map", "shoulder=0.2:0.4:2", "elbow=0.8", milling=milling)
+    model = prepare_scene(scene).model
+    linear, _ = PoseEvaluator(model, found.q[1], "fore.tip").linear_equations(found.q[1])
+    N, K, D = free_coordinates(linear, "compliant")
+    lowest = np.sqrt(np.linalg.eigvalsh(K)[0])
+    w = np.linspace(0.8 * lowest, 1.5 * lowest, 20_001)[:, None, None]
+    J = linear.points["fore.tip"][:2] @ N
+    modes = np.linalg.eigh(K)[1][:, :1]  # below 40 Hz
+    J, K, D = J @ modes, modes.T @ K @ modes, modes.T @ D @ modes
+    G = J @ np.linalg.solve(K + 1j * w * D - w**2, np.broadcast_to(J.T, (len(w), *J.T.shape)))
+    feeds = milling.feeds[:, :, :2]
+    depth = min(0.5 / np.linalg.eigvals(milling.cutter.average @ E @ G @ E.T).real.max() for E in feeds)
+    assert found.values["joints_compliant/milling_depth"][1] == pytest.approx(depth, rel=1e-3)
+    assert "milling_compliant" in quantities(found)

@@ -1,0 +1,104 @@
+"""A milling process from its file, and what it makes of one pose of a robot: `ffrobot map --milling`."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..common.arrays import Array, as_floats
+from ..common.toml_files import load_toml
+from ..common.validation import Record, validate
+from ..mbs.fields.field_types import NotNegative, Positive, Quantity, Vector3
+from ..mbs.linear.joint_conditions import FreeCoordinates
+from .stability import Cutter, Limits, Tip, limit_depth, stability_limits
+
+BELOW, ABOVE = 10.0, 1000.0  # the depth without lobes: where those of lobes are sought
+FEEDS = 12  # directions of feed within half a turn, beyond which forces are the same
+
+
+class Milling(Record):
+    """A cutter, its cutting coefficients, and the engagement of its teeth."""
+
+    teeth: Annotated[int, Field(ge=1, le=100)]
+    """Number of teeth, straight and equally spaced."""
+    tangential: Positive
+    """Tangential cutting coefficient, N/m²."""
+    radial: NotNegative
+    """Radial cutting coefficient, N/m²."""
+    entry: Quantity
+    """Angle at which a tooth enters the cut, from the normal to the feed, rad: 0 of up milling."""
+    exit: Quantity
+    """Angle at which it leaves the cut, rad: π of down milling."""
+    axis: Vector3 = (0.0, 0.0, 1.0)
+    """Axis of the tool, from the cut into the spindle, in the axes of the point (without own ones: global axes)."""
+    feed: Vector3 | None = None
+    """Direction of the feed, normal to the axis; default: the worst one counts."""
+    highest: Positive = 1000.0
+    """Highest natural frequency, Hz, of modes that vibrate; modes above it are rigid."""
+    speeds: Annotated[tuple[Positive, ...], Field(max_length=1000)] = ()
+    """Spindle speeds, rev/min, at which the stable depth is computed."""
+    method: Literal["averaged", "semi-discretization"] = "averaged"
+    """Method at these speeds: with averaged cutting forces, or with the forces of each angle, which takes longer."""
+
+    @model_validator(mode="after")
+    def _turns(self) -> Self:
+        if not 0.0 <= self.entry < self.exit <= np.pi + 1e-9:
+            raise ValueError(f"expected 0 ≤ entry < exit ≤ π, found {self.entry:g} and {self.exit:g}")
+        if not any(self.axis):
+            raise ValueError("expected an axis with a direction, found zero")
+        if self.feed is not None and np.linalg.norm(np.cross(self.feed, self.axis)) < 1e-6:
+            raise ValueError("expected a feed across the axis, found one along it")
+        return self
+
+    @property
+    def cutter(self) -> Cutter:
+        """Teeth, coefficients and angles."""
+        return Cutter(self.teeth, self.tangential, self.radial, self.entry, self.exit)
+
+    @property
+    def feeds(self) -> Array:
+        """Axes (n, 2, 3): unit vectors along the feed, and normal to it, so that the tool's axis is feed × normal."""
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        given = np.eye(3)[np.abs(axis).argmin()] if self.feed is None else np.array(self.feed)
+        x = given - axis * (axis @ given)
+        x /= np.linalg.norm(x)
+        angles = np.arange(FEEDS) * np.pi / FEEDS if self.feed is None else np.zeros(1)
+        y, c, s = np.cross(axis, x), np.cos(angles)[:, None], np.sin(angles)[:, None]
+        return as_floats(np.stack([c * x + s * y, c * y - s * x], axis=1))
+
+
+def read_milling(path: Path) -> Milling:
+    """The process in the TOML file at `path`. Raises `InputError` for wrong keys."""
+    return validate(Milling, load_toml(path, "milling file"), path)
+
+
+def stable_depths(milling: Milling, free: FreeCoordinates, J: Array) -> dict[str, Array]:
+    """Stable depths of a pose: with `free` coordinates and rows J (d, f) of the tip's translations along s.
+
+    `depth` m: without chatter at any speed, of the worst feed; `best_depth` of the `best_feed` (3,); `lobes` (S,) at
+    the speeds, of the worst feed.
+    """
+    values, V = np.linalg.eigh((free.K + free.K.T) / 2)
+    V = V[:, values < (2 * np.pi * milling.highest) ** 2]
+    rows = np.zeros((3, V.shape[1]))
+    rows[: len(J)] = J @ free.N @ V
+    tip = Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows)
+    omega, G = tip.response()
+    feeds, C = milling.feeds, milling.cutter.average
+    found: list[Limits] = [stability_limits(C, omega, axes @ G @ axes.T) for axes in feeds]
+    depths = np.array([one.least for one in found])
+    values_by_name = {
+        "milling_depth": depths.min(),
+        "milling_best_depth": depths.max(),
+        "milling_feed": feeds[depths.argmax(), 0],
+    }
+    if milling.speeds:
+        speed = np.array(milling.speeds) * 2 * np.pi / 60
+        values_by_name["milling_lobes"] = np.min([one.lobes(milling.teeth, speed) for one in found], axis=0)
+        least = float(depths.min())
+        if milling.method != "averaged" and np.isfinite(least):
+            worst, bounds = tip._replace(J=feeds[depths.argmin()] @ tip.J), (least / BELOW, least * ABOVE)
+            exact = [limit_depth(worst, milling.cutter, float(each), bounds) for each in speed]
+            values_by_name["milling_lobes"] = np.array(exact)
+    return {name: np.asarray(value, dtype=float) for name, value in values_by_name.items()}
