@@ -48,8 +48,9 @@ def peaks(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times and absolute values of the peaks after the release, by parabolas through three samples."""
     a, b, c = np.abs(y[:-2]), np.abs(y[1:-1]), np.abs(y[2:])
     top = (b >= a) & (b > c) & (t[1:-1] > 0.0)
-    shift = (0.5 * (a - c) / (a - 2.0 * b + c))[top]
-    return t[1:-1][top] + shift * STEP, b[top] - 0.25 * (a - c)[top] * shift
+    a, b, c = a[top], b[top], c[top]
+    shift = 0.5 * (a - c) / (a - 2.0 * b + c)
+    return t[1:-1][top] + shift * STEP, b - 0.25 * (a - c) * shift
 
 
 def decay_time(t: np.ndarray, y: np.ndarray) -> float:
