@@ -16,7 +16,7 @@ import numpy as np
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, SolveError
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
-from .response_model import Equations, PoseEquations, ends_of, receptance
+from .response_model import Equations, ends_of, receptance, unstacked
 from .response_tests import MeasuredPose
 
 STEP = 1e-4  # relative, for derivatives of the equations
@@ -84,18 +84,16 @@ class _Residuals:
         self,
         poses: Sequence[MeasuredPose],
         center: Array,
-        equations: Sequence[PoseEquations],
-        slopes: Sequence[Sequence[PoseEquations]],
+        equations: Sequence[Array],
+        slopes: Sequence[Sequence[Array]],
     ) -> None:
         self._poses, self._center, self._equations, self.slopes = poses, center, equations, slopes
         self._ends = [ends_of(pose) for pose in poses]
 
-    def equations(self, x: Array) -> list[PoseEquations]:
+    def equations(self, x: Array) -> list[Array]:
         """The equations of all poses, linear in θ."""
-        changes, found = self._center * np.expm1(x), list(self._equations)
-        for k, change in enumerate(changes):
-            found = [of.plus(slopes[k], float(change)) for of, slopes in zip(found, self.slopes, strict=True)]
-        return found
+        change = self._center * np.expm1(x)
+        return [of + np.tensordot(change, by, axes=1) for of, by in zip(self._equations, self.slopes, strict=True)]
 
     def at(self, x: Array, smoothing: Sequence[Array] = ()) -> tuple[Array, Array]:
         """Residuals (m,) and their derivatives (m, n) by x; with a `smoothing` of each pose of magnitudes alone."""
@@ -149,12 +147,18 @@ def _smoothing(frequency: Array, width: float) -> Array:
     return as_floats(weights / weights.sum(axis=1, keepdims=True))
 
 
-def differentiated(equations: Equations, values: Array, place: Sequence[PoseEquations]) -> list[list[PoseEquations]]:
+def _distance(a: Array, b: Array) -> float:
+    """The largest difference of the parts of equations, each relative to its size."""
+    pairs = zip(unstacked(a), unstacked(b), strict=True)
+    return max(float(np.linalg.norm(one - other) / (np.linalg.norm(one) or 1.0)) for one, other in pairs)
+
+
+def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[list[Array]]:
     """∂/∂θ of the equations by pose and parameter at `values` (n,), from those in `place`: exact where linear."""
     found = []
     for step in np.diag(STEP * values):
         pairs = zip(equations(values + step), place, strict=True)
-        found.append([ahead.slope(here, float(step.sum())) for ahead, here in pairs])
+        found.append([(ahead - here) / step.sum() for ahead, here in pairs])
     return [list(of_pose) for of_pose in zip(*found, strict=True)]
 
 
@@ -174,7 +178,7 @@ def fit_receptances(
         raise InputError("fit: expected a test that is not for validation, found none")
     fitted = [poses[k] for k in used]
 
-    def of_used(values: Array) -> list[PoseEquations]:
+    def of_used(values: Array) -> list[Array]:
         found = equations(values)
         return [found[k] for k in used]
 
@@ -185,7 +189,7 @@ def fit_receptances(
         about = _Residuals(fitted, theta, place, slopes)
         x = about.least(width)
         theta, place = as_floats(theta * np.exp(x)), of_used(theta * np.exp(x))
-        off = max(new.distance(old) for new, old in zip(place, about.equations(x), strict=True))
+        off = max(map(_distance, place, about.equations(x)))
         if off > LINEAR:
             slopes = differentiated(of_used, theta, place)
         elif not width and np.abs(x).max() <= REACHED:

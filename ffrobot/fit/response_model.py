@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..common.arrays import Array, ComplexArray
-from ..common.structs import struct
 from ..map.pose_map import check_point
 from ..mbs.linear.joint_conditions import COMPLIANT, free_coordinates
 from ..mbs.linear.poses import PoseEvaluator
@@ -24,88 +23,57 @@ from ..run.prepare import with_scene
 from ..run.solution import Solution
 from .response_tests import Direction, MeasuredPose
 
-
-@struct
-class PoseEquations:
-    """M, K, D (f, f) of free coordinates, and rows J (r, f) of displacements; they add and scale as vectors do."""
-
-    M: Array
-    K: Array
-    D: Array
-    J: Array
-
-    def plus(self, other: PoseEquations, factor: float) -> PoseEquations:
-        """The sum with `factor` times `other`."""
-        pairs = zip(self.parts, other.parts, strict=True)
-        return PoseEquations(*(mine + factor * its for mine, its in pairs))
-
-    def slope(self, behind: PoseEquations, step: float) -> PoseEquations:
-        """The quotient of the difference from `behind` and a `step`."""
-        pairs = zip(self.parts, behind.parts, strict=True)
-        return PoseEquations(*((mine - its) / step for mine, its in pairs))
-
-    @property
-    def parts(self) -> tuple[Array, Array, Array, Array]:
-        """M, K, D and J."""
-        return self.M, self.K, self.D, self.J
-
-    def distance(self, other: PoseEquations) -> float:
-        """The largest difference of the parts, each relative to its size."""
-        pairs = zip(self.parts, other.parts, strict=True)
-        return max(float(np.linalg.norm(a - b) / (np.linalg.norm(a) or 1.0)) for a, b in pairs)
+Equations = Callable[[Array], Sequence[Array]]
+"""`stacked` equations of all poses by the values (n,) of parameters, in the same coordinates for all of these."""
 
 
-Equations = Callable[[Array], Sequence[PoseEquations]]
-"""The equations of all poses by the values (n,) of parameters, in the same coordinates for all of these."""
+def stacked(M: Array, K: Array, D: Array, J: Array) -> Array:
+    """One array (3 f + r, f), which adds and scales, of M, K, D (f, f) and rows J (r, f) of displacements."""
+    return np.vstack([M, K, D, J])
+
+
+def unstacked(equations: Array) -> list[Array]:
+    """M, K, D and J."""
+    f = equations.shape[1]
+    return np.split(equations, [f, 2 * f, 3 * f])
 
 
 class Ends(NamedTuple):
-    """Numbers (p,) of the rows of force and response of each FRF, and what they are."""
+    """The rows of J, and the numbers (p,) of those of force and response of each FRF."""
 
+    rows: list[Direction]
     force: list[int]
     response: list[int]
-    rows: list[Direction]
 
 
 def ends_of(pose: MeasuredPose) -> Ends:
     """Return the rows that the FRFs of a pose need, each once."""
-    places: dict[tuple[str, bytes], int] = {}
-    rows: list[Direction] = []
-
-    def number(one: Direction) -> int:
-        key = (one.point, one.axis.tobytes())
-        if key not in places:
-            places[key] = len(rows)
-            rows.append(one)
-        return places[key]
-
-    force, response = ([number(getattr(one, end)) for one in pose.responses] for end in ("force", "response"))
-    return Ends(force, response, rows)
+    rows = list(dict.fromkeys(end for one in pose.responses for end in (one.force, one.response)))
+    return Ends(
+        rows, [rows.index(one.force) for one in pose.responses], [rows.index(one.response) for one in pose.responses]
+    )
 
 
 def receptance(
-    of: PoseEquations, ends: Ends, omega: Array, changes: Sequence[PoseEquations] = ()
+    equations: Array, ends: Ends, omega: Array, changes: Sequence[Array] = ()
 ) -> tuple[ComplexArray, ComplexArray]:
     """H (F, p) at `omega` (F,), rad/s, and its derivatives (n, F, p) along the `changes` of the equations."""
-    w = omega[:, None, None]
-    forces, responses = sorted(set(ends.force)), sorted(set(ends.response))
-    f, r = [forces.index(k) for k in ends.force], [responses.index(k) for k in ends.response]
-    Z = of.K + 1j * w * of.D - w**2 * of.M
-    J_f, J_r = of.J[forces], of.J[responses]
-    X = np.linalg.solve(Z, np.broadcast_to(J_f.T, (len(omega), *J_f.T.shape)))
-    H = J_r @ X
-    found = np.empty((len(changes), len(omega), len(f)), dtype=complex)
-    if changes:
-        Y = np.linalg.solve(Z.swapaxes(1, 2), np.broadcast_to(J_r.T, (len(omega), *J_r.T.shape))).swapaxes(1, 2)
-        for k, change in enumerate(changes):
-            dX = change.K @ X + 1j * w * (change.D @ X) - w**2 * (change.M @ X)
-            dH = change.J[responses] @ X + Y @ change.J[forces].T - Y @ dX
-            found[k] = dH[:, r, f]
-    return np.asarray(H[:, r, f]), found
+    w, (M, K, D, J) = omega[:, None, None], unstacked(equations)
+    Z, f, r = K + 1j * w * D - w**2 * M, ends.force, ends.response
+    of_all = np.broadcast_to(J.T, (len(omega), *J.T.shape))
+    X = np.linalg.solve(Z, of_all)
+    H: ComplexArray = np.asarray((J @ X)[:, r, f], dtype=complex)
+    slopes = np.empty((len(changes), *H.shape), dtype=complex)
+    if len(changes):
+        Y = np.linalg.solve(Z.swapaxes(1, 2), of_all).swapaxes(1, 2)
+        for k, (dM, dK, dD, dJ) in enumerate(map(unstacked, changes)):
+            dX = dK @ X + 1j * w * (dD @ X) - w**2 * (dM @ X)
+            slopes[k] = (dJ @ X + Y @ dJ.T - Y @ dX)[:, r, f]
+    return H, slopes
 
 
 class PoseModel:
-    """Makes `PoseEquations` of a robot in the pose of a test, with the same coordinates for all parameters.
+    """Makes the equations of a robot in the pose of a test, with the same coordinates for all parameters.
 
     `initial`: the pose; None: the start of the scene. `motors`: "locked", they stand still, or "free".
     """
@@ -116,8 +84,8 @@ class PoseModel:
         self._free: Array | None = None
         self._rest: Array | None = None  # the first equilibrium
 
-    def at(self, robot: Solution) -> PoseEquations:
-        """The equations of a robot about its equilibrium. Raises `InputError` for points, `SolveError` without one."""
+    def at(self, robot: Solution) -> Array:
+        """The `stacked` equations about the equilibrium. Raises `InputError` for points, `SolveError` without one."""
         if self._initial is not None:
             change = {"initial": self._initial, "trajectory": ()}
             robot = with_scene(robot, robot.scene.model_copy(update=change))
@@ -130,5 +98,5 @@ class PoseModel:
             self._rest = rest
             self._free = free_coordinates(linear, COMPLIANT).N if self._motors == "locked" else np.eye(len(linear.M))
         N, d = self._free, len(SPACES[robot.model.scene.space].translations)
-        J = np.array([row.axis[:d] @ linear.points[row.point][:d] for row in self.ends.rows])
-        return PoseEquations(N.T @ linear.M @ N, N.T @ linear.K @ N, N.T @ linear.D @ N, J @ N)
+        J = np.array([np.array(row.axis[:d]) @ linear.points[row.point][:d] for row in self.ends.rows])
+        return stacked(N.T @ linear.M @ N, N.T @ linear.K @ N, N.T @ linear.D @ N, J @ N)

@@ -64,17 +64,17 @@ class ResponseTests(Record):
 
 
 class Direction(NamedTuple):
-    """A point "BODY.POINT" and a direction (3,) of unit length in global axes."""
+    """A point "BODY.POINT" and a direction of unit length in global axes."""
 
     point: str
-    axis: Array
+    axis: tuple[float, float, float]
 
     @property
     def label(self) -> str:
         """The point and the axis, "fore.tip -z"; of an oblique one its components."""
-        k = int(np.abs(self.axis).argmax())
-        if abs(self.axis[k]) == 1.0:
-            return f"{self.point} {'-' * bool(self.axis[k] < 0)}{'xyz'[k]}"
+        for sign, value in (("", 1.0), ("-", -1.0)):
+            if value in self.axis:
+                return f"{self.point} {sign}{'xyz'[self.axis.index(value)]}"
         return f"{self.point} ({', '.join(f'{x:.3g}' for x in self.axis)})"
 
 
@@ -90,7 +90,7 @@ class Response:
     @property
     def is_direct(self) -> bool:
         """Whether it is where and along what the force is."""
-        return self.force.label == self.response.label
+        return self.force == self.response
 
     @property
     def label(self) -> str:
@@ -211,7 +211,8 @@ def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) ->
         raise InputError(f'{where}: expected POINT/x, POINT/-z, …, found "{shown(text)}"')
     if name not in points and "." not in name:
         raise InputError(f'{where}: points: expected the point of the robot for "{shown(name)}", found none')
-    return Direction(points.get(name, name), as_floats(sign * axes[:, "xyz".index(letter)]))
+    x, y, z = (sign * axes[:, "xyz".index(letter)]).tolist()
+    return Direction(points.get(name, name), (x, y, z))
 
 
 def _universal(path: Path) -> Iterator[Column]:

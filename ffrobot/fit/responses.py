@@ -18,7 +18,7 @@ from ..present.lines import print_table
 from ..run.solve import prepare_scene
 from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
 from .response_fit import PoseComparison, ResponseFit, fit_receptances
-from .response_model import PoseEquations, PoseModel
+from .response_model import PoseModel
 from .response_tests import read_tests
 
 UNSEEN = 0.5  # relative deviation of a parameter from which the tests hardly see it
@@ -67,7 +67,7 @@ def fit_responses(
         PoseModel(one, target.scene({}, one.test.pose).initial if one.test.pose else None, motors) for one in measured
     ]
 
-    def equations(values: Array) -> list[PoseEquations]:
+    def equations(values: Array) -> list[Array]:
         with varied.named(values):
             robot = prepare_scene(target.scene(varied.changes(values)))
             return [pose.at(robot) for pose in poses]

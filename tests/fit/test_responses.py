@@ -14,7 +14,7 @@ from scipy.io import savemat
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.fit.response_fit import fit_receptances
-from ffrobot.fit.response_model import PoseEquations
+from ffrobot.fit.response_model import stacked, unstacked
 from ffrobot.fit.response_tests import Direction, MeasuredPose, Response, ResponseTest, read_tests
 
 LINES = np.linspace(2.0, 60.0, 200)  # Hz
@@ -25,7 +25,7 @@ CHAIN_KEYS = ["k1", "k2", "k3", "c1", "c2", "c3", "m3"]
 def chain(values):
     """Three masses in a row."""
     of = [np.array([[a + b, -b, 0], [-b, b + c, -c], [0, -c, c]]) for a, b, c in (values[:3], values[3:6])]
-    return PoseEquations(np.diag([2.0, 1.5, values[6]]), *of, np.eye(3))
+    return stacked(np.diag([2.0, 1.5, values[6]]), *of, np.eye(3))
 
 
 def continued(values, w):
@@ -39,7 +39,7 @@ def continued(values, w):
 
 def measured(H, lines=LINES, coherence=np.nan, **keys):
     """FRFs (F, p) from the first point to all."""
-    places = [Direction(f"m{k}.p", np.eye(3)[0]) for k in range(H.shape[1])]
+    places = [Direction(f"m{k}.p", (1.0, 0.0, 0.0)) for k in range(H.shape[1])]
     test = ResponseTest.model_construct(name="chain", validation=False, averages=None, pose={}).model_copy(update=keys)
     known = np.full(len(lines), coherence)
     return MeasuredPose(test, lines, tuple(Response(places[0], p, h, known) for p, h in zip(places, H.T, strict=True)))
@@ -64,7 +64,7 @@ def test_three_masses_with_noise_are_within_three_deviations(averages):
 
 
 def block(k, d, m, J):
-    return PoseEquations(np.diag(m), np.diag(k), np.diag(d), np.array(J))
+    return stacked(np.diag(m), np.diag(k), np.diag(d), np.array(J))
 
 
 TOGETHER = r"k1 times c\S*, k2 times"
@@ -84,9 +84,9 @@ NOT_SEEN = {
 @pytest.mark.parametrize("case", NOT_SEEN)
 def test_parameters_that_tests_do_not_see_are_named(case):
     equations, truth, expected = NOT_SEEN[case]
-    of = equations(np.array(truth))
+    M, K, D, J = unstacked(equations(np.array(truth)))
     w = 2 * np.pi * LINES[:, None, None]
-    H = of.J @ np.linalg.inv(of.K + 1j * w * of.D - w**2 * of.M) @ of.J.T
+    H = J @ np.linalg.inv(K + 1j * w * D - w**2 * M) @ J.T
     with pytest.raises(InputError, match=f"measured FRFs .*{expected}"):
         fit_receptances(lambda x: [equations(x)], ["k1", "k2"], 1.1 * np.array(truth), [measured(H[:, :, 0])])
 

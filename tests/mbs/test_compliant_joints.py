@@ -10,6 +10,7 @@ from rods import rod
 
 from ffrobot.actuation.control.linear_model import robot_modes, state_space
 from ffrobot.common.errors import InputError
+from ffrobot.common.rotations import skew
 from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.inversion.motors_only import MotorsOnly
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
@@ -19,6 +20,8 @@ from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.quantities.supply import gear_moment, gear_motions, motor_motion
 from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
+from ffrobot.run.solve import solve_scene
+from ffrobot.scene.load import make_scene
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
 MOTOR, LINK = J * N**2, M * L**2 / 3
@@ -161,6 +164,27 @@ def test_equilibrium_winds_the_gears():
     expected = [gear_motions(about.motion)[joint].moment[0] for joint in "OA"]
     np.testing.assert_allclose(mechanism.force[along], expected, rtol=1e-9)
     assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
+
+
+def test_base_on_six_springs():
+    """Three slides and three hinges in a row: the compliance of a point off them is J diag(1/k) Jᵀ."""
+    k, bodies, joints, side = np.array([2e7, 3e7, 5e7, 4e5, 6e5, 8e5]), [], [], "ground"
+    r = np.array([0.1, 0.2, 0.5])
+    for number, stiffness in enumerate(k):
+        points = {"o": [0.0, 0.0, 0.0], "top": r.tolist()}
+        rigid = {"mass": 1.0, "inertia": [0.01] * 3, "center": [0.0] * 3, "points": points}
+        bodies.append({"name": f"b{number}", "rigid": rigid})
+        kind = "revolute" if number > 2 else "prismatic"
+        keys = {"axis": np.eye(3)[number % 3].tolist(), "rotor_inertia": 1e-6, "stiffness": float(stiffness)}
+        joints.append({"name": f"j{number}", "type": kind, "between": [side, f"b{number}.o"]} | keys)
+        side = f"b{number}.o"
+    rest = {"name": "rest", "kind": "static", "points": ["b5.top"]}
+    scene = make_scene(name="base", space="spatial", gravity=[0.0] * 3, body=bodies, joint=joints, analysis=[rest])
+    details = solve_scene(scene).outcomes["rest"].details
+    J = np.block([[np.eye(3), -skew(r)], [np.zeros((3, 3)), np.eye(3)]])
+    expected = J @ np.diag(1 / k) @ J.T
+    compliance = details.conditions[0]["compliant"].compliance["b5.top"]
+    np.testing.assert_allclose(compliance, expected, atol=1e-12 * expected.max())
 
 
 @pytest.mark.parametrize(
