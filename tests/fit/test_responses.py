@@ -6,7 +6,6 @@ import tomllib
 
 import numpy as np
 import pytest
-import pyuff
 import tomli_w
 from rigid_chain import ARM, TOOL, receptance, scene
 from scipy.io import savemat
@@ -148,6 +147,7 @@ def test_six_poses_of_nine_frfs_with_ten_parameters_take_twenty_seconds(tmp_path
 
 
 def universal(path, H, lines, ends, kind=12, **keys):
+    pyuff = pytest.importorskip("pyuff")
     data = {
         "type": 58, "func_type": 4, "load_case_id": 0, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": kind,
         "orddenom_spec_data_type": 13, "binary": 0, "abscissa_axis_lab": "Frequency", "id1": "hammer",
