@@ -23,7 +23,7 @@ from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.posture import natural_sizes, robot_size, row_sizes, with_rates
+from ..posture.posture import joint_scales, natural_sizes, robot_size, row_sizes, with_rates
 from ..posture.start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
@@ -62,15 +62,10 @@ def hanging_joints(model: Model, start: State) -> Iterator[str]:
     """
     if model.scene.initial.state != "static":
         return
-    away, length = np.abs(start.q - undeformed_posture(model).q), robot_size(model)
-    moved = []
+    away, scales, moved = np.abs(start.q - undeformed_posture(model).q), joint_scales(model), []
     for node in model.tree.nodes:
-        units = node.joint.units or node.joint.guess_units
-        ways = np.array([length if unit == "m" else 1.0 for unit in units])
-        scales = (
-            node.joint.state(ways) if node.joint.units else np.append(ways, np.ones(node.joint.q_count - len(ways)))
-        )
-        if (away[node.q] / scales).max(initial=0.0) > AWAY:
+        sizes = np.append(scales[node.v], np.ones(node.joint.q_count - node.joint.freedoms))
+        if (away[node.q] / sizes).max(initial=0.0) > AWAY:
             moved.append(node.joint.name)
     if moved:
         yield (
