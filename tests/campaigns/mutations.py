@@ -147,13 +147,8 @@ class Campaign:
         label = f"{number}: {case.name}/{file.name}: {how}"
         names = ["scene.toml", *(f.name for f in case.files), "loop", "output"]
         if changed.name == "figures.toml":
-            others = [path.name for path in folder.glob("*.csv")]
-            self.command(
-                ["plot", "scene.results.h5", "--format", "png"],
-                folder,
-                label,
-                ["scene.results.h5", "figures.toml", *others],
-            )
+            named = [path.name for path in folder.iterdir()]
+            self.command(["plot", "scene.results.h5", "--format", "png"], folder, label, named)
             return
         (folder / "scene.results.h5").unlink()
         kind = self.command(["solve", "scene.toml"], folder, label, names)
