@@ -88,7 +88,8 @@ def main():
     with TemporaryDirectory() as caches:
         processes = [
             subprocess.Popen(
-                [tree / ".venv/bin/python", "-c", MEASURED], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                [tree / ".venv/bin/python", "-P", "-c", MEASURED], text=True,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 env=os.environ | {"XDG_CACHE_HOME": f"{caches}/{k}", "OMP_NUM_THREADS": "1"},
             )
             for k, tree in enumerate(asked.trees)
