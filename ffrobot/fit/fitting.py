@@ -100,9 +100,6 @@ def _beside(path: Path, output: Path | None) -> Path:
     return output or _fitted_name(path)
 
 
-ANALYSIS = {"name": "fit", "kind": "linear"}
-
-
 class RobotTarget:
     """The scene at `path`: vibrations about the equilibrium at t = 0, with `motors` "free" or "locked"."""
 
@@ -123,10 +120,13 @@ class RobotTarget:
             return value_of(self._scene, key)
         return value_of(self._tables, key[1:]) if len(key) > 2 else None
 
-    def scene(self, changes: Mapping[Key, float], initial: Mapping[str, object] | None = None) -> Scene:
-        """The scene with some values changed, and with other entries of [initial]. Raises `InputError`."""
+    def scene(self, changes: Mapping[Key, float], kind: str, initial: Mapping[str, object] | None = None) -> Scene:
+        """The scene with some values changed, one analysis of a `kind`, and other entries of [initial].
+
+        Raises `InputError`.
+        """
         files = run_files(self._path, changes, self._path.parent)
-        scene = files.scene | {"analysis": [ANALYSIS]}
+        scene = files.scene | {"analysis": [{"name": "fit", "kind": kind}]}
         if initial:
             scene["initial"] = scene.get("initial", {}) | initial
         tables = {path.name: link for path, link in files.links.items()}
@@ -138,7 +138,7 @@ class RobotTarget:
 
     def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
         """Frequencies (Hz) of the robot's vibrations, the lowest first, with some values changed; no families."""
-        solution = solve_scene(self.scene(changes), Watcher())
+        solution = solve_scene(self.scene(changes, "linear"), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
         free = robot_modes(model := details.models[0]).frequency

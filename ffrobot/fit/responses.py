@@ -63,13 +63,12 @@ def fit_responses(
     varied = VariedKeys(path, target, vary, output)
     varied.check_new(replace=force)
     measured = read_tests(Path(tests))
-    poses = [
-        PoseModel(one, target.scene({}, one.test.pose).initial if one.test.pose else None, motors) for one in measured
-    ]
+    starts = [target.scene({}, "static", one.test.pose).initial if one.test.pose else None for one in measured]
+    poses = [PoseModel(one, start, motors) for one, start in zip(measured, starts, strict=True)]
 
     def equations(values: Array) -> list[Array]:
         with varied.named(values):
-            robot = prepare_scene(target.scene(varied.changes(values)))
+            robot = prepare_scene(target.scene(varied.changes(values), "static"))
             return [pose.at(robot) for pose in poses]
 
     found = fit_receptances(equations, varied.names, varied.start, measured)

@@ -7,8 +7,10 @@ import tomllib
 import numpy as np
 import pytest
 import tomli_w
+from beam_links import beam_link, tube
 from rigid_chain import ARM, TOOL, receptance, scene
 from scipy.io import savemat
+from scipy.optimize import brentq
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -130,6 +132,37 @@ def test_arm_assembled_in_numpy_is_found_again(tmp_path):
     assert np.abs(fit.poses[1].frequency_error).max() < 1e-6
     joints = {joint["name"]: joint for joint in tomllib.loads((tmp_path / "arm.fitted.toml").read_text())["joint"]}
     assert joints["elbow"]["stiffness"] == pytest.approx(ARM[4].k, rel=1e-6)
+
+
+BEAM = """name = "beam"
+gravity = [0.0, 0.0]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "clamp", type = "weld", between = ["ground", "arm.root"] }]
+analysis = [{ name = "rest", kind = "static" }]
+"""
+
+
+def test_modulus_and_damping_of_a_link_from_the_modes_of_a_clamped_beam(tmp_path):
+    """4/(ρAL) Σ 1/(ω_k² − ω² + 2iζω_kω) at the tip, with 1 + cos λ cosh λ = 0; a robot without motors."""
+    E, rho, L, zeta = 70e9, 2700.0, 0.6, 0.006
+    area, inertia = np.pi * (0.02**2 - 0.016**2) / 4, np.pi * (0.02**4 - 0.016**4) / 64
+    guess = (np.arange(40) + 0.5) * np.pi
+    roots = np.array([brentq(lambda x: 1 / np.cosh(x) + np.cos(x), x - 0.6, x + 0.6) for x in guess])
+    modes = roots**2 * np.sqrt(E * inertia / (rho * area * L**4))
+    lines = np.linspace(20.0, 900.0, 300)
+    w = 2 * np.pi * lines[:, None]
+    H = (4 / (rho * area * L) / (modes**2 - w**2 + 2j * zeta * modes * w)).sum(axis=1)
+    pairs = zip(lines.tolist(), H.tolist(), strict=True)
+    rows = [f"{f!r},arm.tip/y,arm.tip/y,{h.real!r},{h.imag!r}" for f, h in pairs]
+    (tmp_path / "tip.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+    (tmp_path / "tests.toml").write_text(tomli_w.dumps({"test": [{"name": "tip", "file": "tip.csv", "unit": "m/N"}]}))
+    link = beam_link(L, tube(0.02, 0.016), 20, nu=None, name="arm", modes={"count": 6, "family": "in-plane-bending"})
+    link["material"] = {"youngs_modulus": 60e9, "density": rho}
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(link | {"damping": {"ratio": 0.004}}))
+    (tmp_path / "beam.toml").write_text(BEAM)
+    keys = ["links.arm.material.youngs_modulus", "links.arm.damping.ratio"]
+    fit = ffrobot.fit_responses(tmp_path / "beam.toml", tmp_path / "tests.toml", keys)
+    np.testing.assert_allclose(fit.value, [E, zeta], rtol=1e-4)  # elements and modes leave 1e-5
 
 
 @pytest.mark.slow
