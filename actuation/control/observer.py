@@ -38,6 +38,7 @@ from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
 HIDDEN = 1e-7  # of the largest singular value
+DECAYS = 1.0 - 1e-10  # eigenvalues of errors that die out; what no sensor sees is at 1, to round-off
 NAMED = 0.1  # of the largest entry of a vector of states
 
 
@@ -134,7 +135,8 @@ def kalman(
     Q[range(n, n + d), range(n, n + d)] = np.square(list(record.disturbance.values())) * T
     R = np.array([s.sensor.deviation(T) ** 2 + s.sensor.resolution**2 / 12 for s in read])
     a, c, q = A[np.ix_(unknown, unknown)], C[:, unknown], Q[np.ix_(unknown, unknown)]
-    states = [*model.state_names, *record.disturbance, *list(record.process)[:w]]
+    disturbed = [f"disturbance/{name}" for name in record.disturbance]
+    states = [*model.state_names, *disturbed, *list(record.process)[:w]]
     states += [f"filter {k}" for k in range(1, len(A_w) + 1)]
     P = _covariance(a, c, q, R, states)
     L = np.zeros((len(A), len(rows)))
@@ -145,14 +147,13 @@ def kalman(
     E[: len(estimated), :n] = model.C[model.outputs(estimated)]
     E[len(estimated) :, n : n + d] = np.eye(d)
     B = np.vstack([plant.B, np.zeros((len(A) - at, len(columns)))])
-    names = [*estimated, *(f"disturbance/{name}" for name in record.disturbance)]
-    return Observer(A, B, C, L, np.zeros_like(L), E, covariance, tuple(names))
+    return Observer(A, B, C, L, np.zeros_like(L), E, covariance, (*estimated, *disturbed))
 
 
 def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -> Array:
     """P of x − x̂⁻ in the steady state. Raises `InputError` where there is none."""
     try:
-        return riccati(A.T, C.T, Q, np.diag(R))
+        return riccati(A.T, C.T, Q, np.diag(R), DECAYS)
     except ValueError as error:
         unseen, still = hidden(A, C, states), hidden(A.T, Q, states)
         if not unseen and not still:
@@ -408,7 +409,7 @@ def make_observed(
         if (radius := schedule.radius) >= 1.0:
             raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")
     except InputError as error:
-        raise InputError(f"{robot.path}: observer: {error}") from None
+        raise InputError(f"{robot.path}: observer: {str(error).removeprefix(f'{robot.path}: controller: ')}") from None
     every = schedule.observers[0].estimates
     still = np.zeros((len(reference), len(every) - reference.shape[1]))
     inner = replace(

@@ -60,10 +60,10 @@ def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     return block[:n, :n], block[:n, n:] * scale
 
 
-def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
+def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Array:
     """X = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q, for which A − B K is stable; of filters with Aᵀ and Cᵀ in their place.
 
-    Raises `ValueError` where there is none.
+    Raises `ValueError` where there is none with eigenvalues of A − B K `within` that radius.
     """
     from scipy.linalg import LinAlgError, solve_discrete_are
 
@@ -76,7 +76,7 @@ def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
             raise ValueError(str(error)) from None
         X = found
     K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
-    if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < 1.0:
+    if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < within:
         raise ValueError("its solution is not stable")
     return as_floats((X + X.T) / 2)
 

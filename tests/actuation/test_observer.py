@@ -367,6 +367,12 @@ def test_sensors_are_outputs_of_linear_models():
         ({"sensor": [{"joint": "O"}], "observer": KALMAN}, "expected sensors with noise.*joint/O"),
         ({"observer": KALMAN}, "expected sensors with noise.*no sensor"),
         ({"sensor": [ENCODER | {"measure": "rate"}], "observer": KALMAN}, "they cannot see joint/O"),
+        ({"sensor": [ENCODER | {"high_pass": 1.0}], "observer": KALMAN}, "they cannot see joint/O"),
+        (
+            {"sensor": [ENCODER], "observer": KALMAN | {"disturbance": {"joint/O": 1.0, "force/w.rim/y": 1.0}}},
+            "they cannot see disturbance/joint/O, disturbance/force/w.rim/y",
+        ),
+        ({"sensor": [ENCODER], "observer": GAINS | {"outputs": ["joint/P"]}}, "observer: expected readings"),
         ({"sensor": [ENCODER], "observer": KALMAN | {"process": {"joint/P": 1.0}}}, 'expected an input .*"joint/P"'),
         ({"sensor": [ENCODER | {"delay": 0.4 * T}]}, "expected a multiple of the loop's sample_time"),
         ({"sensor": [ENCODER | {"sample_time": 2 * T}], "observer": KALMAN}, "read at every sample"),
