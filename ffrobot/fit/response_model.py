@@ -38,7 +38,7 @@ def unstacked(equations: Array) -> list[Array]:
     return np.split(equations, [f, 2 * f, 3 * f])
 
 
-class Ends(NamedTuple):
+class ResponseEnds(NamedTuple):
     """The rows of J, and the numbers (p,) of those of force and response of each FRF."""
 
     rows: list[Direction]
@@ -46,16 +46,16 @@ class Ends(NamedTuple):
     response: list[int]
 
 
-def ends_of(pose: MeasuredPose) -> Ends:
+def ends_of(pose: MeasuredPose) -> ResponseEnds:
     """Return the rows that the FRFs of a pose need, each once."""
     rows = list(dict.fromkeys(end for one in pose.responses for end in (one.force, one.response)))
-    return Ends(
+    return ResponseEnds(
         rows, [rows.index(one.force) for one in pose.responses], [rows.index(one.response) for one in pose.responses]
     )
 
 
 def receptance(
-    equations: Array, ends: Ends, omega: Array, changes: Sequence[Array] = ()
+    equations: Array, ends: ResponseEnds, omega: Array, changes: Sequence[Array] = ()
 ) -> tuple[ComplexArray, ComplexArray]:
     """H (F, p) at `omega` (F,), rad/s, and its derivatives (n, F, p) along the `changes` of the equations."""
     w, (M, K, D, J) = omega[:, None, None], unstacked(equations)

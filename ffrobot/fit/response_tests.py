@@ -79,7 +79,7 @@ class Direction(NamedTuple):
 
 
 @struct
-class Response:
+class MeasuredResponse:
     """A measured FRF as receptance, m/N, (F,) complex, of `response` by `force`; coherence (F,), NaN where unknown."""
 
     force: Direction
@@ -104,7 +104,7 @@ class MeasuredPose:
 
     test: ResponseTest
     frequency: Array
-    responses: tuple[Response, ...]
+    responses: tuple[MeasuredResponse, ...]
 
     @property
     def receptance(self) -> ComplexArray:
@@ -190,7 +190,7 @@ def _worst(coherence: Array) -> float:
     return float(coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()])
 
 
-def _response(test: ResponseTest, column: Column, inside: Booleans) -> Response:
+def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredResponse:
     where = f"{test.file}: {column.force} → {column.response}"
     order, factor = UNITS[test.unit] if test.unit else (column.order, 1.0)
     if test.unit is None and not column.is_si:
@@ -201,7 +201,7 @@ def _response(test: ResponseTest, column: Column, inside: Booleans) -> Response:
     force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
     receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order
     coherence = np.full(len(receptance), np.nan) if column.coherence is None else column.coherence[inside]
-    return Response(force, response, receptance, as_floats(coherence))
+    return MeasuredResponse(force, response, receptance, as_floats(coherence))
 
 
 def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) -> Direction:
@@ -239,7 +239,7 @@ def _universal(path: Path) -> Iterator[Column]:
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
         is_si = label in ("", "none", *LABELS[ORDERS[kind]])
         values = one["data"].astype(complex)
-        yield Column(force, response, as_floats(one["x"]), values, coherence.get(at), ORDERS[kind], is_si)
+        yield Column(force, response, as_floats(one["x"]), values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
 
 
 def _axis(path: Path, code: float) -> str:

@@ -11,7 +11,7 @@ from ..common.toml_files import load_toml
 from ..common.validation import Record, validate
 from ..mbs.fields.field_types import NotNegative, Positive, Quantity, Vector3
 from ..mbs.linear.joint_conditions import FreeCoordinates
-from .stability import Cutter, Limits, Tip, limit_depth, stability_limits
+from .stability import Cutter, StabilityLimits, Tip, limit_depth, stability_limits
 
 BELOW, ABOVE = 10.0, 1000.0  # the depth without lobes: where those of lobes are sought
 FEEDS = 12  # directions of feed within half a turn, beyond which forces are the same
@@ -86,7 +86,7 @@ def stable_depths(milling: Milling, free: FreeCoordinates, J: Array) -> dict[str
     tip = Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows)
     omega, G = tip.response()
     feeds, C = milling.feeds, milling.cutter.average
-    found: list[Limits] = [stability_limits(C, omega, axes @ G @ axes.T) for axes in feeds]
+    found: list[StabilityLimits] = [stability_limits(C, omega, axes @ G @ axes.T) for axes in feeds]
     depths = np.array([one.least for one in found])
     values_by_name = {
         "milling_depth": depths.min(),

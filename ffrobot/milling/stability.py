@@ -76,7 +76,7 @@ class Tip(NamedTuple):
         return as_floats(omega), np.tensordot(1.0 / (1j * omega[:, None] - poles), residues, axes=1)
 
 
-class Limits(NamedTuple):
+class StabilityLimits(NamedTuple):
     """Depths (F, k), m, at the edge of stability at frequencies `omega` (F,), rad/s; infinite where there is none.
 
     `phase` (F, k): ωτ between 0 and 2π there.
@@ -105,13 +105,13 @@ class Limits(NamedTuple):
         return found
 
 
-def stability_limits(C: Array, omega: Array, G: ComplexArray) -> Limits:
+def stability_limits(C: Array, omega: Array, G: ComplexArray) -> StabilityLimits:
     """Edges of stability for averaged forces `C` (d, d), N/m², from G (F, d, d), m/N, at `omega` (F,), rad/s."""
     nu = _continuous(_eigenvalues(C @ G))
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where(nu.real > 0.0, 0.5 / nu.real, np.inf)
         delayed = 1.0 - 1.0 / (depth * nu)  # exp(−iωτ)
-    return Limits(omega, as_floats(depth), as_floats(-np.angle(delayed) % (2 * np.pi)))
+    return StabilityLimits(omega, as_floats(depth), as_floats(-np.angle(delayed) % (2 * np.pi)))
 
 
 def _eigenvalues(A: ComplexArray) -> ComplexArray:

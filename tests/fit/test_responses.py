@@ -16,7 +16,7 @@ import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.fit.response_fit import fit_receptances
 from ffrobot.fit.response_model import stacked, unstacked
-from ffrobot.fit.response_tests import Direction, MeasuredPose, Response, ResponseTest, read_tests
+from ffrobot.fit.response_tests import Direction, MeasuredPose, MeasuredResponse, ResponseTest, read_tests
 
 LINES = np.linspace(2.0, 60.0, 200)  # Hz
 CHAIN = np.array([4e4, 3e4, 2e4, 8.0, 6.0, 4.0, 1.0])  # springs (N/m), dampers (N·s/m) from the wall on, last mass
@@ -43,7 +43,9 @@ def measured(H, lines=LINES, coherence=np.nan, **keys):
     places = [Direction(f"m{k}.p", (1.0, 0.0, 0.0)) for k in range(H.shape[1])]
     test = ResponseTest.model_construct(name="chain", validation=False, averages=None, pose={}).model_copy(update=keys)
     known = np.full(len(lines), coherence)
-    return MeasuredPose(test, lines, tuple(Response(places[0], p, h, known) for p, h in zip(places, H.T, strict=True)))
+    return MeasuredPose(
+        test, lines, tuple(MeasuredResponse(places[0], p, h, known) for p, h in zip(places, H.T, strict=True))
+    )
 
 
 @pytest.mark.parametrize("averages", [None, 50])
