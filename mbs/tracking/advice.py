@@ -17,7 +17,7 @@ from ..inversion.stable_inversion import invert
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from ..run.context import Context
 from .intervals import OUT_OF_REACH, settled, start_breaks
-from .path_error import Tolerance, rows_of_points, slopes_by_error
+from .path_error import Tolerance, forces_off_path, rows_of_points
 from .transition import Tracked, Transition
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
@@ -64,8 +64,8 @@ def bounds_of_zeros(
         y = np.concatenate([servo.scale * (inverted.curve(t) - rest), inverted.curve(t, 1)])
         B = np.linalg.solve(dynamics.M[0], asked.Phi_V) * unit
         off = np.zeros((3, 1, len(rows_of_points(servo))))
-        slopes = slopes_by_error(servo, np.array([t]), (rest[None], still, still), off)[:, 0, : len(rest)]
-        by_error = np.linalg.solve(dynamics.M[0], slopes)
+        slopes = forces_off_path(servo, np.array([t]), (rest[None], still, still), off)[1]
+        by_error = np.linalg.solve(dynamics.M[0], slopes[:, 0, : len(rest)])
         counts = (sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)
         for k in np.flatnonzero(counts):
             reach = float(np.abs(left[len(rest) :, k] @ B).sum())

@@ -63,21 +63,20 @@ def displaced_along(servo: Servo, error: PPoly) -> Servo:
     )
 
 
-def slopes_by_error(servo: Servo, times: Array, motion: Sequence[Array], off: Array) -> Array:
-    """Derivatives (3, T, n + torques, k) of (r, τ) by e, ė and ë; off (3, T, k) at `times` (T,), s.
+def forces_off_path(servo: Servo, times: Array, motion: Sequence[Array], off: Array) -> tuple[Array, Array]:
+    """(r, τ) (T, n + torques) with e, ė, ë `off` (3, T, k) at `times` (T,), s, and their slopes (3, T, n + torques, k).
 
-    Central differences, which are exact for ė and ë: forces are quadratic in rates, linear in accelerations.
+    By differences, which are exact for ë and off by about `NEAR` for e and ė.
     """
-    found, size = [], NEAR * robot_size(servo.model)
+    now = np.hstack(displaced_at(servo, times, off).forces(times, *motion))
+    slopes, size = np.zeros((3, *now.shape, off.shape[2])), NEAR * robot_size(servo.model)
     for order, step in enumerate((size, size / servo.end, size / servo.end**2)):
         for k in range(off.shape[2]):
-            sides = []
-            for side in (step, -step):
-                moved = off.copy()
-                moved[order, :, k] += side
-                sides.append(np.hstack(displaced_at(servo, times, moved).forces(times, *motion)))
-            found.append((sides[0] - sides[1]) / (2 * step))
-    return np.stack(found, axis=2).reshape(len(times), -1, 3, off.shape[2]).transpose(2, 0, 1, 3)
+            moved = off.copy()
+            moved[order, :, k] += step
+            there = displaced_at(servo, times, moved).forces(times, *motion)
+            slopes[order, :, :, k] = (np.hstack(there) - now) / step
+    return now, slopes
 
 
 def _targets(servo: Servo) -> list[TimeFunction]:

@@ -12,7 +12,7 @@ from ...common.structs import struct
 from ..inversion.collocation import GAUSS, Elimination, bernstein_integral, piecewise, stage_states
 from .curves import Curves, Unknowns
 from .interior_point import GAP, Minimum, Program, minimize
-from .path_error import displaced_at, slopes_by_error
+from .path_error import displaced_at, forces_off_path
 from .transition import RATE, Tracked, Transition
 
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
@@ -157,11 +157,12 @@ class Steps:
 
     def _iterate(self, x: Array, K: Array, found: Minimum) -> Iterate:
         """What `_at_breaks` puts together, and σ, which is kept."""
-        controls, y, lower = x[:, self.controls], x[:, self.y], x[:, self.y.stop : self.states.stop]
+        controls, lower = x[:, self.controls], x[:, self.y.stop : self.states.stop]
+        p, v = np.split(x[:, self.y], 2, axis=1)
         volts, errors = np.split(lower, [self.m * self.asked.order], axis=1)
         V, e = np.hstack([controls[:, : self.m], volts]), np.hstack([controls[:, self.m :], errors])
         self.sigma = float(x[0, -1]) if self.has_share else 1.0
-        return Iterate(*np.split(y, 2, axis=1), K, V, e, self.sigma, found)
+        return Iterate(p, v, K, V, e, self.sigma, found)
 
     def _z(self, x: Array) -> Array:
         """All z_k (N, width + controls) of x."""
@@ -179,10 +180,12 @@ class Steps:
         if self.errors.count:
             e_z = np.array([self.errors.by_z(GAUSS.c, order) for order in range(3)])
             off = np.einsum("oNskz,Nz->oNsk", e_z, z).reshape(3, len(times), -1)
-            slopes = slopes_by_error(driven, times, at, off)
+            now, slopes = forces_off_path(driven, times, at, off)
             by_error = (slopes.reshape(3, N, s, -1, self.errors.count) @ e_z).sum(axis=0)
             driven = displaced_at(driven, times, off)
-        forces = np.hstack(driven.forces(times, *at)).reshape(N, s, -1)
+        else:
+            now = np.hstack(driven.forces(times, *at))
+        forces = now.reshape(N, s, -1)
         by_z = np.zeros((*forces.shape, len(self.unit_z))) + by_error
         supplied = self.asked.Phi_V @ self.voltages.by_z(GAUSS.c)
         by_z[:, :, :n] -= supplied

@@ -24,7 +24,7 @@ from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.tracking.advice import bounds_of_zeros, price_of_tolerance
 from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
-from ffrobot.mbs.tracking.path_error import Tolerance, displaced_at, slopes_by_error
+from ffrobot.mbs.tracking.path_error import Tolerance, displaced_at, forces_off_path
 from ffrobot.mbs.tracking.problem import track
 from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
 from ffrobot.run.solve import prepare_scene, solve_scene
@@ -241,9 +241,9 @@ def test_slopes_by_path_errors():
     times, generator = np.linspace(0.05, 0.65, 5), np.random.default_rng(3)
     motion = [servo.mode_sizes * 1e-3 * generator.normal(size=(5, 4)) * 10.0**k for k in range(3)]
     off = np.zeros((3, 5, 2))
-    slopes = slopes_by_error(servo, times, motion, off)
+    before, slopes = forces_off_path(servo, times, motion, off)
     change = 1e-6 * generator.normal(size=off.shape) * np.array([1.0, 10.0, 100.0])[:, None, None]
-    before, after = (np.hstack(displaced_at(servo, times, of).forces(times, *motion)) for of in (off, change))
+    after = np.hstack(displaced_at(servo, times, change).forces(times, *motion))
     expected = np.einsum("otfk,otk->tf", slopes, change)
     assert np.abs(after - before - expected).max() < 1e-4 * np.abs(expected).max()
 
