@@ -29,7 +29,7 @@ THIRDS = np.linspace(0.0, 1.0, 4)
 OF_THIRDS = np.linalg.inv(np.array([[comb(3, k) * x**k * (1 - x) ** (3 - k) for k in range(4)] for x in THIRDS]))[:3]
 HALVES, OF_HALVES = np.concatenate([THIRDS, 1.0 + THIRDS]) / 2, np.kron(np.eye(2), OF_THIRDS)
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
-BEND = 1e-2  # of the square of ë in the effort, relative to its limit: it makes e unique
+BEND = 1e-5  # of the square of ë, relative to its limit, in the objective: it makes e unique, and smooth
 
 
 @struct
@@ -265,7 +265,7 @@ class Steps:
         for order in (0, max(1, self.voltages.curves.order)):
             others += self.voltages.squares(share * (weights.rate**order / weights.voltage) ** 2, order)
         if (allowed := self.asked.tolerance) is not None:
-            share = BEND * self.h[:, None] * GAUSS.end_once / whole
+            share = BEND / (self.unique if self.has_share else 1.0) * self.h[:, None] * GAUSS.end_once / whole
             others += self.errors.squares(share / allowed.acceleration**2, 2)
         others *= self.unit_z[:, None] * self.unit_z
         z = self._z(now)[..., None]
