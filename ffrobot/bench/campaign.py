@@ -7,7 +7,7 @@ import json
 import os
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,9 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from ..common.errors import InputError, check_known, quoted
 from ..common.files import check_folder, write_atomically
 from ..common.tables import as_csv
 from ..mbs import _core
-from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ..pictures.figures.plot import write_figure
 from ..pictures.figures.style import legend, line_style, new_axes, style
 from ..present.lines import print_table
@@ -28,12 +26,12 @@ from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .axes import measure_axes
 from .precision import (
-    INTEGRATORS,
     KINDS,
     TIGHTER,
     Point,
     ReferenceRun,
     Row,
+    Settings,
     find_analysis,
     find_reference,
     measure_points,
@@ -120,27 +118,6 @@ def _processor() -> str:
 Swept = tuple[ReferenceRun, list[Point]]
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings: names of integrators, tolerances, repetitions, time limit of a run (s)."""
-
-    integrators: Sequence[str]
-    tolerances: Sequence[float]
-    repeat: int
-    budget: float
-
-    def __post_init__(self) -> None:
-        for name in self.integrators:
-            check_known(name, INTEGRATORS, f"--integrators: expected some of {quoted(INTEGRATORS)}")
-        for tolerance in self.tolerances:
-            if not TIGHTEST_TOLERANCE <= tolerance < 1:
-                raise InputError(
-                    f"--tolerances: expected numbers from {TIGHTEST_TOLERANCE:g} to below 1, found {tolerance:g}"
-                )
-        if not self.integrators or not self.tolerances:
-            raise InputError("--integrators, --tolerances: expected one at least, found none")
-
-
 class Campaign:
     """Measures, writes below `folder` and prints to `console`."""
 
@@ -168,16 +145,7 @@ class Campaign:
         settings = self.settings
         tolerance = TIGHTER * min(settings.tolerances)
         reference = find_reference(scene, name, tolerance, settings.budget, self.display)
-        points = measure_points(
-            scene,
-            name,
-            reference,
-            settings.integrators,
-            settings.tolerances,
-            repeat=settings.repeat,
-            budget=settings.budget,
-            display=self.display,
-        )
+        points = measure_points(scene, name, reference, settings, self.display)
         rows = [point.row() for point in points]
         about = {"inputs": inputs_of(scene, reference.bodies), "analysis": name, "reference": reference.about()}
         self.keep("work-precision", rows, about, folder, f"{scene.name}, {name}: {reference.in_words}")

@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.errors import InputError, SolveError, did_you_mean, quoted
+from ..common.errors import InputError, SolveError, check_known, did_you_mean, quoted
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, Analysis, IntegratedAnalysis
 from ..results.file import Results
 from ..results.write import results_image
@@ -204,6 +204,27 @@ Row = dict[str, object]
 
 
 @dataclass(frozen=True)
+class Settings:
+    """Settings: names of integrators, tolerances, repetitions, time limit of a run (s)."""
+
+    integrators: Sequence[str]
+    tolerances: Sequence[float]
+    repeat: int
+    budget: float
+
+    def __post_init__(self) -> None:
+        for name in self.integrators:
+            check_known(name, INTEGRATORS, f"--integrators: expected some of {quoted(INTEGRATORS)}")
+        for tolerance in self.tolerances:
+            if not TIGHTEST_TOLERANCE <= tolerance < 1:
+                raise InputError(
+                    f"--tolerances: expected numbers from {TIGHTEST_TOLERANCE:g} to below 1, found {tolerance:g}"
+                )
+        if not self.integrators or not self.tolerances:
+            raise InputError("--integrators, --tolerances: expected one at least, found none")
+
+
+@dataclass(frozen=True)
 class ReferenceRun:
     """The run against which errors are measured.
 
@@ -285,35 +306,28 @@ def find_reference(scene: Scene, name: str, tolerance: float, budget: float, dis
 
 
 def measure_points(
-    scene: Scene,
-    name: str,
-    reference: ReferenceRun,
-    integrators: Sequence[str],
-    tolerances: Sequence[float],
-    repeat: int,
-    budget: float,
-    display: Watcher,
+    scene: Scene, name: str, reference: ReferenceRun, settings: Settings, display: Watcher
 ) -> list[Point]:
-    """Time every integrator at every tolerance, `repeat` times in turn, so that disturbances hit all equally.
+    """Time every integrator at every tolerance, repetitions in turn, so that disturbances affect all equally.
 
     What does not complete is kept with its status and tried once. An integrator that took a hundred times as long as
     the best one before it is not asked for tighter tolerances.
     """
     points: list[Point] = []
-    for integrator in integrators:
-        for tolerance in tolerances:
+    for integrator in settings.integrators:
+        for tolerance in settings.tolerances:
             if _is_hopeless(points, integrator, tolerance):
                 continue
             display.stage(f"{name}: {integrator} at {tolerance:.0e}")
-            first = run(at(scene, name, integrator, tolerance), name, budget, display)
+            first = run(at(scene, name, integrator, tolerance), name, settings.budget, display)
             points.append(
                 Point(integrator, tolerance, first, errors(first.histories, reference.histories), [first.seconds])
             )
-    for repetition in range(1, repeat):
+    for repetition in range(1, settings.repeat):
         for point in points:
             if point.first.completed:
                 display.stage(f"{name}: {point.integrator} at {point.tolerance:.0e}, repetition {repetition + 1}")
-                repeat_point(scene, name, point, budget, display)
+                repeat_point(scene, name, point, settings.budget, display)
     return points
 
 

@@ -60,8 +60,8 @@ def bench(
     agree on. Then the error of its mesh, of its number of modes and of time integration. Tables as CSV and JSON,
     figures as PNG and PDF.
     """
-    from ..bench.campaign import Campaign, Settings
-    from ..bench.precision import INTEGRATORS, TOLERANCES
+    from ..bench.campaign import Campaign
+    from ..bench.precision import INTEGRATORS, TOLERANCES, Settings
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import click
 
 from ffrobot.bench import OF_A_SCENE
-from ffrobot.bench.campaign import Settings
-from ffrobot.bench.precision import INTEGRATORS, TOLERANCES
+from ffrobot.bench.precision import INTEGRATORS, TOLERANCES, Settings
 from ffrobot.present.console import Display, summary_console
 
 from .source_tree import PARTS, PEER, SourceTree

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ffrobot.bench.precision import KINDS, Point, Row, find_reference, measure_points, repeat_point
+from ffrobot.bench.precision import KINDS, Point, Row, Settings, find_reference, measure_points, repeat_point
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
@@ -92,7 +92,7 @@ def _scene(scene: Scene, aim: Aim) -> Scene:
 def _rows(aim: Aim, scene: Scene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher) -> list[Row]:
     """The run that a user gets who asks for 1e-4, and the fastest of all whose measured error is that small."""
     reference = find_reference(scene, NAME, REFERENCE_TOLERANCE, budget, display)
-    points = measure_points(scene, NAME, reference, INTEGRATORS, TOLERANCES, 2, budget, display)
+    points = measure_points(scene, NAME, reference, Settings(INTEGRATORS, TOLERANCES, 2, budget), display)
     asked = next(point for point in points if (point.integrator, point.tolerance) == ("auto", ACCURACY))
     chosen = {"requested 1e-4": asked, "fastest within 1e-4": fastest(points, dict.fromkeys(aim.within, ACCURACY))}
     pairs: dict[str, list[tuple[float, float]]] = {label: [] for label in chosen}
