@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
@@ -47,7 +47,7 @@ from .margins import Feedback, lowest_frequency
 from .metrics import LoopMotion, last_change, place_of_tip
 from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
-from .records import SampledAnalysis, Sensor
+from .records import SampledAnalysis
 from .robot import (
     ControlledRobot,
     Setup,
@@ -172,10 +172,7 @@ class ClosedLoop(SampledAnalysis):
         self, context: ActuatedContext, plant: Model, robot: ControlledRobot
     ) -> tuple[tuple[Signal, ...], tuple[Signal, ...]]:
         """What sensors read, those that controllers need included, and what an observer estimates instead of these."""
-
-        def signals(sensors: Iterable[Sensor]) -> list[Signal]:
-            return [s for sensor in sensors for s in make_signals(plant, context, sensor, context.whole)]
-
+        signals = partial(make_signals, plant, context, whole=context.whole)
         own = signals(self.sensor)
         if self.observer is None:
             return merged(own, signals(needed_sensors(robot, self.controller))), ()
@@ -222,8 +219,8 @@ def loops_about(
     acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
     inner = cache(partial(find_feedback, acting, asked, readings))
     # Computed torque alone changes along the path; a user's function is asked in order
-    is_asked_in_order = any(isinstance(controller, PythonControl) for controller in asked)
-    changes = not is_asked_in_order and any(isinstance(controller, ComputedTorqueControl) for controller in asked)
+    kinds = {type(controller) for controller in asked}
+    changes = ComputedTorqueControl in kinds and PythonControl not in kinds
     latest = max(len(setup.times) - LONGEST, 0) if changes else 0
 
     def at(t: float, first: int) -> Feedback | None:

@@ -130,7 +130,7 @@ def make_linear_models(context: ActuatedContext, analysis: Linear, about: Operat
     mechanisms = [
         linearization.at(float(t), q, v, a) for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True)
     ]
-    signals = [signal for sensor in analysis.sensor for signal in make_signals(free, context, sensor, context.whole)]
+    signals = make_signals(free, context, analysis.sensor, context.whole)
     models = [
         state_space(one, voltages_at(free, one, context.patches), readings_at(free, one, signals)) for one in mechanisms
     ]

@@ -9,7 +9,7 @@ their way, and the filters of sensors, are states of the model; the first are kn
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import fields, replace
 
@@ -343,12 +343,6 @@ class Observed:
         )
 
 
-def signals_of(robot: ControlledRobot, context: ActuatedContext, sensors: Iterable[Sensor]) -> list[Signal]:
-    """Return what sensors read of a robot with whole links and gears that give."""
-    plant = with_compliance(robot.model)
-    return [signal for sensor in sensors for signal in make_signals(plant, context, sensor)]
-
-
 def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, signals: Sequence[Signal]) -> LinearModel:
     """Return the linear model of a filter about output `row` of the robot's motion; the readings `signals` are outputs.
 
@@ -370,7 +364,8 @@ def kalman_filters(
     Raises `InputError` as `kalman` does.
     """
     robot, source, T = setup.robot, setup.source, setup.sample_time
-    read, estimated = (signals_of(robot, context, of) for of in (sensors, more))
+    plant = with_compliance(robot.model)
+    read, estimated = (make_signals(plant, context, of) for of in (sensors, more))
     wanted = merged(estimated, ())
     names, signals = [signal.name for signal in wanted], (*read, *wanted)
     at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)

@@ -22,6 +22,7 @@ from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.fields.field_types import Reference
 from ...mbs.linear.linearisation import LinearEquations
+from ...mbs.model.gears import with_compliance
 from ...mbs.run.record import Details, Run
 from ...mbs.run.replay import motor_forces_of
 from ...mbs.scene.analysis import Surroundings
@@ -30,10 +31,10 @@ from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray
 from ..patches.records import PztLayout
 from .linear_model import LinearModel, state_space
-from .observer import kalman, model_of_filter, signals_of
+from .observer import kalman, model_of_filter
 from .records import EstimateRecord, Placement, Sensor
 from .robot import default_tip, whole_robot
-from .signals import Signal
+from .signals import Signal, make_signals
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
 CHUNK = 200  # sets whose voltages over the path are held in memory together
@@ -339,7 +340,8 @@ def _deviation(
     """
     key, robot = f"{context.model.scene.path}: placement.estimate", whole_robot(context, run)
     tip = Sensor(point=record.tip or default_tip(robot.model))
-    read, wanted = (signals_of(robot, context, of) for of in (record.sensor, (tip,)))
+    plant = with_compliance(robot.model)
+    read, wanted = (make_signals(plant, context, of) for of in (record.sensor, (tip,)))
     known = model_of_filter(record, robot, 0, [*read, *wanted])
     to_file = robot.model.tree.nodes[robot.model.tree.index[link.name]].body.modal_transform
     own = _patches(context, link.name).modes[link.layout.label].coordinates(to_file.T).T

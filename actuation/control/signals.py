@@ -130,15 +130,16 @@ def _places_in_q(tree: KinematicTree) -> Indices:
 
 
 def make_signals(
-    model: Model,
-    context: ActuatedContext,
-    sensor: Sensor,
-    whole: WholeLinks | None = None,
-) -> Iterator[Signal]:
-    """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones.
+    model: Model, context: ActuatedContext, sensors: Iterable[Sensor], whole: WholeLinks | None = None
+) -> list[Signal]:
+    """The readings of sensors of the scene, of whose links some are in pieces where there are `whole` ones.
 
     Raises `InputError` for a joint without coordinates in the tree, and for strain where the link has no such point.
     """
+    return [signal for sensor in sensors for signal in _of_sensor(model, context, sensor, whole)]
+
+
+def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: WholeLinks | None) -> Iterator[Signal]:
     ending = "" if sensor.measure == "value" else f"/{sensor.measure}"
     if sensor.joint is not None:
         check_joint(model, sensor.joint)
