@@ -71,6 +71,9 @@ class LqrControl:
             ) from None
         self.bandwidth = _bandwidth(model.A, discrete.A - discrete.B @ self.K, setup.sample_time)
         self.values, self.rates, differences = _estimates(record, setup, model)
+        unread = [name for name, row in zip(model.state_names, self.values, strict=False) if not row.any()]
+        if unread:
+            self.warnings += (f"LQR: no sensor reads {', '.join(unread)}, taken for 0: an observer estimates them",)
         self.differences = differences / setup.sample_time
         self.reference, self.f = setup.reference, model.freedom
         self.x = np.zeros(len(discrete.A))

@@ -510,6 +510,17 @@ def test_lqr_names_the_modes_out_of_reach():
     lines = solve_scene(scene).outcomes["loop"].details.warnings
     for word in ("uncontrollable", "unobservable"):
         assert any(word in line and f"({frequency:.4g} Hz)" in line for line in lines), lines
+    assert any("no sensor reads joint/P" in line for line in lines), lines
+
+
+@pytest.mark.parametrize(("sensor", "unread"), [("pzt", ["LQR: no sensor reads modal/link/2"]), ("ideal", [])])
+def test_lqr_names_what_no_sensor_reads(sensor, unread):
+    """One patch tells one mode of two."""
+    control = {"kind": "lqr", "modes": 2, "sensor": sensor}
+    patch = {"count": 1, "allocation": "least-squares"}
+    scene = held_link(paper_link(count=3), loop(sample_time=1e-3, controller=[control]), end=5e-3, pzt=patch)
+    lines = solve_scene(scene).outcomes["loop"].details.warnings
+    assert [line.partition(",")[0] for line in lines if "no sensor reads" in line] == unread
 
 
 def test_a_patch_reads_the_charge_of_its_bending():
