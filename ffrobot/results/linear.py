@@ -167,10 +167,12 @@ def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController,
     group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
     inputs, outputs = tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"])
     step = float((time[-1] - time[0]) / (len(time) - 1))
-    states = tuple(f"state/{k}" for k in range(1, group["A"].shape[1] + 1))
+    states = tuple(f"state/{k}" for k in range(1, group["A"].shape[-1] + 1))
+    times = group["time"][()] if "time" in group else time[:1]
+    along = (np.reshape(group[key], (len(times), *group[key].shape[-2:])) for key in "ABCD")
     return tuple(
         SampledController(A, B, C, D, states, inputs, outputs, float(t), step)
-        for A, B, C, D, t in zip(*(group[key][()] for key in ("A", "B", "C", "D", "time")), strict=True)
+        for A, B, C, D, t in zip(*along, times, strict=True)
     )
 
 
@@ -212,9 +214,11 @@ def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
     group.attrs["advice"] = list(record.advice)
     if record.feedback:
         laws = list(record.feedback.values())
-        group["controller/time"] = list(record.feedback)
         for key in "ABCD":
-            group[f"controller/{key}"] = np.array([getattr(of, key) for of in laws])
+            every = np.array([getattr(of, key) for of in laws])
+            group[f"controller/{key}"] = every if len(laws) > 1 else every[0]
+        if len(laws) > 1:
+            group["controller/time"] = list(record.feedback)
         group["controller"].attrs.update(inputs=list(laws[0].outputs), outputs=list(laws[0].inputs))
     if record.poles is not None:
         _write_poles(group, _by_size(record.poles))
