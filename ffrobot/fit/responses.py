@@ -14,12 +14,13 @@ from ..common.errors import InputError
 from ..common.files import AnyPath
 from ..common.toml_files import load_toml
 from ..common.validation import check_texts
+from ..mbs.scene.mechanism import Initial
 from ..present.lines import print_table
 from ..run.solve import prepare_scene
 from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
 from .response_fit import PoseComparison, ResponseFit, fit_receptances
 from .response_model import PoseModel
-from .response_tests import read_tests
+from .response_tests import MeasuredPose, read_tests
 
 UNSEEN = 0.5  # relative deviation of a parameter from which the tests hardly see it
 POOR = 0.8  # FRAC of an FRF that the model hardly has
@@ -63,8 +64,7 @@ def fit_responses(
     varied = VariedKeys(path, target, vary, output)
     varied.check_new(replace=force)
     measured = read_tests(Path(tests))
-    starts = [target.scene({}, "static", one.test.pose).initial if one.test.pose else None for one in measured]
-    poses = [PoseModel(one, start, motors) for one, start in zip(measured, starts, strict=True)]
+    poses = [PoseModel(one, _start(Path(tests), target, one), motors) for one in measured]
 
     def equations(values: Array) -> list[Array]:
         with varied.named(values):
@@ -73,6 +73,16 @@ def fit_responses(
 
     found = fit_receptances(equations, varied.names, varied.start, measured)
     return replace(found, files=varied.write(found.value))
+
+
+def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | None:
+    """The [initial] of a pose; None for that of the scene. Raises `InputError` with the name of the test."""
+    if not pose.test.pose:
+        return None
+    try:
+        return target.scene({}, "static", pose.test.pose).initial
+    except InputError as error:
+        raise InputError(f'{tests}: test "{pose.test.name}": pose:\n{error}') from None
 
 
 def print_responses(fit: ResponseFit, console: Console) -> None:

@@ -263,6 +263,18 @@ def test_bad_tables_are_refused(tmp_path, rows, expected):
         read_tests(tmp_path / "tests.toml")
 
 
+def test_poses_and_points_that_the_robot_has_not(tmp_path):
+    files = robot_tests(tmp_path, ARM, lines=3)
+    text = files[1].read_text()
+    for wrong, expected in (
+        (text.replace("waist", "wast"), r'hammer.toml: test "pose 0": pose:\n.*found "wast" \(did you mean "waist"'),
+        (text.replace("body7.end", "body7.ned"), r'test "pose 0": expected one of .* found "body7.ned"'),
+    ):
+        files[1].write_text(wrong)
+        with pytest.raises(InputError, match=expected):
+            ffrobot.fit_responses(*files, ["joint.waist.stiffness"])
+
+
 def test_several_tests_need_poses(tmp_path):
     (tmp_path / "a.csv").write_text(HEADER + "5.0,1/x,1/x,1e-3,0.0,0.9\n")
     one = {"name": "one", "file": "a.csv", "unit": "g/N"}
