@@ -62,13 +62,14 @@ class Motion(NamedTuple):
 
 
 def within_limits(
-    asked: Transition, limits: Limits, breaks: Array, near: Tracked, *, tolerance: float, step: float
+    asked: Transition, limits: Limits, meshes: tuple[Array, Array], near: Tracked, *, tolerance: float, step: float
 ) -> Tracked:
     """The motion `asked` for behind its gears; its limits shrink by what exceeds `limits` between Gauss points.
 
-    Where that does not do, the motion that exceeds them least.
+    Where that does not do, the motion that exceeds them least. The breaks of the second, coarser one of the `meshes`
+    serve where those of the first have no solution.
     """
-    near, wanted = _without_jumps(asked, breaks, near, tolerance), replace(asked, limits=limits)
+    near, wanted = _without_jumps(asked, meshes, near, tolerance), replace(asked, limits=limits)
     found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
     for _ in range(MOST_SHRINKINGS):
         if near.converged:
@@ -92,12 +93,15 @@ def within_limits(
     return min(found, key=lambda one: one[0])[1]
 
 
-def _without_jumps(asked: Transition, breaks: Array, near: Tracked, tolerance: float) -> Tracked:
+def _without_jumps(asked: Transition, meshes: tuple[Array, Array], near: Tracked, tolerance: float) -> Tracked:
     """The optimum on intervals that are halved, all of them, while that leaves less on modes of a motion without jumps.
 
-    Splines swing where intervals are unlike, and where a zero passes through infinity finer ones do not help.
+    Splines swing where intervals are unlike, and where a zero passes through infinity finer ones do not help, or have
+    no solution.
     """
-    best = track(asked, breaks, near, within=NEAR_OPTIMUM)
+    best = track(asked, meshes[0], near, within=NEAR_OPTIMUM)
+    if not best.converged:
+        best = track(asked, meshes[1], within=NEAR_OPTIMUM)
     left = smooth(asked, best).unmet if best.converged else 0.0
     while left > tolerance and 2 * len(best.voltage.x) <= MOST_INTERVALS and asked.driven.goes_on():
         finer = track(asked, halved(best.voltage.x), best, within=NEAR_OPTIMUM)

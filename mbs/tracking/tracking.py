@@ -331,7 +331,8 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
     if asked.gears is None:
         tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
     else:
-        tracked = within_limits(asked, limits, breaks, least, tolerance=analysis.tolerance, step=analysis.output_step)
+        meshes = breaks, posed.coarse
+        tracked = within_limits(asked, limits, meshes, least, tolerance=analysis.tolerance, step=analysis.output_step)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = _causes(context, posed) or "loosen limits or tolerance"

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from patch_sets import amplifiers
 from test_tracking import arm, strip_scene
+from tracked_arms import random_arm
 
+import ffrobot
 from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium
 from ffrobot.mbs.model.model import modal_directions
@@ -184,3 +186,16 @@ def test_without_voltage_motors_alone_carry():
     off = moved.gears["O"].torque(at) - expected
     assert np.abs(off[1:]).max() < 1e-5
     assert abs(off[0]) < 2e-2  # where the fourth derivative of the path jumps, and that of p, a spline, does not
+
+
+@pytest.mark.nightly
+def test_finer_intervals_that_have_no_solution():
+    """Two links, six modes and six patches each, whose det M changes its sign twice: 64 intervals have none.
+
+    A smooth motion through the breaks of 32 is exact, since there are as many patches as modes.
+    """
+    tables = random_arm(np.random.default_rng([62, 2]), 0.0)[1]
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        wanted, found = (results[f"{name}/points/fore.tip/position"] for name in ("carried", "replay"))
+        assert results.attributes("carried/tracking")["unmet"] < 1e-12
+    assert np.abs(found - wanted).max() < 1e-7
