@@ -162,10 +162,10 @@ def check_within_reach(asked: Transition, linear: Linearisation, bounds: Bounds 
     )
 
 
-def price_of_tolerance(asked: Transition, least: Tracked) -> float:
-    """V/m, by how much less the least voltage is for a larger path tolerance; NaN without one."""
+def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
+    """V/m, by how much less the least voltage is for a larger path tolerance; None without one."""
     if asked.tolerance is None:
-        return float("nan")
+        return None
     prices = least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2
     return float(prices * asked.units.max())
 

@@ -188,8 +188,8 @@ class TrackedPath(AroundPath):
     unmet: float  # see `Tracked`
     bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
     prices: Mapping[str, Mapping[str, Array]]  # `Tracked.prices` by kind, then by body, of torques by joint
-    path_tolerance: float  # m, by which coordinates of points may be off their path
-    tolerance_price: float  # V/m, by how much less the least voltage is for a larger path tolerance; NaN without one
+    path_tolerance: float | None  # m, by which coordinates of points may be off their path
+    tolerance_price: float | None  # V/m, by how much less the least voltage is for a larger path tolerance
     # m or rad, how far off the path the same torques alone are at most; NaN where not found
     without_patches: float = float("nan")
     is_needed: bool = True  # whether that is more than the tolerance times the path's way
@@ -390,7 +390,7 @@ def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> Trac
     off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, of_links).values())
     inside = run.time[(run.time >= 0.0) & (run.time <= analysis.end)]
     way = max(float(np.ptp(target.sample(inside)[0])) for row in around.held.rows if (target := row.target))
-    permitted = max(analysis.tolerance * way, ALLOWED * around.path_tolerance)
+    permitted = max(analysis.tolerance * way, ALLOWED * (around.path_tolerance or 0.0))
     return replace(around, without_patches=off, is_needed=off > permitted)
 
 
@@ -423,7 +423,7 @@ def _around(context: Context, posed: _Posed, tracked: Tracked, least: Tracked, o
         held=posed.servo.model,
         unmet=tracked.unmet,
         bounds=posed.bounds,
-        path_tolerance=posed.asked.allowed,
+        path_tolerance=posed.asked.allowed or None,
         tolerance_price=price_of_tolerance(posed.asked, least),
         prices={
             kind: context.model.by_motor(of)
