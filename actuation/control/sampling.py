@@ -51,13 +51,17 @@ def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bo
 
 
 def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
-    """e^{A T} and ∫ e^{A s} ds B over T."""
-    from scipy.linalg import expm
+    """e^{A T} and ∫ e^{A s} ds B over T: units of states and commands do not decide on the powers that expm takes."""
+    from scipy.linalg import expm, matrix_balance
 
     n, m = B.shape
-    scale = float(np.abs(B).max(initial=0.0)) or 1.0  # of inputs: the unit of a command must not decide on the powers
-    block = expm(np.block([[A, B / scale], [np.zeros((m, n + m))]]) * T)
-    return block[:n, :n], block[:n, n:] * scale
+    size = np.ones((n, 1))
+    if n:
+        size[:, 0] = matrix_balance(A, permute=False, separate=True)[1][0]  # powers of 2
+    B = B / size
+    scale = float(np.abs(B).max(initial=0.0)) or 1.0
+    block = expm(np.block([[A / size * size.T, B / scale], [np.zeros((m, n + m))]]) * T)
+    return size * block[:n, :n] / size.T, size * block[:n, n:] * scale
 
 
 def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Array:

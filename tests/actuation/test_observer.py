@@ -50,6 +50,21 @@ def filter_of(model, **sampling):
     return kalman(record, model, read, model.output_names[2:], (model.input_names, T, sampling.get("delay", 0.0)))
 
 
+def test_samples_do_not_depend_on_the_units_of_states():
+    """Modes of 0, 60 and 2200 Hz in closed form, told by one angle (rad) and two m√kg of a robot of 10 µm."""
+    shapes, T, unit = np.array([[1.0, 1, 1], [1, -2, 1], [1, 0.5, -3]]), 2e-3, np.array([1.0, 1e-12, 1e-12] * 2)
+    A, expected = np.zeros((6, 6)), np.zeros((6, 6))
+    for k, omega in enumerate([0.0, 375.0, 14e3]):
+        along, rate = np.outer(shapes[:, k], np.linalg.inv(shapes)[k]), omega * np.sqrt(1 - 0.01**2)
+        c, s = np.cos(rate * T) + 0.01 * omega * T * np.sinc(rate * T / np.pi), T * np.sinc(rate * T / np.pi)
+        moved = np.exp(-0.01 * omega * T) * np.array([[c, s], [-(omega**2) * s, c - 0.02 * omega * s]])
+        A += np.kron([[0.0, 1.0], [-(omega**2), -0.02 * omega]], along)
+        expected += np.kron(moved, along)
+    Phi, _ = zero_order_hold(unit[:, None] * A / unit, unit[:, None], T)
+    for row, right in zip(Phi * unit / unit[:, None], expected, strict=True):
+        np.testing.assert_allclose(row, right, rtol=0.0, atol=1e-12 * np.abs(right).max())
+
+
 def test_riccati_of_one_state_in_closed_form():
     a, q, r = 1.1, 0.3, 0.02
     half = ((a * a - 1) * r + q) / 2
