@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .fe_models.modal_body_file import read_modal_body
     from .fit.fitting import fit_measured
-    from .fit.responses import fit_responses
+    from .fit.frf import fit_responses
     from .results.file import Results
     from .run.watcher import Watcher
     from .scene.load import load_scene, make_scene
@@ -42,7 +42,7 @@ _NAMES = {
     ".fe_models.modal_body": ("ModalBody",),
     ".fe_models.modal_body_file": ("read_modal_body",),
     ".fit.fitting": ("fit_measured",),
-    ".fit.responses": ("fit_responses",),
+    ".fit.frf": ("fit_responses",),
     ".results.file": ("Results",),
     ".run.watcher": ("Watcher",),
     ".scene.load": ("load_scene", "make_scene"),

@@ -59,8 +59,8 @@ def fit(
 
         print_fit(fit_measured(file, measured, keys, output, motors=motors, force=force), console)
     else:
-        from ..fit.response_picture import draw_responses
-        from ..fit.responses import fit_responses, print_responses
+        from ..fit.frf import fit_responses, print_responses
+        from ..fit.frf_picture import draw_responses
 
         fitted = fit_responses(file, table, keys, output, motors=motors or "locked", force=force)
         print_responses(fitted, console)

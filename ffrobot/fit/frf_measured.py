@@ -1,7 +1,6 @@
-"""Measured frequency response functions (FRFs): a TOML file of tests, whose tables are UFF 58, CSV or MAT files."""
+"""Measured frequency response functions (FRFs) of a robot, in poses: the TOML file of tests, in SI units and axes."""
 
-import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -9,15 +8,15 @@ import numpy as np
 from pydantic import Field
 
 from ..common.arrays import Array, Booleans, ComplexArray, as_floats
-from ..common.errors import InputError, check_known, quoted
-from ..common.extras import extras
+from ..common.errors import InputError, quoted
 from ..common.rotations import of_rpy
 from ..common.structs import struct
-from ..common.tables import parse_csv, shown
-from ..common.toml_files import load_toml, read_text
+from ..common.tables import shown
+from ..common.toml_files import load_toml
 from ..common.validation import InputFile, Record, validate
 from ..mbs.fields.field_types import NotNegative, PointReference, Positive
 from ..mbs.joints.joint import Angles
+from .frf_files import Column, read_columns
 
 G = 9.80665  # m/s²
 UNITS = {
@@ -27,10 +26,6 @@ UNITS = {
 """Order of the time derivative that was measured (receptance 0, mobility 1, accelerance 2), and factor to SI."""
 Unit = Literal["m/N", "mm/N", "µm/N", "m/s/N", "mm/s/N", "m/s²/N", "g/N"]
 FLOOR = 1e-3  # relative deviation that no FRF is better known than
-COLUMNS = ("frequency", "force", "response", "real", "imaginary", "coherence")
-FRF, COHERENCE = 4, 6  # function types of UFF 58
-FORCE, ORDERS = 13, {8: 0, 11: 1, 12: 2}  # data types of UFF 58: what is measured per force
-LABELS = {0: ("m",), 1: ("m/s",), 2: ("m/s^2", "m/s2", "m/s²", "m/s**2")}  # of its units, where they are SI
 
 
 class ResponseTest(Record):
@@ -134,26 +129,8 @@ def read_tests(path: Path) -> list[MeasuredPose]:
     return [_read(path, test) for test in tests]
 
 
-class Column(NamedTuple):
-    """An FRF as a file has it, with texts of its ends, "POINT/-x"."""
-
-    force: str
-    response: str
-    frequency: Array
-    values: ComplexArray
-    coherence: Array | None
-    order: int | None = None  # of the time derivative, where the file has it
-    is_si: bool = False
-
-
 def _read(path: Path, test: ResponseTest) -> MeasuredPose:
-    readers = {".uff": _universal, ".unv": _universal, ".58": _universal, ".csv": _of_csv, ".mat": _of_mat}
-    suffix = test.file.suffix.lower()
-    if suffix not in readers:
-        raise InputError(f'{test.file}: expected a file with {quoted(readers)}, found "{test.file.name}"')
-    columns = list(readers[suffix](test.file))
-    if not columns:
-        raise InputError(f"{test.file}: expected frequency response functions (type 4 of dataset 58), found none")
+    columns = read_columns(test.file)
     frequency = columns[0].frequency
     low, high = test.band or (-np.inf, np.inf)
     inside = (frequency >= low) & (frequency <= high)
@@ -213,78 +190,3 @@ def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) ->
         raise InputError(f'{where}: points: expected the point of the robot for "{shown(name)}", found none')
     x, y, z = (sign * axes[:, "xyz".index(letter)]).tolist()
     return Direction(points.get(name, name), (x, y, z))
-
-
-def _universal(path: Path) -> Iterator[Column]:
-    """FRFs of datasets 58 with the coherence of the same ends; other functions are left out."""
-    with extras():
-        import pyuff
-    try:
-        data = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:  # whatever pyuff finds in a file that is none
-        raise InputError(f"{path}: expected a universal file that pyuff reads, found: {error}") from None
-    sets = [one for one in (data if isinstance(data, list) else [data]) if one.get("type") == 58]
-    ends = [(one["ref_node"], one["ref_dir"], one["rsp_node"], one["rsp_dir"]) for one in sets]
-    coherence = {at: one["data"].real for at, one in zip(ends, sets, strict=True) if one["func_type"] == COHERENCE}
-    for at, one in zip(ends, sets, strict=True):
-        if one["func_type"] != FRF:
-            continue
-        kind, by = one["ordinate_spec_data_type"], one["orddenom_spec_data_type"]
-        if kind not in ORDERS or by != FORCE:
-            raise InputError(
-                f"{path}: node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per"
-                f" force (13), found types {kind} and {by}"
-            )
-        force, response = (f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:]))
-        label = str(one["ordinate_axis_units_lab"]).strip().lower()
-        is_si = label in ("", "none", *LABELS[ORDERS[kind]])
-        values = one["data"].astype(complex)
-        yield Column(force, response, as_floats(one["x"]), values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
-
-
-def _axis(path: Path, code: float) -> str:
-    if abs(code) not in (1, 2, 3):
-        raise InputError(f"{path}: expected translations along x, y, z (directions ±1, ±2, ±3), found {code:g}")
-    return "-" * (code < 0) + "xyz"[int(abs(code)) - 1]
-
-
-def _of_csv(path: Path) -> Iterator[Column]:
-    """FRFs of a table with a line for each frequency of each function."""
-    try:
-        header, table = parse_csv(read_text(path, "table of FRFs"))
-        for name in header:
-            check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
-        cells = [dict(zip(header, row, strict=True)) for _, row in table]
-        ends = [(one["force"], one["response"]) for one in cells]
-        numbers = np.array(
-            [[float(one[name]) for name in COLUMNS if name in one and name not in ENDS] for one in cells]
-        )
-    except (csv.Error, ValueError, KeyError) as error:
-        raise InputError(f"{path}: expected a table with the columns {quoted(COLUMNS)}, found: {error}") from None
-    for force, response in dict.fromkeys(ends):
-        values = numbers[[at == (force, response) for at in ends]]
-        coherence = as_floats(values[:, 3]) if values.shape[1] > 3 else None
-        yield Column(force, response, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
-
-
-ENDS = ("force", "response")
-
-
-def _of_mat(path: Path) -> Iterator[Column]:
-    """FRFs of variables frequency (F,), H (F, p), force and response (p names), and perhaps coherence (F, p)."""
-    from scipy.io import loadmat
-
-    try:
-        data = loadmat(path, chars_as_strings=True)
-        frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
-        ends = [[str(np.ravel(one)[0]) for one in data[name].ravel()] for name in ENDS]
-        coherence = data["coherence"].astype(float) if "coherence" in data else None
-        shapes = {H.shape, (len(frequency), len(ends[0])), (len(frequency), len(ends[1]))}
-        if len(shapes) > 1 or (coherence is not None and coherence.shape != H.shape):
-            raise ValueError(f"H of shape {H.shape} for {len(frequency)} frequencies and {len(ends[0])} forces")
-    except (OSError, ValueError, KeyError, IndexError, NotImplementedError) as error:
-        raise InputError(
-            f"{path}: expected a .mat file with frequency, H, force and response, found: {error}"
-        ) from None
-    for k, (force, response) in enumerate(zip(*ends, strict=True)):
-        yield Column(force, response, as_floats(frequency), H[:, k], None if coherence is None else coherence[:, k])

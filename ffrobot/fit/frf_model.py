@@ -21,7 +21,7 @@ from ..mbs.scene.mechanism import Initial
 from ..mbs.scene.space import SPACES
 from ..run.prepare import with_scene
 from ..run.solution import Solution
-from .response_tests import Direction, MeasuredPose
+from .frf_measured import Direction, MeasuredPose
 
 Equations = Callable[[Array], Sequence[Array]]
 """`stacked` equations of all poses by the values (n,) of parameters, in the same coordinates for all of these."""

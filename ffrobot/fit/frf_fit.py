@@ -15,9 +15,9 @@ import numpy as np
 
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, SolveError
+from .frf_measured import MeasuredPose
+from .frf_model import Equations, ends_of, receptance, unstacked
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
-from .response_model import Equations, ends_of, receptance, unstacked
-from .response_tests import MeasuredPose
 
 STEP = 1e-4  # relative, for derivatives of the equations
 LINEAR = 1e-3  # relative: where the equations are off by more, their derivatives are made anew

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ..common.files import write_atomically
 from ..pictures.figures.style import SIZE, style
 from ..pictures.projection import COLORS
-from .response_fit import ResponseFit
+from .frf_fit import ResponseFit
 
 MOST_POSES, MOST_FRFS = 3, 3  # that are drawn, direct ones first
 
