@@ -19,7 +19,7 @@ SETTLED = 0.02  # change of the least share of voltages by finer intervals, rela
 CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
 LOST = 0.5  # of the largest elastic force: where more is left over between Gauss points, no motion is near
 OUT_OF_REACH = 5.0  # times the limits: more than so much voltage is not found to the end
-TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
+TURNING = 0.3  # of the largest voltage, or of the limit of ë: by so much one changes in intervals that are then halved
 
 
 def graded(start: float, end: float, intervals: int) -> Array:
@@ -65,9 +65,9 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
 
 
 def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tracked:
-    """The least voltage, on intervals that are halved where voltages turn until that changes it by at most `SETTLED`.
+    """The least voltage, on intervals that are halved where V or ë turns until that changes it by at most `SETTLED`.
 
-    V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
+    Both are linear on each interval: finer ones allow more of them, so that the least share falls. Where steps wander,
     more of the effort joins it, on intervals that are all halved. All that converge count, and the least one is taken;
     where much is `LOST` between Gauss points it is no motion and did not converge. Surely far beyond the limits it is
     not refined.
@@ -89,8 +89,7 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
     while tracked.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
         if asked.is_limited and tracked.surely > OUT_OF_REACH:
             break
-        steps = np.abs(np.diff(tracked.voltage(breaks) / asked.units, axis=0)).max(axis=1)
-        breaks = halved(breaks, steps > TURNING * tracked.share)
+        breaks = halved(breaks, _changes(asked, tracked) > TURNING * tracked.share)
         finer = track(asked, breaks, tracked, calm)
         if not finer.converged:  # from other voltages steps wander less
             finer = track(asked, breaks, None, calm)
@@ -100,3 +99,12 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
         change = abs(finer.share - tracked.share) / least
         tracked = replace(finer, doubt=2 * change + finer.added / least)
     return tracked, change <= SETTLED
+
+
+def _changes(asked: Transition, tracked: Tracked) -> Array:
+    """Largest changes (N,) of V in each interval as shares of limits, and of ë likewise, times the least share."""
+    breaks = tracked.voltage.x
+    values = [tracked.voltage(breaks) / asked.units]
+    if asked.tolerance is not None and tracked.error is not None:
+        values.append(tracked.share * tracked.error(breaks, 2) / asked.tolerance.acceleration)
+    return as_floats(np.abs(np.diff(np.hstack(values), axis=0)).max(axis=1))

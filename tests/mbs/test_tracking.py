@@ -299,6 +299,17 @@ def test_least_voltage_settles():
     assert found.doubt < 3 * SETTLED
 
 
+def test_least_voltage_within_a_path_tolerance_settles():
+    """On intervals that follow ë, too: an independent, far finer mesh lies within the doubt."""
+    servo, Phi_V = strip(2, 0.6)
+    problem = asked(servo, Phi_V, (0.0, 0.6), "least-voltage", 200.0)
+    problem = replace(problem, rate=SLOWEST, tolerance=Tolerance(3e-4))
+    found = settled(problem, graded(0.0, 0.6, 32), lambda: True)
+    fine = track(problem, graded(0.0, 0.6, 300), None, 1e-3)
+    assert found.converged
+    assert found.share * (1 - found.doubt) < fine.share < found.share
+
+
 def test_least_voltage_where_steps_wander():
     """T = 0.45 s within 2 N·m, which torques reach: from the first mesh's motion the steps on the next one wander."""
     servo, Phi_V = strip(4, 0.45)
