@@ -16,7 +16,7 @@ import numpy as np
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, SolveError
 from .frf_measured import MeasuredPose
-from .frf_model import Equations, ends_of, receptance, unstacked
+from .frf_model import Equations, receptance, unstacked
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
 
 STEP = 1e-4  # relative, for derivatives of the equations
@@ -88,7 +88,6 @@ class _Residuals:
         slopes: Sequence[Sequence[Array]],
     ) -> None:
         self._poses, self._center, self._equations, self.slopes = poses, center, equations, slopes
-        self._ends = [ends_of(pose) for pose in poses]
 
     def equations(self, x: Array) -> list[Array]:
         """The equations of all poses, linear in θ."""
@@ -98,9 +97,9 @@ class _Residuals:
     def at(self, x: Array, smoothing: Sequence[Array] = ()) -> tuple[Array, Array]:
         """Residuals (m,) and their derivatives (m, n) by x; with a `smoothing` of each pose of magnitudes alone."""
         values, slopes = [], []
-        poses = zip(self._poses, self.equations(x), self._ends, self.slopes, strict=True)
-        for (pose, of, ends, by), S in zip_longest(poses, smoothing):
-            H, dH = receptance(of, ends, _omega(pose), by)
+        poses = zip(self._poses, self.equations(x), self.slopes, strict=True)
+        for (pose, of, by), S in zip_longest(poses, smoothing):
+            H, dH = receptance(of, pose, by)
             off = np.log(H / pose.receptance) / pose.deviation
             by_x = (self._center * np.exp(x))[:, None, None] * dH / H / pose.deviation
             parts = (off.real, off.imag) if S is None else (S @ off.real,)
@@ -134,10 +133,6 @@ class _Residuals:
             gtol=None,
         )
         return as_floats(found.x)
-
-
-def _omega(pose: MeasuredPose) -> Array:
-    return as_floats(2 * np.pi * pose.frequency)
 
 
 def _smoothing(frequency: Array, width: float) -> Array:
@@ -199,9 +194,8 @@ def fit_receptances(
     r, J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))
     check_distinguishable(J, keys, "FRFs")
     deviation, correlation = uncertainty_of(J, r, known=all(pose.is_known for pose in fitted))
-    ends = [ends_of(pose) for pose in poses]
     before, after = (
-        [receptance(of, at, _omega(pose))[0] for of, at, pose in zip(equations(values), ends, poses, strict=True)]
+        [receptance(of, pose)[0] for of, pose in zip(equations(values), poses, strict=True)]
         for values in (start, theta)
     )
     return ResponseFit(

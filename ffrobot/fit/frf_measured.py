@@ -1,6 +1,7 @@
 """Measured frequency response functions (FRFs) of a robot, in poses: the TOML file of tests, in SI units and axes."""
 
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -93,6 +94,14 @@ class MeasuredResponse:
         return f"{self.force.label} → {self.response.label}"
 
 
+class Ends(NamedTuple):
+    """The directions of p FRFs, each once, and the numbers (p,) of those of force and response among them."""
+
+    directions: list[Direction]
+    force: list[int]
+    response: list[int]
+
+
 @struct
 class MeasuredPose:
     """The FRFs of one test at `frequency` (F,), Hz; `deviation` (F, p): relative standard deviation, or a weight."""
@@ -101,7 +110,20 @@ class MeasuredPose:
     frequency: Array
     responses: tuple[MeasuredResponse, ...]
 
-    @property
+    @cached_property
+    def omega(self) -> Array:
+        """Angular frequencies (F,), rad/s."""
+        return as_floats(2 * np.pi * self.frequency)
+
+    @cached_property
+    def ends(self) -> Ends:
+        """Where, and along what, forces act and responses are measured."""
+        pairs = [(one.force, one.response) for one in self.responses]
+        directions = list(dict.fromkeys(end for pair in pairs for end in pair))
+        force, response = ([directions.index(end) for end in ends] for ends in zip(*pairs, strict=True))
+        return Ends(directions, force, response)
+
+    @cached_property
     def receptance(self) -> ComplexArray:
         """(F, p) m/N."""
         return np.column_stack([one.receptance for one in self.responses])
@@ -111,7 +133,7 @@ class MeasuredPose:
         """Whether coherence and averages determine the deviations."""
         return self.test.averages is not None
 
-    @property
+    @cached_property
     def deviation(self) -> Array:
         """(F, p) of ln H: √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, 9.2); with unknown γ² all 1."""
         coherence = np.column_stack([one.coherence for one in self.responses])

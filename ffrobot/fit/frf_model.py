@@ -8,7 +8,6 @@ With Z = K + iωD − ω²M and rows J of the points' displacements, the recepta
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,14 +20,14 @@ from ..mbs.scene.mechanism import Initial
 from ..mbs.scene.space import SPACES
 from ..run.prepare import with_scene
 from ..run.solution import Solution
-from .frf_measured import Direction, MeasuredPose
+from .frf_measured import MeasuredPose
 
 Equations = Callable[[Array], Sequence[Array]]
 """`stacked` equations of all poses by the values (n,) of parameters, in the same coordinates for all of these."""
 
 
 def stacked(M: Array, K: Array, D: Array, J: Array) -> Array:
-    """One array (3 f + r, f), which adds and scales, of M, K, D (f, f) and rows J (r, f) of displacements."""
+    """One array (3 f + r, f), which adds and scales, of M, K, D (f, f) and rows J (r, f) of `MeasuredPose.ends`."""
     return np.vstack([M, K, D, J])
 
 
@@ -38,29 +37,13 @@ def unstacked(equations: Array) -> list[Array]:
     return np.split(equations, [f, 2 * f, 3 * f])
 
 
-class ResponseEnds(NamedTuple):
-    """The rows of J, and the numbers (p,) of those of force and response of each FRF."""
-
-    rows: list[Direction]
-    force: list[int]
-    response: list[int]
-
-
-def ends_of(pose: MeasuredPose) -> ResponseEnds:
-    """Return the rows that the FRFs of a pose need, each once."""
-    rows = list(dict.fromkeys(end for one in pose.responses for end in (one.force, one.response)))
-    return ResponseEnds(
-        rows, [rows.index(one.force) for one in pose.responses], [rows.index(one.response) for one in pose.responses]
-    )
-
-
 def receptance(
-    equations: Array, ends: ResponseEnds, omega: Array, changes: Sequence[Array] = ()
+    equations: Array, pose: MeasuredPose, changes: Sequence[Array] = ()
 ) -> tuple[ComplexArray, ComplexArray]:
-    """H (F, p) at `omega` (F,), rad/s, and its derivatives (n, F, p) along the `changes` of the equations."""
-    w, (M, K, D, J) = omega[:, None, None], unstacked(equations)
-    Z, f, r = K + 1j * w * D - w**2 * M, ends.force, ends.response
-    of_all = np.broadcast_to(J.T, (len(omega), *J.T.shape))
+    """H (F, p), m/N, where a pose was measured, and its derivatives (n, F, p) along `changes` of the equations."""
+    w, (M, K, D, J) = pose.omega[:, None, None], unstacked(equations)
+    Z, f, r = K + 1j * w * D - w**2 * M, pose.ends.force, pose.ends.response
+    of_all = np.broadcast_to(J.T, (len(w), *J.T.shape))
     X = np.linalg.solve(Z, of_all)
     H: ComplexArray = np.asarray((J @ X)[:, r, f], dtype=complex)
     slopes = np.empty((len(changes), *H.shape), dtype=complex)
@@ -80,7 +63,6 @@ class PoseModel:
 
     def __init__(self, pose: MeasuredPose, initial: Initial | None, motors: str) -> None:
         self.pose, self._initial, self._motors = pose, initial, motors
-        self.ends = ends_of(pose)
         self._free: Array | None = None
         self._rest: Array | None = None  # the first equilibrium
 
@@ -90,7 +72,7 @@ class PoseModel:
             change = {"initial": self._initial, "trajectory": ()}
             robot = with_scene(robot, robot.scene.model_copy(update=change))
         q = undeformed_posture(robot.model).q
-        first, *others = dict.fromkeys(row.point for row in self.ends.rows)
+        first, *others = dict.fromkeys(row.point for row in self.pose.ends.directions)
         for point in (first, *others):
             check_point(robot, point, f'test "{self.pose.test.name}"')
         linear, rest = PoseEvaluator(robot.model, q, first, others=others).linear_equations(q, self._rest)
@@ -98,5 +80,5 @@ class PoseModel:
             self._rest = rest
             self._free = free_coordinates(linear, COMPLIANT).N if self._motors == "locked" else np.eye(len(linear.M))
         N, d = self._free, len(SPACES[robot.model.scene.space].translations)
-        J = np.array([np.array(row.axis[:d]) @ linear.points[row.point][:d] for row in self.ends.rows])
+        J = np.array([np.array(row.axis[:d]) @ linear.points[row.point][:d] for row in self.pose.ends.directions])
         return stacked(N.T @ linear.M @ N, N.T @ linear.K @ N, N.T @ linear.D @ N, J @ N)
