@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..common.arrays import Array, Booleans, ComplexArray, as_floats
-from ..common.errors import InputError, quoted
+from ..common.errors import InputError, either, quoted
 from ..common.rotations import of_rpy
 from ..common.structs import struct
 from ..common.tables import shown
@@ -195,7 +195,8 @@ def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredR
     if test.unit is None and not column.is_si:
         raise InputError(f"{where}: expected the key unit of the test, one of {quoted(UNITS)}, found none")
     if order is None or column.order not in (None, order):
-        raise InputError(f'{where}: unit: expected that of derivative no. {column.order}, found "{test.unit}"')
+        units = either(unit for unit, (of, _) in UNITS.items() if of == column.order)
+        raise InputError(f'{where}: unit: expected that of the file, {units}, found "{test.unit}"')
     axes = of_rpy(*test.rpy)
     force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
     receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order

@@ -223,7 +223,7 @@ BAD = {
     "UFF of strains": ({"kind": 3}, {}, r"data types 8, 11, 12\) per force \(13\), found types 3 and 13"),
     "UFF of rotations": ({"axis": 4}, {}, "expected translations .*, found 4"),
     "UFF in g": ({"ordinate_axis_units_lab": "g"}, {}, "expected the key unit of the test"),
-    "another quantity": ({}, {"unit": "m/N"}, "unit: expected that of derivative no. 2"),
+    "another quantity": ({}, {"unit": "m/N"}, 'unit: expected that of the file, "m/s²/N" or "g/N", found "m/N"'),
     "an unknown unit": ({}, {"unit": "ft/s²/lbf"}, 'unit: expected "m/N"'),
     "frequency 0": ({"first": 0.0}, {}, "expected frequencies above 0 Hz, found 0: the key band"),
     "no frequency": ({}, {"band": [900.0, 950.0]}, "band: expected frequencies of the file within it"),
