@@ -1,5 +1,6 @@
 """A milling process from its file, and what it makes of one pose of a robot: `ffrobot map --milling`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -76,29 +77,38 @@ def read_milling(path: Path) -> Milling:
 def stable_depths(milling: Milling, free: FreeCoordinates, J: Array) -> dict[str, Array]:
     """Stable depths of a pose: with `free` coordinates and rows J (d, f) of the tip's translations along s.
 
-    `depth` m: without chatter at any speed, of the worst feed; `best_depth` of the `best_feed` (3,); `lobes` (S,) at
-    the speeds, of the worst feed.
+    `milling_depth` m: without chatter at any speed, of the worst feed; `milling_best_depth` m: of the best one,
+    `milling_feed` (3,). With speeds also `milling_lobes` (S,) m there: averaged forces take the worst feed of each
+    speed, semi-discretization that of `milling_depth`.
     """
-    values, V = np.linalg.eigh((free.K + free.K.T) / 2)
-    V = V[:, values < (2 * np.pi * milling.highest) ** 2]
-    rows = np.zeros((3, V.shape[1]))
-    rows[: len(J)] = J @ free.N @ V
-    tip = Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows)
+    tip, feeds = _tip(free, J, milling.highest), milling.feeds
     omega, G = tip.response()
-    feeds, C = milling.feeds, milling.cutter.average
-    found: list[StabilityLimits] = [stability_limits(C, omega, axes @ G @ axes.T) for axes in feeds]
-    depths = np.array([one.least for one in found])
-    values_by_name = {
+    limits = [stability_limits(milling.cutter.average, omega, axes @ G @ axes.T) for axes in feeds]
+    depths = np.array([one.least for one in limits])
+    values = {
         "milling_depth": depths.min(),
         "milling_best_depth": depths.max(),
         "milling_feed": feeds[depths.argmax(), 0],
     }
     if milling.speeds:
-        speed = np.array(milling.speeds) * 2 * np.pi / 60
-        values_by_name["milling_lobes"] = np.min([one.lobes(milling.teeth, speed) for one in found], axis=0)
-        least = float(depths.min())
-        if milling.method != "averaged" and np.isfinite(least):
-            worst, bounds = tip._replace(J=feeds[depths.argmin()] @ tip.J), (least / BELOW, least * ABOVE)
-            exact = [limit_depth(worst, milling.cutter, float(each), bounds) for each in speed]
-            values_by_name["milling_lobes"] = np.array(exact)
-    return {name: np.asarray(value, dtype=float) for name, value in values_by_name.items()}
+        worst = tip._replace(J=feeds[depths.argmin()] @ tip.J)
+        values["milling_lobes"] = _lobes(milling, limits, worst, float(depths.min()))
+    return {name: np.asarray(value, dtype=float) for name, value in values.items()}
+
+
+def _tip(free: FreeCoordinates, J: Array, highest: float) -> Tip:
+    """The modes up to `highest` Hz of the free coordinates, with the tip's translations (3, m)."""
+    values, V = np.linalg.eigh((free.K + free.K.T) / 2)
+    V = V[:, values < (2 * np.pi * highest) ** 2]
+    rows = np.zeros((3, V.shape[1]))
+    rows[: len(J)] = J @ free.N @ V
+    return Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows)
+
+
+def _lobes(milling: Milling, limits: Sequence[StabilityLimits], worst: Tip, least: float) -> Array:
+    """Stable depths (S,), m, at the speeds, by the `limits` of all feeds, or of the `worst` one, from `least` m on."""
+    speed = np.array(milling.speeds) * 2 * np.pi / 60
+    if milling.method == "averaged" or not np.isfinite(least):
+        return as_floats(np.min([one.lobes(milling.teeth, speed) for one in limits], axis=0))
+    bounds = least / BELOW, least * ABOVE
+    return np.array([limit_depth(worst, milling.cutter, float(each), bounds) for each in speed])

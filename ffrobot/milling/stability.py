@@ -143,9 +143,9 @@ def growth(tip: Tip, cutter: Cutter, depth: float, speed: float) -> float:
     fastest = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max()))
     steps = int(np.clip(fastest * pitch / speed / FINE, *STEPS))
     step, edges = pitch / speed / steps, np.linspace(0.0, pitch, steps + 1)
-    whole, size = np.eye(2 * m + 2 * steps), 2 * m + 2 * steps
+    size, angles = 2 * m + 2 * steps, pitch * np.arange(cutter.teeth)
+    whole = np.eye(size)
     for first, last in pairwise(edges):
-        angles = pitch * np.arange(cutter.teeth)
         C = depth * cutter.mean_forces(first + angles, last + angles).sum(axis=0)
         A = np.zeros((2 * m + 2, 2 * m + 2))
         A[:m, m : 2 * m], A[m : 2 * m, :m], A[m : 2 * m, m : 2 * m] = np.eye(m), J.T @ C @ J - K, -D
