@@ -25,6 +25,7 @@ MOST_TRIES = 6
 NEAR_END = 1e-3  # of the path's time, of its start and of its end, for derivatives there
 FAR = 0.1  # of the time constant of the slowest zero: t_ℓ of patches whose voltages need not converge with modes
 INVERTED = 1e-6  # tolerance of stable inversion
+SEEN = 1e-3  # of the limits: by less than that a tolerance saves, and gaps of quadratic programs hide its price
 
 
 @struct
@@ -163,11 +164,11 @@ def check_within_reach(asked: Transition, linear: Linearisation, bounds: Bounds 
 
 
 def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
-    """V/m, by how much less the least voltage is for a larger path tolerance; None without one."""
+    """V/m, by how much less the least voltage is for a larger path tolerance; None without one, or one too small."""
     if asked.tolerance is None:
         return None
-    prices = least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2
-    return float(prices * asked.units.max())
+    prices = float(least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2)
+    return None if least.share and prices * asked.allowed < SEEN else prices * float(asked.units.max())
 
 
 def slowest(zeros: ComplexArray) -> float:

@@ -233,6 +233,8 @@ def test_price_of_a_path_tolerance():
     assert price == pytest.approx(100.0 * (least[1].share - least[2].share) / 1e-5, rel=1e-2)
     exact = track(replace(problem, tolerance=None), breaks_of_the_notes(0.5), None, 1e-4)
     assert 100.0 * (exact.share - least[0].share) / 1e-4 == pytest.approx(259.7e3, rel=1e-2)
+    small = replace(problem, tolerance=Tolerance(1e-7))
+    assert price_of_tolerance(small, track(small, breaks_of_the_notes(0.5), None, 1e-3)) is None
 
 
 def test_slopes_by_path_errors():
