@@ -1,7 +1,7 @@
 """Motors and patches carry the robot along its path together, within their limits: `kind = "tracking"`.
 
 The problem, its discretization and its solver are in `mbs.tracking.problem`. First comes the least voltage with which
-patches can do it; where that is within their limits, the motion of least effort follows. What each zero asks for, and
+patches can do it; where that is within their limits, the motion of least effort follows. What each zero requires, and
 what would do beyond limits, is in `advice`; a simulation under torques alone shows whether patches are needed.
 """
 
@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
-from functools import cached_property
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -25,7 +24,7 @@ from ..fields.field_types import NotNegative, Positive
 from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along, where
 from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
-from ..inversion.zero_dynamics import Linearisation, equilibrium, linearise
+from ..inversion.zero_dynamics import equilibrium, linearise
 from ..model.amplifiers import joined
 from ..model.model import Model, modal_directions, path_errors
 from ..run.context import Context, PatchedLink
@@ -33,33 +32,18 @@ from ..run.integrators import Choice
 from ..run.record import Run, Statistics
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..scene.robustness import Robustness
-from .advice import (
-    Bounds,
-    bounds_of_zeros,
-    check_ends_for_gears,
-    check_within_reach,
-    enough_path_time,
-    enough_time,
-    enough_tolerance,
-    far_patches,
-    price_of_tolerance,
-    rough_ends,
-    singular_times,
-    slowest,
-)
+from .advice import Bounds, check_ends_for_gears, price_of_tolerance, slowest
 from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
-from .intervals import SETTLED, refined, settled, start_breaks
+from .intervals import refined, settled, start_breaks
 from .path_error import Tolerance, displaced_along, rows_of_points
-from .problem import track
+from .posed import Posed, causes, check_found, check_reach, is_beyond, needs_none, warnings_of
 from .transition import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights
 
 VOLT = 200.0  # V_ref where patches have no limits
 SNAP = 4.5  # power of time with which a path begins whose fourth derivative is zero there, at least
-ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
 AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
 RESERVE = 1e-9  # of the limits of voltages
-NONE = 1e-4  # of the limits: voltages that motors alone do without
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
 ALLOWED = 1.01  # of the path tolerance: what a replay may use of it
 REPLAYED = 1e-5  # tolerance of torques alone, at most
@@ -142,15 +126,15 @@ class Tracking(TimedAnalysis):
 
         try:
             posed = _pose(model, context.patches, self, progress)
-            _check_reach(posed, None)
+            check_reach(posed, None)
             least = settled(posed.asked, posed.coarse, progress)
-            _check_found(context, posed, least)
-            _check_reach(posed, least)
+            check_found(context, posed, least)
+            check_reach(posed, least)
             tracked, objective = _solve(context, posed, self, least)
             if objective == "least-voltage":  # without the effort's share
                 smoothed = 1.0 - least.surely / tracked.share if tracked.gears else 0.0
                 least = replace(tracked, doubt=max(least.doubt, smoothed))
-            texts = list(_warnings(context, posed, self, least))
+            texts = list(warnings_of(context, posed, self.intervals, least))
             shares = largest_shares(posed.asked, tracked) if tracked.gears else None
             texts += () if shares is None else torques_beyond(model, shares)
             if tracked.unmet > self.tolerance:
@@ -183,7 +167,7 @@ class TrackedPath(AroundPath):
     least_voltage: float  # V, the largest voltage that is needed at least, of the patch next to its limit
     least_voltage_doubt: float  # V, by how much a finer mesh may change it, estimated; infinite where it did not settle
     least_share: float  # the same as a share of the limits; NaN where no patch has any
-    objective: Objective  # what was made small, `effort` unless limits do not allow it
+    objective: Objective  # what was made small: voltage instead of what is asked beyond limits, or if none is needed
     cost: float  # the effort, without unit
     unmet: float  # see `Tracked`
     bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
@@ -195,26 +179,6 @@ class TrackedPath(AroundPath):
     is_needed: bool = True  # whether that is more than the tolerance times the path's way
 
 
-@struct
-class _Posed:
-    """What is asked for, on which breaks (s), `coarse` ones for a least voltage; time before and after the path (s)."""
-
-    servo: Servo
-    linear: Linearisation
-    around: tuple[float, float]
-    asked: Transition
-    breaks: Array
-    coarse: Array
-
-    @cached_property
-    def bounds(self) -> Bounds | None:
-        """What each zero requires, V; None where motors alone have no bounded motion."""
-        try:
-            return bounds_of_zeros(self.servo, self.asked, self.linear, self.around, self.asked.units)
-        except SolveError:
-            return None
-
-
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
     """Least voltage, V, and its uncertainty (see `TrackedPath`) for another model of the robot; NaN if not found."""
     posed = _pose(model, patches, analysis, lambda: True)
@@ -223,7 +187,7 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
     return voltage, least.doubt * voltage
 
 
-def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
+def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> Posed:
     """The problem of a path: its robot, limits, ends, and the first breaks. Raises as `Tracking.run`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
     servo = with_gears(make_servo(model, end, place, progress, 1.0, analysis.kind))
@@ -248,7 +212,7 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
         with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
         for k in (1, 2)
     )
-    return _Posed(servo, linear, around, asked, *meshes)
+    return Posed(servo, linear, around, asked, *meshes)
 
 
 def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
@@ -269,59 +233,10 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
     return Tolerance(error) if analysis.tolerance_time is None else Tolerance(error, analysis.tolerance_time)
 
 
-def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
-    """Raise `SolveError` where there is no least voltage: motors are too weak, or the path is too fast."""
-    if least.converged:
-        return
-    asked, limits = posed.asked, posed.asked.limits
-    if limits.patches.has_rates:
-        none = np.full_like(limits.patches.slew, np.inf)
-        free = replace(asked, limits=replace(limits, patches=replace(limits.patches, slew=none, current=none)))
-        if track(free, posed.breaks).converged:
-            raise SolveError(
-                f"{posed.servo.where}: no motion follows the path within the largest current and slew rate of the"
-                " amplifiers, whatever the voltages: slow the path down, or raise current or slew"
-            )
-    if np.isfinite(limits.torque).any():
-        free = replace(asked, limits=replace(limits, torque=np.full_like(limits.torque, np.inf)))
-        if track(free, posed.breaks).converged:
-            raise SolveError(
-                f"{posed.servo.where}: no motion follows the path within the motors' limits, whatever the voltages:"
-                " slow the path down, if torques at rest are within them, or raise moment_limit"
-            )
-    raise SolveError(
-        f"{posed.servo.where}: no motion of motors and patches was found: "
-        + (_causes(context, posed) or "slow the path down, or allow pre_actuation and post_actuation")
-    )
-
-
-def _causes(context: Context, posed: _Posed) -> str:
-    zeros = posed.linear.zeros[[0, -1]]
-    return "; ".join(
-        [
-            *singular_times(posed.linear),
-            *rough_ends(posed.servo.functions, posed.servo.end),
-            *far_patches(context, zeros),
-        ]
-    )
-
-
-def _is_beyond(posed: _Posed, least: Tracked) -> bool:
-    return least.share > 1.0 + ENOUGH and posed.asked.is_limited
-
-
-def _check_reach(posed: _Posed, least: Tracked | None) -> None:
-    """Raise `SolveError` where a zero, or the least voltage, surely needs far more than the limits."""
-    shares = [] if posed.bounds is None else (posed.bounds.voltages / posed.asked.units.max()).tolist()
-    shares += [] if least is None else [least.surely]
-    if posed.asked.is_limited:
-        check_within_reach(posed.asked, posed.linear, posed.bounds, max(shares, default=0.0))
-
-
-def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
-    """The motion of least effort or what else is wanted; of the least voltage where limits do not allow that."""
+def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
+    """The motion of least effort or what else is wanted; of the least voltage beyond limits, or if none is needed."""
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
-    if _is_beyond(posed, least) or (posed.asked.tolerance is not None and least.share < NONE):
+    if is_beyond(posed, least) or needs_none(posed, least):
         objective = "least-voltage"
     limits = posed.asked.limits  # torques reach beyond them between Gauss points, voltages by rounding
     within = replace(limits.patches, range=limits.patches.range * (1.0 - RESERVE))
@@ -335,39 +250,9 @@ def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) 
         tracked = within_limits(asked, limits, meshes, least, tolerance=analysis.tolerance, step=analysis.output_step)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
-        cure = _causes(context, posed) or "loosen limits or tolerance"
+        cure = causes(context, posed) or "loosen limits or tolerance"
         raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
     return tracked, objective
-
-
-def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
-    """Warnings: what would do where limits are too small, ends of the path and places of patches that cost voltage."""
-    if _is_beyond(posed, least):
-        given = posed.servo, posed.asked, analysis.intervals, posed.around, least.share
-        limits = np.unique(posed.asked.units)
-        would = [
-            f"{least.share * limits[0]:.3g} V instead of {limits[0]:g} V"
-            if len(limits) == 1
-            else f"{least.share:.3g} times their limits"
-        ]
-        if np.isfinite(more := enough_time(*given)):
-            would.append(f"{1e3 * more:.3g} ms more of pre_actuation and post_actuation")
-        if np.isfinite(longer := enough_path_time(*given)):
-            would.append(f"the same path in {longer:.3g} s")
-        relief = 0.0 if posed.bounds is None else float(posed.bounds.relief.max(initial=0.0)) / limits.max()
-        if np.isfinite(wider := enough_tolerance(*given, relief)):
-            would.append(f"{1e3 * wider:.3g} mm of path_tolerance")
-        yield f"patches cannot do it within their limits. Any of these would do: {'; '.join(would)}"
-    if least.doubt > 3 * SETTLED:
-        yield (
-            f"the least voltage, {least.share * posed.asked.units.max():.3g} V, did not settle on finer meshes: it may"
-            f" be {100 * least.doubt:.2g} % less. Fewer modes, or more intervals"
-            if np.isfinite(least.doubt)
-            else "the least voltage is that of the first intervals: finer ones had no solution. Fewer modes, or more"
-            " intervals"
-        )
-    yield from rough_ends(posed.servo.functions, posed.servo.end)
-    yield from far_patches(context, posed.linear.zeros[[0, -1]])
 
 
 def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> TrackedPath:
@@ -407,9 +292,9 @@ def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     return Weights(torque, voltage, rate if given.rate is None else given.rate)
 
 
-def _around(context: Context, posed: _Posed, tracked: Tracked, least: Tracked, objective: Objective) -> TrackedPath:
+def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, objective: Objective) -> TrackedPath:
     """The actuation of a path by the motion `tracked`."""
-    if posed.asked.tolerance is not None and least.share < NONE:
+    if needs_none(posed, least):
         least = replace(least, share=0.0)
     most = float(posed.asked.units.max())
     return TrackedPath(
