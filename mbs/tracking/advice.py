@@ -111,8 +111,7 @@ def enough_path_time(
         breaks = start_breaks(-around[0], slower.end, end, intervals // 2)
         return _share(servo, replace(asked, driven=slower, rest=rest), breaks)
 
-    orders = [order for order in path_orders(servo.functions, servo.end) if order > 1]
-    return float(servo.end * np.exp(_enough(share_with, share, min(orders, default=4.0))))
+    return float(servo.end * np.exp(_enough(share_with, share, _lower_order(servo))))
 
 
 def enough_tolerance(
@@ -129,7 +128,7 @@ def enough_tolerance(
 
     def share_with(more: float) -> float:
         wider = replace(given, error=given.error + more)
-        return float(np.exp(_share(servo, replace(asked, tolerance=wider), breaks) - 1.0))
+        return float(np.exp(_share(servo, replace(asked, tolerance=wider), breaks) - 1.0))  # its logarithm is linear
 
     return given.error + _enough(share_with, float(np.exp(share - 1.0)), relief)
 
@@ -137,7 +136,7 @@ def enough_tolerance(
 def check_within_reach(asked: Transition, linear: Linearisation, bounds: Bounds | None, share: float) -> None:
     """Raise `SolveError` where a lower bound of the least voltage exceeds the limits by the factor `share`.
 
-    What would do follows from how the bound of the zero falls: as e^{−s t}, and as T^−m.
+    What would do follows from how the bound of the zero falls: as e^{−s t}, as T^−m, linearly with a path tolerance.
     """
     if share <= OUT_OF_REACH:
         return
@@ -147,14 +146,13 @@ def check_within_reach(asked: Transition, linear: Linearisation, bounds: Bounds 
     if bounds is not None and len(bounds.voltages):
         rate = abs(float(bounds.zeros[0].real))
         found += f"; the zero at {bounds.zeros[0].real:.4g} 1/s alone requires {bounds.voltages[0]:.4g} V"
-    order = min((order for order in path_orders(servo.functions, servo.end) if order > 1), default=4.0)
     would = [f"{1e3 * np.log(share) / rate:.3g} ms more of pre_actuation and post_actuation"] if rate else []
     if bounds is not None and bounds.relief.any() and asked.gears is None:
         of_zeros = bounds.relief > 0.0
         error = float(((bounds.voltages - limit) / bounds.relief)[of_zeros].max()) + asked.allowed
         would.append(f"a path_tolerance of more than {1e3 * error:.3g} mm")
     would += [
-        f"the same path in {servo.end * share ** (1 / order):.3g} s instead of {servo.end:g} s",
+        f"the same path in {servo.end * share ** (1 / _lower_order(servo)):.3g} s instead of {servo.end:g} s",
         f"patches that bend the links {share:.3g} times as much per volt",
     ]
     raise SolveError(
@@ -206,6 +204,11 @@ def path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, flo
         size = np.sqrt(sum(target.sample(near)[2] ** 2 for target in targets))
         orders.append(2.0 + np.log2(size[1] / size[0]) if size[0] > 0 else np.inf)
     return float(orders[0]), float(orders[1])
+
+
+def _lower_order(servo: Servo) -> float:
+    """The power of time with which a path leaves its start or reaches its end, the lower one that is known; else 4."""
+    return min((order for order in path_orders(servo.functions, servo.end) if order > 1), default=4.0)
 
 
 def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
