@@ -83,12 +83,17 @@ def _of_csv(path: Path) -> Iterator[Column]:
         header, table = parse_csv(read_text(path, "table of FRFs"))
         for name in header:
             check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+        if missing := [name for name in COLUMNS[:-1] if name not in header]:
+            raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}, found no {quoted(missing)}")
+        for line, row in table:
+            if len(row) != len(header):
+                raise InputError(f"{path}: line {line}: expected {len(header)} cells, found {len(row)}")
         cells = [dict(zip(header, row, strict=True)) for _, row in table]
         ends = [(one["force"], one["response"]) for one in cells]
         numbers = np.array(
             [[float(one[name]) for name in COLUMNS if name in one and name not in ENDS] for one in cells]
         )
-    except (csv.Error, ValueError, KeyError) as error:
+    except (csv.Error, ValueError) as error:
         raise InputError(f"{path}: expected a table with the columns {quoted(COLUMNS)}, found: {error}") from None
     for force, response in dict.fromkeys(ends):
         values = numbers[[at == (force, response) for at in ends]]
@@ -103,12 +108,12 @@ def _of_mat(path: Path) -> Iterator[Column]:
     try:
         data = loadmat(path, chars_as_strings=True)
         frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
-        ends = [[str(np.ravel(one)[0]) for one in data[name].ravel()] for name in ENDS]
+        ends = [[str(np.ravel(one)[0]).strip() for one in data[name].ravel()] for name in ENDS]
         coherence = data["coherence"].astype(float) if "coherence" in data else None
         shapes = {H.shape, (len(frequency), len(ends[0])), (len(frequency), len(ends[1]))}
         if len(shapes) > 1 or (coherence is not None and coherence.shape != H.shape):
             raise ValueError(f"H of shape {H.shape} for {len(frequency)} frequencies and {len(ends[0])} forces")
-    except (OSError, ValueError, KeyError, IndexError, NotImplementedError) as error:
+    except Exception as error:  # whatever SciPy finds in a file that is none
         raise InputError(
             f"{path}: expected a .mat file with frequency, H, force and response, found: {error}"
         ) from None

@@ -174,6 +174,8 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
 def _check(where: str, column: Column, inside: Booleans) -> None:
     """Raise `InputError` for numbers that no FRF has."""
     at, values = column.frequency[inside], column.values[inside]
+    if not (np.diff(column.frequency) > 0.0).all():
+        raise InputError(f"{where}: expected each frequency once, in rising order, found others")
     if len(at) and not at.min() > 0.0:
         raise InputError(
             f"{where}: expected frequencies above 0 Hz, found {at.min():g}: the key band, such as [5.0, 200.0], leaves"
@@ -181,8 +183,9 @@ def _check(where: str, column: Column, inside: Booleans) -> None:
         )
     if not (np.isfinite(values).all() and np.abs(values).all()):
         raise InputError(f"{where}: expected finite values that are not 0, found others")
-    if column.coherence is not None and not ((column.coherence >= 0.0) & (column.coherence <= 1.0)).all():
-        raise InputError(f"{where}: coherence: expected values from 0 to 1, found {_worst(column.coherence):g}")
+    coherence = np.ones(1) if column.coherence is None else column.coherence[inside]
+    if not ((coherence >= 0.0) & (coherence <= 1.0)).all():
+        raise InputError(f"{where}: coherence: expected values from 0 to 1, found {_worst(coherence):g}")
 
 
 def _worst(coherence: Array) -> float:
