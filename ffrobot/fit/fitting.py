@@ -19,7 +19,7 @@ from rich.console import Console
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import locked_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
-from ..common.errors import FfrobotError, InputError
+from ..common.errors import FfrobotError, InputError, quoted
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import check_texts
@@ -233,7 +233,10 @@ class VariedKeys:
         """Raises `InputError` for keys without a number above 0."""
         self.target, self._place = target, None if output is None else Path(output)
         self._groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
-        self._starts = {key: _start(path, target, key) for group in self._groups for key in group}
+        keys = [key for group in self._groups for key in group]
+        if twice := {".".join(key) for key in keys if keys.count(key) > 1}:
+            raise InputError(f"--vary: expected each key once, found {quoted(sorted(twice))} again")
+        self._starts = {key: _start(path, target, key) for key in keys}
         self.names = ["=".join(".".join(key) for key in group) for group in self._groups]
         self.start = np.array([self._starts[group[0]] for group in self._groups])
 

@@ -24,6 +24,8 @@ LINEAR = 1e-3  # relative: where the equations are off by more, their derivative
 REACHED = 1e-9  # of ln θ: a last step
 FARTHEST = 1.5  # of ln θ at once
 MOST_PLACES = 30
+NO_EFFECT = 1e-9  # of a parameter at the start, against the largest: small damping has little there
+NO_MOTION = 1e-12  # of a measured FRF: the model has none
 STANDS_OUT = float(np.log(2.0))  # of peaks, in the logarithm of the magnitude
 SMOOTH = (0.3, 0.1, 0.03)  # of ln f: widths over which magnitudes are first compared, so that peaks find each other
 
@@ -157,6 +159,19 @@ def differentiated(equations: Equations, values: Array, place: Sequence[Array]) 
     return [list(of_pose) for of_pose in zip(*found, strict=True)]
 
 
+def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> list[ComplexArray]:
+    """The FRFs (F, p) of all poses. Raises `InputError` for one of directions in which the robot does not move."""
+    found = [receptance(of, pose)[0] for of, pose in zip(equations, poses, strict=True)]
+    for pose, H in zip(poses, found, strict=True):
+        for one, h in zip(pose.responses, H.T, strict=True):
+            if np.abs(h).max() <= NO_MOTION * np.abs(one.receptance).max():
+                raise InputError(
+                    f'test "{pose.test.name}": {one.label}: expected an FRF of directions in which the model moves,'
+                    " found one without motion in the model: leave it out"
+                )
+    return found
+
+
 def fit_receptances(
     equations: Equations, keys: Sequence[str], start: Array, poses: Sequence[MeasuredPose]
 ) -> ResponseFit:
@@ -177,9 +192,11 @@ def fit_receptances(
         found = equations(values)
         return [found[k] for k in used]
 
-    theta, place = as_floats(start), of_used(start)
+    before = _receptances(equations(start), poses)
+    theta, place, converged = as_floats(start), of_used(start), False
     slopes = differentiated(of_used, theta, place)
-    check_distinguishable(_Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))[1], keys, "FRFs")
+    J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))[1]
+    check_distinguishable(J, keys, "FRFs", least=NO_EFFECT)
     for width in (*SMOOTH, *[0.0] * MOST_PLACES):
         about = _Residuals(fitted, theta, place, slopes)
         x = about.least(width)
@@ -187,22 +204,18 @@ def fit_receptances(
         off = max(map(_distance, place, about.equations(x)))
         if off > LINEAR:
             slopes = differentiated(of_used, theta, place)
-        elif not width and np.abs(x).max() <= REACHED:
+        elif converged := not width and bool(np.abs(x).max() <= REACHED):
             break
-    else:
-        raise SolveError(f"fit: no convergence within {MOST_PLACES} places: start nearer to the measured FRFs")
     r, J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))
     check_distinguishable(J, keys, "FRFs")
+    if not converged:
+        raise SolveError(f"fit: no convergence within {MOST_PLACES} places: start nearer to the measured FRFs")
     deviation, correlation = uncertainty_of(J, r, known=all(pose.is_known for pose in fitted))
-    before, after = (
-        [receptance(of, pose)[0] for of, pose in zip(equations(values), poses, strict=True)]
-        for values in (start, theta)
-    )
     return ResponseFit(
         keys=tuple(keys),
         start=as_floats(start),
         value=theta,
         relative_deviation=deviation,
         correlation=correlation,
-        poses=tuple(map(PoseComparison, poses, before, after)),
+        poses=tuple(map(PoseComparison, poses, before, _receptances(equations(theta), poses))),
     )

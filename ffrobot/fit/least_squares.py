@@ -149,17 +149,23 @@ def fit_frequencies(
     )
 
 
-def check_distinguishable(J: Array, keys: Sequence[str], measured: str = "frequencies") -> None:
-    """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n), m ≥ n."""
+def check_distinguishable(
+    J: Array, keys: Sequence[str], measured: str = "frequencies", *, least: float = NO_EFFECT
+) -> None:
+    """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n), m ≥ n.
+
+    `least`: the effect of one, against the largest.
+    """
     _, values, V = np.linalg.svd(J, full_matrices=False)
     sizes = np.linalg.norm(J, axis=0)
-    for key, size in zip(keys, sizes, strict=True):
-        if size <= NO_EFFECT * sizes.max():
-            raise InputError(f"fit: expected keys on which the measured {measured} depend, found {key}: leave it out")
-    if values[-1] > NO_EFFECT * values[0]:
+    without = [key for key, size in zip(keys, sizes, strict=True) if size <= least * sizes.max()]
+    if not without and values[-1] > least * values[0]:
         return
     vector = V[-1] / V[-1][np.abs(V[-1]).argmax()]
     named = [(key, part) for key, part in zip(keys, vector, strict=True) if abs(part) > SHARE]
+    if without or len(named) == 1:
+        key = (*without, named[0][0])[0]
+        raise InputError(f"fit: expected keys on which the measured {measured} depend, found {key}: leave it out")
     change = ", ".join(f"{key} times c" + ("" if part > 1 - 1e-3 else f"^{part:.3g}") for key, part in named)
     raise InputError(
         f"fit: expected keys that the measured {measured} distinguish, found no change of these with {change}, for"

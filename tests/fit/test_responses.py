@@ -167,6 +167,46 @@ def test_modulus_and_damping_of_a_link_from_the_modes_of_a_clamped_beam(tmp_path
     np.testing.assert_allclose(fit.value, [E, zeta], rtol=1e-4)  # elements and modes leave 1e-5
 
 
+def arm_in_gravity(folder, stiffness, damping):
+    """A scene, and FRFs of J²/(k − m g c sin q − I ω² + iωd) with k (q − q₀) = −m g c cos q, k = 300 and d = 2."""
+    mass, center, inertia, length, lines = 8.0, 0.4, 0.3 + 8.0 * 0.4**2, 0.7, np.linspace(0.8, 8.0, 60)
+    torque, w, tests = mass * 9.81 * center, 2 * np.pi * lines, []
+    for k, start in enumerate((-1.1, 0.9)):
+        q = brentq(lambda q, start=start: 300.0 * (q - start) + torque * np.cos(q), start - 1.0, start + 0.1)
+        H = (length * np.cos(q)) ** 2 / (300.0 - torque * np.sin(q) - inertia * w**2 + 2j * w)
+        pairs = zip(lines.tolist(), H.tolist(), strict=True)
+        rows = [f"{f!r},arm.tip/y,arm.tip/-y,{-h.real!r},{-h.imag!r}" for f, h in pairs]
+        (folder / f"{k}.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+        tests.append({"name": f"{k}", "file": f"{k}.csv", "unit": "m/N", "pose": {"joints": {"a": start}}})
+    (folder / "tests.toml").write_text(tomli_w.dumps({"test": tests}))
+    points = {"root": [0.0, 0.0], "tip": [length, 0.0]}
+    rigid = {"mass": mass, "center": [center, 0.0], "inertia": 0.3, "points": points}
+    joint = {"name": "a", "type": "revolute", "between": ["ground", "arm.root"], "rotor_inertia": 1e-3}
+    scene = {
+        "name": "arm", "gravity": [0.0, -9.81], "analysis": [{"name": "rest", "kind": "static"}],
+        "body": [{"name": "arm", "rigid": rigid}], "joint": [joint | {"stiffness": stiffness, "damping": damping}],
+    }  # fmt: skip
+    (folder / "arm.toml").write_text(tomli_w.dumps(scene))
+    return folder / "arm.toml", folder / "tests.toml"
+
+
+@pytest.mark.parametrize("start", [(1e6, 1.0), (1e3, 1e-3), (1e3, 1e4)])
+def test_arm_in_gravity_from_far_starts(tmp_path, start):
+    """Small damping has hardly an effect at the start, and the whole effect at the peaks that are fitted."""
+    fit = ffrobot.fit_responses(*arm_in_gravity(tmp_path, *start), ["joint.a.stiffness", "joint.a.damping"])
+    np.testing.assert_allclose(fit.value, [300.0, 2.0], rtol=1e-6)
+
+
+def test_frfs_without_motion_and_keys_that_are_there_twice(tmp_path):
+    files = arm_in_gravity(tmp_path, 1e3, 1.0)
+    with pytest.raises(InputError, match=r'each key once, found "joint.a.stiffness" again'):
+        ffrobot.fit_responses(*files, ["joint.a.stiffness", "joint.a.damping=joint.a.stiffness"])
+    table = tmp_path / "0.csv"
+    table.write_text(table.read_text().replace("/y", "/z"))
+    with pytest.raises(InputError, match=r'test "0": arm.tip z → arm.tip -y: expected an FRF of directions'):
+        ffrobot.fit_responses(*files, ["joint.a.stiffness"])
+
+
 @pytest.mark.slow
 def test_six_poses_of_nine_frfs_with_ten_parameters_take_twenty_seconds(tmp_path):
     start = copy.deepcopy(ARM)
@@ -203,8 +243,8 @@ def test_files_of_three_kinds_have_the_same_frfs(tmp_path):
     H = continued(CHAIN, 2 * np.pi * lines)[:, :2] * -((2 * np.pi * lines[:, None]) ** 2)
     universal(tmp_path / "a.uff", H, lines, [((1, 3), (1, 3)), ((1, 3), (2, -1))])
     ends = {"force": ["1/z", "1/z"], "response": ["1/z", "2/-x"]}
-    cells = {name: np.array(texts, dtype=object) for name, texts in ends.items()}
-    savemat(tmp_path / "b.mat", {"frequency": lines, "H": H / 9.80665} | cells)
+    padded = {name: np.array(texts) for name, texts in ends.items()}  # with blanks, as char arrays have them
+    savemat(tmp_path / "b.mat", {"frequency": lines, "H": H / 9.80665} | padded)
     rows = [f"{f!r},1/z,{to},{h.real!r},{h.imag!r}" for to, of in zip(("1/z", "2/-x"), H.T, strict=True)
             for f, h in zip(lines.tolist(), of.tolist(), strict=True)]  # fmt: skip
     (tmp_path / "c.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
@@ -254,6 +294,8 @@ def test_bad_files_are_refused(tmp_path, case):
         ("5.0,1/x,1/x,0.0,0.0,0.9\n", "finite values that are not 0"),
         ("5.0,1/q,1/x,1e-3,0.0,0.9\n", 'expected POINT/x, POINT/-z, …, found "1/q"'),
         ("5.0,1/x,1/x,one,0.0,0.9\n", "expected a table with the columns"),
+        ("5.0,1/x,1/x,1e-3\n", "line 2: expected 6 cells, found 4"),
+        ("5.0,1/x,1/x,1e-3,0.0,0.9\n" * 2, "expected each frequency once, in rising order"),
     ],
 )
 def test_bad_tables_are_refused(tmp_path, rows, expected):
@@ -261,6 +303,22 @@ def test_bad_tables_are_refused(tmp_path, rows, expected):
     (tmp_path / "tests.toml").write_text(table(file="a.csv", unit="g/N"))
     with pytest.raises(InputError, match=expected):
         read_tests(tmp_path / "tests.toml")
+
+
+def test_tables_without_a_column_and_empty_files(tmp_path):
+    (tmp_path / "a.csv").write_text("frequency,force,response,real\n5.0,1/x,1/x,1e-3\n")
+    (tmp_path / "b.mat").write_bytes(b"")
+    for name, expected in (("a.csv", 'line 1: expected the columns .* found no "imaginary"'), ("b.mat", "a .mat file")):
+        (tmp_path / "tests.toml").write_text(table(file=name, unit="g/N"))
+        with pytest.raises(InputError, match=expected):
+            read_tests(tmp_path / "tests.toml")
+
+
+def test_coherence_outside_the_band_does_not_count(tmp_path):
+    (tmp_path / "a.csv").write_text(HEADER + "0.0,1/x,1/x,0.0,0.0,nan\n5.0,1/x,1/x,1e-3,0.0,0.9\n")
+    (tmp_path / "tests.toml").write_text(table(file="a.csv", unit="m/N", band=[2.0, 9.0], averages=5))
+    (pose,) = read_tests(tmp_path / "tests.toml")
+    np.testing.assert_allclose(pose.deviation, [[np.sqrt(0.1 / (2 * 5 * 0.9))]])
 
 
 def test_poses_and_points_that_the_robot_has_not(tmp_path):
