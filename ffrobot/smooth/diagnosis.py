@@ -12,7 +12,6 @@ from ..mbs.fields.paths import Piecewise
 from .recording import Fault, Limits, Recording, evened, faults_of_motion, faults_of_stamps, peaks
 from .robot import Modes, Ride, Robot, accelerations
 
-INSTANTS = 9  # postures along the motion whose frequencies are found
 KEPT = 3  # frequencies
 POINTS = 10  # set points in a period of the lowest frequency: fewer are coarse
 NEAR, PEAK = 0.1, 3.0  # of a frequency, and times the usual of the spectrum about it: the command oscillates there
@@ -116,8 +115,8 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
 
 
 def modes_along(robot: Robot, ride: Ride, *, of_links: bool = False) -> list[Modes]:
-    """Return modes at postures along the motion, the last one at its end."""
-    return [robot.modes(ride.q[k], of_links=of_links) for k in np.linspace(0, len(ride.q) - 1, INSTANTS).astype(int)]
+    """Return modes at postures along the motion, the last one at rest."""
+    return [robot.modes(q, of_links=of_links) for q in ride.postures]
 
 
 def _spectrum(path: Piecewise, frequencies: Array) -> Array:

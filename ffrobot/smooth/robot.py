@@ -38,6 +38,7 @@ SLACK = 1e-9  # of the largest stiffness: less is none
 UNKNOWN = 5.0  # Hz, where nothing vibrates
 FIRST = 1e-3  # s, of a run that finds the posture at the start
 FINE = 4000  # instants of motors' accelerations
+INSTANTS = 9  # postures along the motion whose frequencies are found
 
 
 def accelerations(path: Piecewise) -> tuple[Array, Array]:
@@ -75,7 +76,7 @@ class Ride:
         settling: of the point, by its distance from its final place since the last set point; its residual is that of
             the first period of the lowest vibration once the controllers have settled. None without a place of rest.
         times, off: (T,) s, and m between the point and its final place.
-        q: (T, n_q) states.
+        postures: (`INSTANTS`, n_q) evenly along the motion to the last set point; the last one is that of rest.
         torque: (n,) largest of each motor, N·m or N.
         sag: (2, n) by which joints are off their set points at rest, at the start and at the end, rad or m.
     """
@@ -83,7 +84,7 @@ class Ride:
     settling: Settling | None
     times: Array
     off: Array
-    q: Array
+    postures: Array
     torque: Array
     sag: Array
 
@@ -132,8 +133,10 @@ class Robot:
         found = self._solved(path, "motor", until + min(LAST * period, LONGEST), period / PER_PERIOD)
         run, rest, moments = found.run, commanded_rest(found.run), motor_moments(found.run)
         torque = np.array([np.abs(moments[joint]).max() if joint in moments else 0.0 for joint in self.joints])
+        postures = run.q[np.searchsorted(run.time, np.linspace(0.0, last, INSTANTS))]
         if rest is None:
-            return Ride(None, run.time, np.full(len(run.time), np.nan), run.q, torque, np.zeros((2, len(torque))))
+            return Ride(None, run.time, np.full(len(run.time), np.nan), postures, torque, np.zeros((2, len(torque))))
+        postures[-1] = rest.q
         rest = rest._replace(since=last)
         whole, soon = (
             settling(one, rest, [self.point], self.tolerance, rest.frequency)[self.point]
@@ -142,7 +145,7 @@ class Robot:
         still = replace(run, model=rest.model, q=rest.q[None], v=0 * run.v[:1])
         off = np.linalg.norm(section_motion(run, self.point).r - section_motion(still, self.point).r[0], axis=1)
         sag = np.vstack([self._coordinates(run)[:1] - command[0], self._coordinates(still) - command[-1]])
-        return Ride(replace(whole, residual=soon.residual), run.time, off, run.q, torque, sag)
+        return Ride(replace(whole, residual=soon.residual), run.time, off, postures, torque, sag)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
         """Set points (T', n) every `times[1]` s that make links follow `motion` at `times` (T,), and motors' torques.

@@ -65,6 +65,21 @@ def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected, ba
     assert "hub causes 100 %" in found.verdict
 
 
+def test_vibration_by_a_rail_depends_on_the_posture_of_rest(tmp_path):
+    """Through the lever m c cos θ of a body behind a gear, which swings by a tenth of its own angle."""
+    m, c, ends = 4.0, 0.5, np.array([0.3, 0.8])
+    arm = rigid("arm", m, [0.01, 0.2, 0.2], [c, 0.0, 0.0], tip=[1.0, 0.0, 0.0])
+    about, gear = 0.2 + m * c**2, {"stiffness": 3000.0, "damping": 0.5, "gear_ratio": 10.0, "rotor_inertia": 0.02}
+    rail = {"name": "rail", "type": "prismatic", "between": ["ground", "base.root"], "axis": Y, "motor": True}
+    bodies = [rigid("base", 1.0, [0.01] * 3, ORIGIN), arm]
+    path, law = written(tmp_path, scene(bodies, [rail, revolute("hub", "base.root", "arm.root", **gear)])), TIMES / 0.25
+    rows = np.outer(np.where(law < 1.0, law**2 * (3.0 - 2.0 * law), 1.0), ends)
+    before = smooth_motion(path, table(tmp_path / "path.csv", TIMES, rail=rows[:, 0], hub=rows[:, 1])).before
+    lever = m * c * np.cos(ends[1]) / about
+    assert before.residual > 0.1 * ends[1]
+    assert before.alone[0] / before.alone[1] == pytest.approx(lever * ends[0] / ends[1], rel=1e-3)
+
+
 def test_a_servo_follows_lines_exactly():
     """Step by step the same as the convolution of the command with the controller's own response."""
     servo, rng = Servo((axis_of(20.0, RATIO), axis_of(5.0, RATIO))), np.random.default_rng(0)
