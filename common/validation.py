@@ -171,7 +171,7 @@ def _merge(problems: Sequence[_Problem]) -> list[str]:
         if problem.expected not in alternatives:
             alternatives.append(problem.expected)
     return [
-        f"{key}: {' or '.join(texts).replace(' or expected ', ' or ')}{value}"
+        f"{key}{': ' * bool(key)}{' or '.join(texts).replace(' or expected ', ' or ')}{value}"
         for (key, value), texts in expected.items()
     ]
 

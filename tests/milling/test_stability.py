@@ -127,7 +127,7 @@ def test_depth_of_a_pose_does_not_depend_on_axes(tmp_path):
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
-        ({"exit": "45*deg"}, "expected 0 ≤ entry < exit ≤ π"),
+        ({"exit": "45*deg"}, r"cutter\.toml: expected 0 ≤ entry < exit ≤ π"),
         ({"teeth": 0}, "teeth"),
         ({"axis": [0.0, 0.0, 0.0]}, "an axis with a direction"),
         ({"feed": [0.0, 0.0, 1.0]}, "a feed across the axis"),
