@@ -1,6 +1,6 @@
 """Searches along gradients from one start; all rows of catalogs; differential evolution.
 
-What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of the responses.
+What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of objective and limits.
 
 A design that fails reads as far worse than the last one that did not, with its excesses: SLSQP's line search and
 trust-constr's radius then shorten the step towards that one.
@@ -30,7 +30,7 @@ DOWN = 0.05  # of the gradient since it was judged last: is judged again
 FAR = 1e-2  # violation up to which an optimizer is left to itself: limits that it follows are always exceeded a little
 NEARER = 0.9  # of the violation: much less
 PATIENCE = 4  # gradients without that: the violation itself is made less
-SHORTEST = 1e-6  # step of SLSQP, of a range: its line search refuses steps where a limit trades for the response
+SHORTEST = 1e-6  # step of SLSQP, of a range: its line search refuses steps where a limit trades for the objective
 ITERATIONS = 200
 FTOL = 1e-9  # of the objective, and of excesses
 GTOL, XTOL = 1e-7, 1e-9  # of trust-constr
@@ -250,9 +250,9 @@ def search_from(
 ) -> Local:
     """Search along gradients from one start, at first with unjudged gradients, then with judged ones.
 
-    What SLSQP then leaves, whose line search may come to nothing where a limit trades for the response almost linearly,
-    trust-constr goes on with. Where one ends beyond limits, the largest excess is made less until they are kept; where
-    that fails with judged gradients, the search ends.
+    What SLSQP then leaves, whose line search may come to nothing where a limit trades for the objective almost
+    linearly, trust-constr goes on with. Where one ends beyond limits, the largest excess is made less until they are
+    kept; where that fails with judged gradients, the search ends.
     """
     evaluations = differentiation.evaluations
     begun = len(evaluations.searched)

@@ -303,9 +303,7 @@ class Optimum(Finding):
             yield limit.text, _at(self.start, k + 1), _at(self.best, k + 1), self._state(k), cost
 
     def _state(self, k: int) -> str:
-        limit, value = self.problem.limits[k], self.limits[k]
-        excess = limit.sense * (value - limit.bound) / limit.scale
-        if excess > KEPT:
+        if (excess := self.problem.limits[k].excess(self.limits[k])) > KEPT:
             return f"exceeded by {100 * excess:.3g} %"
         return "active" if self.optimality is not None and np.isfinite(self.optimality.limits[k]) else "satisfied"
 

@@ -277,6 +277,10 @@ class Limit:
         """The scale of its excess: the bound; of 0 the response's unit."""
         return abs(self.bound) or 1.0
 
+    def excess(self, value: float) -> float:
+        """How far a value is beyond the limit, relative to `scale`; negative within it."""
+        return self.sense * (value - self.bound) / self.scale
+
 
 @dataclass(frozen=True)
 class DesignProblem:
@@ -305,11 +309,6 @@ class DesignProblem:
         _, slopes = self._logarithms(values)
         return as_floats(slopes * self._senses / self._sizes)
 
-    def excess(self, values: Sequence[float]) -> Array:
-        """Return (m,) relative excess of responses over their limits; negative within the limits."""
-        bounds, senses = (np.array([getattr(limit, of) for limit in self.limits]) for of in ("bound", "sense"))
-        return as_floats(senses * (np.array(values[1:]) - bounds) / np.abs(self._sizes[1:]))
-
     @property
     def _senses(self) -> Array:
         objective = self.sense * np.sign(self.scale)
@@ -329,8 +328,8 @@ class DesignProblem:
 
     def violation(self, readings: Sequence[Reading]) -> float:
         """The largest excess, of its limit; 0 where none is exceeded."""
-        excess = self.excess([reading.value for reading in readings])
-        return max(0.0, float(excess.max())) if excess.size else 0.0
+        excesses = (limit.excess(one.value) for limit, one in zip(self.limits, readings[1:], strict=True))
+        return max((0.0, *excesses))
 
 
 def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> DesignProblem:
