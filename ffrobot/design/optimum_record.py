@@ -266,12 +266,12 @@ class Optimum(Finding):
         yield from super().write_tables(folder)
 
     def csv_files(self) -> Iterator[CsvFile]:
-        """CSV table of response, keys and limits with their shadow prices."""
+        """CSV table of the objective, keys and limits with their shadow prices."""
         yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, self._numbers())
 
     def _numbers(self) -> Iterator[list[object]]:
         problem, starts = self.problem, self.start.values or (np.nan,) * len(self.best.values)
-        yield ["response", problem.objective.text, starts[0], self.value, "", "", "", ""]
+        yield ["objective", problem.objective.text, starts[0], self.value, "", "", "", ""]
         for variable, price in zip(self.space.variables, self.bound_prices, strict=True):
             bounds = ("", "") if variable.is_catalogue else (variable.low, variable.high)
             for key in variable.keys:
