@@ -22,30 +22,30 @@ def picture(found: Smoothed, extension: str) -> bytes:
     with style():
         figure = Figure(figsize=WIDE, layout="constrained")
         grid = figure.add_gridspec(2, 5)
-        _accelerations(figure.add_subplot(grid[0, :3]), found.before)
-        _spectrum(figure.add_subplot(grid[0, 3:]), found.before)
+        _accelerations(figure.add_subplot(grid[0, :3]), found.before, found.robot.units("/s²"))
+        _spectrum(figure.add_subplot(grid[0, 3:]), found.before, found.robot.units("/s"))
         _distance(figure.add_subplot(grid[1, :]), found)
         return image_of(literal(figure), extension)
 
 
-def _accelerations(axes: Axes, of: Diagnosis) -> None:
+def _accelerations(axes: Axes, of: Diagnosis, unit: str) -> None:
     """Second differences of set points."""
     times, values = difference_quotients(*difference_quotients(*of.recording.dense(of.recording.step)))
     for joint, column in zip(of.recording.joints, values.T, strict=True):
         axes.plot(times, column, label=joint)
-    axes.set_title("acceleration of set points (rad/s²)")
+    axes.set_title(f"acceleration of set points ({unit})")
     axes.set_xlabel("t (s)")
     axes.legend(fontsize=7)
 
 
-def _spectrum(axes: Axes, of: Diagnosis) -> None:
+def _spectrum(axes: Axes, of: Diagnosis, unit: str) -> None:
     grid, *each = of.spectrum
     for band in of.frequencies.T:
         axes.axvspan(min(band.min(), grid[-1]), min(band.max(), grid[-1]), color=BAND)
     for values in each:
         axes.plot(grid, values)
     axes.set_yscale("log")
-    axes.set_title("its spectrum (rad/s), natural frequencies")
+    axes.set_title(f"its spectrum ({unit}), natural frequencies")
     axes.set_xlabel("frequency (Hz)")
 
 

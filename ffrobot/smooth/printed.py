@@ -18,7 +18,7 @@ from .diagnosis import Diagnosis
 from .drawn import picture
 from .smoothing import Smoothed
 
-MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)", "off the path (rad)", "of a limit", "torque")
+MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)")
 STUBBORN = "controllers have zeros that decay too slowly for inversion"
 COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "at most, by it alone (mm)", "share")
 
@@ -60,15 +60,16 @@ def write_page(found: Smoothed, motion: Path | None, path: Path) -> None:
 def _tables(found: Smoothed) -> list[Table]:
     """Of joints, and of motions where there are new ones."""
     joints = Table(COLUMNS, list(_rows(found.before)))
-    return [joints, *([Table(MOTIONS, list(_motions(found)))] if found.candidates else [])]
+    columns = (*MOTIONS, f"off the path ({found.robot.units()})", "of a limit", "torque")
+    return [joints, *([Table(columns, list(_motions(found)))] if found.candidates else [])]
 
 
 def _lines(found: Smoothed) -> list[tuple[str, str]]:
-    before = found.before
+    before, joints = found.before, len(found.before.recording.joints)
     words = [axis.words for axis in found.robot.servo.axes]
     each = [f"{joint}: {of}" for joint, of in zip(found.robot.joints, words, strict=True)]
     return [
-        ("motion", f"{len(before.recording.times)} set points of {len(before.recording.joints)} joints over"
+        ("motion", f"{len(before.recording.times)} set points of {joints} joint{'s' * (joints > 1)} over"
          f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
         *(("servo", of) for of in (each if len(set(words)) > 1 else words[:1])),
         *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),

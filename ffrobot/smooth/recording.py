@@ -280,7 +280,7 @@ def _jumps(name: str, unit: str, times: Array, values: Array) -> Iterator[Fault]
     if abrupt.any():
         k = int(abrupt.argmax())
         others = int(np.count_nonzero(np.diff(abrupt > 0.0, prepend=False) & (abrupt > 0.0))) - 1
-        more = f", and {others} times more" if others else ""
+        more = f", and {others} times more" if others > 1 else ", and once more" * others
         size = f"{abs(thirds[max(k - 1, 0) : k + 2].sum()) / usual:.3g} {unit}/s²"  # in up to three rows
         at = times[min(k, len(times) - 1)]
         yield Fault("jump of acceleration", f"{name}: acceleration jumps by {size} at t = {at:.4g} s{more}")

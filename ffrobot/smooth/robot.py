@@ -95,6 +95,7 @@ class Robot:
     def __init__(self, scene: Scene, servo: Servo, point: str | None, tolerance: float, watcher: Watcher) -> None:
         self.file, self.servo, self.tolerance, self._watcher = scene.path, servo, tolerance, watcher
         self.joints = tuple(joint.name for joint in scene.motor_joints)
+        self._units = dict.fromkeys(joint.units[0] for joint in scene.motor_joints)
         update = {"trajectory": (), "analysis": (), "initial": scene.initial.model_copy(update={"state": "static"})}
         self._scene = scene.model_copy(update=update)
         self._prepared = prepare_scene(self._scene, watcher)
@@ -104,6 +105,10 @@ class Robot:
         self.has_gears, self._still = bool(self._gears.tree.gears), np.zeros(self._gears.tree.n_v)
         self.bends = any(node.p_v.stop > node.p_v.start for node in self._gears.tree.nodes)
         self._frequency: float | None = None
+
+    def units(self, per: str = "") -> str:
+        """Return units of the joints' coordinates, or of what they are `per` some time."""
+        return ", ".join(f"{unit}{per}" for unit in self._units)
 
     def modes(self, q: Array, *, of_links: bool = False) -> Modes:
         """Return modes at the posture q (n_q,) of a run; `of_links`: motors and joints behind gears move alike."""

@@ -74,10 +74,13 @@ def test_vibration_by_a_rail_depends_on_the_posture_of_rest(tmp_path):
     bodies = [rigid("base", 1.0, [0.01] * 3, ORIGIN), arm]
     path, law = written(tmp_path, scene(bodies, [rail, revolute("hub", "base.root", "arm.root", **gear)])), TIMES / 0.25
     rows = np.outer(np.where(law < 1.0, law**2 * (3.0 - 2.0 * law), 1.0), ends)
-    before = smooth_motion(path, table(tmp_path / "path.csv", TIMES, rail=rows[:, 0], hub=rows[:, 1])).before
+    found = smooth_motion(path, table(tmp_path / "path.csv", TIMES, rail=rows[:, 0], hub=rows[:, 1]))
+    before = found.before
     lever = m * c * np.cos(ends[1]) / about
     assert before.residual > 0.1 * ends[1]
     assert before.alone[0] / before.alone[1] == pytest.approx(lever * ends[0] / ends[1], rel=1e-3)
+    assert found.robot.units("/s²") == "m/s², rad/s²"
+    assert [fault.text.partition(" t = ")[2] for fault in before.faults] == ["0.256 s, and once more"] * 2
 
 
 def test_a_servo_follows_lines_exactly():
