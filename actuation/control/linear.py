@@ -26,7 +26,7 @@ from .linear_model import (
     state_space,
 )
 from .margins import Suggestion, unhurried_gains
-from .records import Sensor
+from .sensor_records import Sensor
 from .signals import make_signals, readings_at
 from .zeros import Zeros, zeros
 

@@ -23,17 +23,11 @@ from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, make_controllers
 from .linear_model import LinearModel, kept_modes, observability, state_space
 from .margins import Feedback
-from .records import (
-    FilterRecord,
-    GainsObserver,
-    KalmanObserver,
-    KalmanRecord,
-    SampledAnalysis,
-    ScheduledObserver,
-    Sensor,
-)
+from .observer_records import FilterRecord, GainsObserver, KalmanObserver, KalmanRecord, ScheduledObserver
+from .records import SampledAnalysis
 from .robot import ControlledRobot, Setup, default_tip, estimated_sensors
 from .sampling import riccati, sampled, zero_order_hold
+from .sensor_records import Sensor
 from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge

@@ -32,8 +32,9 @@ from ..patches.patches import PatchArray
 from ..patches.records import PztLayout
 from .linear_model import LinearModel, state_space
 from .observer import kalman, model_of_filter
-from .records import EstimateRecord, Placement, Sensor
+from .placement_records import EstimateRecord, Placement
 from .robot import default_tip, whole_robot
+from .sensor_records import Sensor
 from .signals import Signal, make_signals
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business

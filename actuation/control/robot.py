@@ -28,7 +28,8 @@ from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
-from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController, Sensor
+from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController
+from .sensor_records import Sensor
 from .signals import check_joint, volts_on_file
 
 

@@ -21,7 +21,7 @@ from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.scene.space import SPACES
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, OnBody
-from .records import Sensor
+from .sensor_records import Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2, "accelerometer": 3, "gyro": 4}
 STEP = 2.0**-13  # of differences of readings of points, in rad, m, √kg·m and these per s

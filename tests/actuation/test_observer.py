@@ -14,8 +14,9 @@ from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.actuation.control.lqr import gains
 from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
 from ffrobot.actuation.control.observer import Schedule, hidden, kalman
-from ffrobot.actuation.control.records import KalmanObserver, Sensor
+from ffrobot.actuation.control.observer_records import KalmanObserver
 from ffrobot.actuation.control.sampling import by_doubling, riccati, sampled, zero_order_hold
+from ffrobot.actuation.control.sensor_records import Sensor
 from ffrobot.actuation.control.signals import Filter, Signal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.exchange.export import export_file

@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 import ffrobot
 from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.placement import PatchableLink, locked_modes, place
-from ffrobot.actuation.control.records import Placement
+from ffrobot.actuation.control.placement_records import Placement
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.model import build_model
