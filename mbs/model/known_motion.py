@@ -154,7 +154,7 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
             torque[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
         elif node.joint.type == "prismatic":  # whose rotors feel no turn of their section
             J, N = rotor(node)
-            torque[:, number] = J * N * states.a[:, node.v.start]
+            torque[:, number] = J * N * node.sign * states.a[:, node.v.start]
     return torque
 
 

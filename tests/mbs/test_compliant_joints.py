@@ -94,15 +94,16 @@ def nonic(start, end):
     return f"{float(start)!r}+{float(end - start)!r}*(126*t**5-420*t**6+540*t**7-315*t**8+70*t**9)"
 
 
-def test_slide_behind_a_spring_follows_its_path():
+@pytest.mark.parametrize(("between", "sign"), [(["ground", "a.root"], 1.0), (["a.root", "ground"], -1.0)])
+def test_slide_behind_a_spring_follows_its_path(between, sign):
     """Of M ẍ = K (θ − x), the motor needs (J N² + M) ẍ + J N² M x⁗/K; a forward simulation follows."""
-    path = {"name": "tip", "joint": "O", "value": nonic(0.0, 0.3)}
-    model = pendulum(trajectory=[path], **SLIDES)
+    path = {"name": "tip", "joint": "O", "value": nonic(0.0, 0.3 * sign)}
+    model = pendulum(trajectory=[path], between=between, **SLIDES)
     error, source, _ = carried_out(model)
     x = np.polynomial.Polynomial([0.0] * 5 + [126.0, -420.0, 540.0, -315.0, 70.0]) * 0.3
     t = source.time
     needed = (MOTOR + M) * x.deriv(2)(t) + MOTOR * M / K * x.deriv(4)(t)
-    found = gear_motions(source.motion)["O"].moment
+    found = sign * gear_motions(source.motion)["O"].moment
     assert np.abs(found - needed).max() < 1e-5 * np.abs(needed).max()
     assert error.max() < 1e-8
 
