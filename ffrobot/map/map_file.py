@@ -100,19 +100,27 @@ CONSTANT = 1e-9  # of the largest value: differences of less are round-off
 
 
 class Quantity(NamedTuple):
-    """Values (P,) in the unit of the title, NaN where a pose is impossible; whether larger is better."""
+    """Values (P,) in the unit of the title, NaN where a pose is impossible; whether larger is better.
+
+    `endless`: the word for infinite ones.
+    """
 
     title: str
     values: Array
     more_is_better: bool
+    endless: str = "rigid"
 
     @property
     def everywhere(self) -> str:
-        """The one value of all poses, "rigid" if it is infinite; empty where values differ, or none is known."""
+        """The one value of all poses; empty where values differ, or none is known."""
         known = self.values[~np.isnan(self.values)]
         if not known.size or not np.isfinite(known).any():
-            return "rigid" if known.size else ""
+            return self.endless if known.size else ""
         return f"{known[0]:.4g}" if np.ptp(known) <= CONSTANT * np.abs(known).max() else ""
+
+    def text(self, pose: int) -> str:
+        """Return the value of a pose as it is printed."""
+        return f"{self.values[pose]:.4g}" if np.isfinite(self.values[pose]) else self.endless
 
     @property
     def worst(self) -> int:
@@ -138,7 +146,8 @@ def quantities(poses: PoseMap) -> dict[str, Quantity]:
             peak = 1e3 * response.max(axis=(1, 2))
             table[f"response_{condition}"] = Quantity(f"largest response, {words} (mm/N)", peak, False)
         if (depth := values.get(f"joints_{condition}/milling_depth")) is not None:
-            table[f"milling_{condition}"] = Quantity(f"stable depth of cut, {words} (mm)", 1e3 * depth, True)
+            title = f"stable depth of cut, {words} (mm)"
+            table[f"milling_{condition}"] = Quantity(title, 1e3 * depth, True, "unlimited")
     reach = np.nanmax(np.linalg.norm(values["place"], axis=1))
     deflection = 1e3 * _beyond(ROUND_OFF * reach, np.linalg.norm(values["sag"], axis=1))
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)
@@ -146,7 +155,8 @@ def quantities(poses: PoseMap) -> dict[str, Quantity]:
     if np.isfinite(share).any():
         table["torque"] = Quantity("largest static torque (% of limit)", 100 * _largest(share), False)
     elif share.shape[1]:
-        table["torque"] = Quantity("largest static torque (N·m)", _largest(np.abs(values["torque"])), False)
+        title = " or ".join({"rad": "torque (N·m)", "m": "force (N)"}[unit] for unit in dict.fromkeys(poses.units))
+        table["torque"] = Quantity(f"largest static {title}", _largest(np.abs(values["torque"])), False)
     manipulability = _beyond(ROUND_OFF * reach ** values["place"].shape[1], values["manipulability"])
     table["manipulability"] = Quantity("manipulability", manipulability, True)
     size = {name: float(np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0)) for name, one in table.items()}
@@ -176,7 +186,7 @@ def _ranges(poses: PoseMap) -> Iterator[tuple[str, ...]]:
         if quantity.everywhere:
             yield quantity.title, quantity.everywhere, "everywhere", "", ""
         elif np.isfinite(quantity.values).any():
-            ends = ((f"{quantity.values[k]:.4g}", _place(poses, k)) for k in (quantity.worst, quantity.best))
+            ends = ((quantity.text(k), _place(poses, k)) for k in (quantity.worst, quantity.best))
             yield quantity.title, *(cell for end in ends for cell in end)
 
 

@@ -127,10 +127,14 @@ class MapPlan:
 
 @dataclass(frozen=True)
 class PoseMap:
-    """A map: `values` by name, (P, …) with nan where a pose is none; `status` (P,) numbers of `STATUS`."""
+    """A map: `values` by name, (P, …) with nan where a pose is none; `status` (P,) numbers of `STATUS`.
+
+    `motors` have the unit "rad" or "m" of their coordinates in `units`.
+    """
 
     plan: MapPlan
     motors: tuple[str, ...]
+    units: tuple[str, ...]
     limits: Array
     status: Indices
     values: Mapping[str, Array]
@@ -342,9 +346,18 @@ def _assembled(
             if name != "stands":
                 whole = values.setdefault(name, np.full((len(status), *value.shape[1:]), np.nan))
                 whole[part] = value
-    names, limits = tuple(name.split("/")[1] for name in evaluator.motors), dict[str, float]()
+    names, limits, units = tuple(name.split("/")[1] for name in evaluator.motors), dict[str, float](), dict[str, str]()
     for joint in solution.scene.motor_joints:
-        labels = (name.removeprefix("joint/") for name, _ in labelled(solution.model, joint.name))
+        labels = [name.removeprefix("joint/") for name, _ in labelled(solution.model, joint.name)]
+        units |= zip(labels, joint.units, strict=True)
         limits |= {label: limit.moment for label, limit in zip(labels, joint.motor_limits, strict=True)}
     moments = np.array([limits[name] for name in names])
-    return PoseMap(plan, names, np.where(np.isfinite(moments), moments, np.nan), status, values, postures.q)
+    return PoseMap(
+        plan=plan,
+        motors=names,
+        units=tuple(units[name] for name in names),
+        limits=np.where(np.isfinite(moments), moments, np.nan),
+        status=status,
+        values=values,
+        q=postures.q,
+    )

@@ -268,7 +268,9 @@ class Statics:
             return f'"{self.model.rows[int(np.abs(at.missed).argmax())].owner}" cannot be met with links that bend so'
         node = next(node for node in self.model.tree.nodes if node.v.start <= worst < node.p_v.stop)
         what = f'joint "{node.joint.name}"' if worst < node.p_v.start else f'"{node.body.name}"'
-        return f"after {MOST_ITERATIONS} steps of Newton's method {abs(at.left[worst]):.3g} N·m are left at {what}"
+        slides = worst in [node.v.start + k for k, axis in enumerate(node.joint.axes) if axis < 3]
+        left = f"{abs(at.left[worst]):.3g} {'N' if slides else 'N·m'}"
+        return f"after {MOST_ITERATIONS} steps of Newton's method {left} are left at {what}"
 
 
 def _independent(J: Array) -> list[int]:

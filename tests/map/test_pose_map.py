@@ -351,3 +351,42 @@ def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
     depth = min(0.5 / np.linalg.eigvals(milling.cutter.average @ E @ G @ E.T).real.max() for E in feeds)
     assert found.values["joints_compliant/milling_depth"][1] == pytest.approx(depth, rel=1e-3)
     assert "milling_compliant" in quantities(found)
+
+
+SLIDE = """name = "slide"
+space = "spatial"
+gravity = [0.0, 0.0, -10.0]
+analysis = [{ name = "rest", kind = "static" }]
+[[body]]
+name = "box"
+rigid = { mass = 2.0, center = [0, 0, 0], inertia = [0.1, 0.1, 0.1], points = { o = [0, 0, 0] } }
+[[joint]]
+name = "lift"
+type = "prismatic"
+between = ["ground", "box.o"]
+axis = [0, 0, 1]
+rotor_inertia = 1e-3
+stiffness = 5e3
+"""
+
+
+@pytest.mark.parametrize("scene", [SLIDE, SLIDE.replace('"ground", "box.o"', '"box.o", "ground"')])
+def test_a_slide_behind_a_spring_needs_a_force(tmp_path, scene):
+    """m g in N, m g/k below the motor; a process whose cutter no mode below its highest frequency moves."""
+    (tmp_path / "slide.toml").write_text(scene)
+    keys = {"teeth": 2, "tangential": 6e8, "radial": 2e8, "entry": 0.0, "exit": 2.0, "highest": 1.0}
+    (tmp_path / "cutter.toml").write_text(tomli_w.dumps(keys))
+    found = mapped(
+        tmp_path / "slide.toml", tmp_path / "map", "lift=0.1:0.2:2", milling=read_milling(tmp_path / "cutter.toml")
+    )
+    np.testing.assert_allclose(np.abs(found.values["torque"]), 20.0)
+    np.testing.assert_allclose(found.values["sag"][:, 2], -20.0 / 5e3)
+    titles = {name: (one.title, one.everywhere) for name, one in quantities(found).items()}
+    assert titles["torque"] == ("largest static force (N)", "20")
+    assert titles["milling_compliant"] == ("stable depth of cut, compliant gears (mm)", "unlimited")
+
+
+def test_force_that_a_slide_without_motor_leaves(tmp_path):
+    (tmp_path / "slide.toml").write_text(SLIDE)
+    with pytest.raises(SolveError, match=r'20 N are left at joint "lift"'):
+        solve(tmp_path / "slide.toml")
