@@ -94,7 +94,7 @@ class _Search:
         self.sag, (self.times, self.values) = before.ride.sag, evened(before.recording).dense(step / 2)
         low, high = limits.positions.T
         self.low, self.high = np.minimum(low, self.values.min(axis=0)), np.maximum(high, self.values.max(axis=0))
-        self.modes = modes_along(robot, before.ride)
+        self.modes = before.modes
         self.of_links = modes_along(robot, before.ride, of_links=True) if robot.has_gears and robot.bends else []
         self.periods = [1 / f for f in before.frequencies.mean(axis=0)]
 

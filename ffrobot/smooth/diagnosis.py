@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -28,7 +28,8 @@ class Diagnosis:
         recording, ride: the stream, and the robot under it.
         even: the robot under its set points at even times; the same where these are no smoother.
         faults: of the stream.
-        frequencies: (instants, k) Hz, the lowest along the motion, with motors locked.
+        modes: of postures along the motion, the last one at rest, with motors locked.
+        frequencies: (instants, k) Hz, the lowest of these modes.
         alone: (n,) m, residual vibration at the point by each joint alone, peak to peak, linear model at the end: the
             sum of its modes, which is the most that it can be.
         shares: (n,) of the vibration by each joint in phase with the whole; they add up to 1.
@@ -41,6 +42,7 @@ class Diagnosis:
     ride: Ride
     even: Ride
     faults: tuple[Fault, ...]
+    modes: Sequence[Modes]
     frequencies: Array
     alone: Array
     shares: Array
@@ -105,6 +107,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
         ride=ride,
         even=ride if even is recording else robot.ride(*even.dense(min(even.step / 4, 1e-3))),
         faults=tuple(faults),
+        modes=modes,
         frequencies=as_floats(frequencies),
         alone=as_floats(2 * np.abs(left).sum(axis=0)),
         shares=as_floats(in_phase / (in_phase.sum() or 1.0)),
