@@ -210,12 +210,12 @@ def loops_about(
     readings: Array,
     models: Sequence[LinearModel],
 ) -> tuple[list[tuple[LinearModel, Feedback]], Mapping[float, Feedback]]:
-    """The linear `models` with the controllers, as they begin, that act there; none where they are not linear there.
+    """The linear `models`, each with the linear controllers at its time; and controllers by time (s).
 
-    Beside them the controllers at the start, or at each time (s) of an observer's schedule.
+    The latter are those at the start, or at each time of an observer's schedule. Both are empty where a controller is
+    not linear at the time of a model.
     """
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
-
     acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
     inner = cache(partial(find_feedback, acting, asked, readings))
     # Computed torque alone changes along the path; a user's function is asked in order
