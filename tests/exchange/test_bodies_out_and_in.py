@@ -174,7 +174,7 @@ def test_axes_of_nodes_that_are_turned_are_told(bodies):
         r"m0\( 1, 1\)( +)=.*\n(.*)m0\( 2, 2\)( +)=.*", r"m0( 1, 2)\1= -1.0D0\n\2m0( 2, 1)\3= 1.0D0", node, count=1
     )
     turned, remarks = read_sid(head + node, "line")
-    assert [text for text in remarks if text.startswith("AP: turned axes of nodes 2 left out")]
+    assert [text for text in remarks if text.startswith("AP: turned axes of nodes 2 are omitted")]
     straight, none = read_sid(text, "line")
     assert not [text for text in none if text.startswith("AP")]
     assert differences(integrals_of(straight), integrals_of(turned), ["S_bar"]) == {"S_bar": 0.0}
