@@ -20,7 +20,7 @@ from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.operating_points import locked_motors
 from ..mbs.joints.joints import AnyJoint
-from ..mbs.joints.revolute import RevoluteJoint
+from ..mbs.joints.moving_joint import GearedJoint
 from ..mbs.joints.twist_spring import stiffer
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
@@ -65,7 +65,7 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
     held = f"zero-order hold of {1e3 * asked.sample_time:g} ms"
     runs, nominal = _Runs(context, source, asked), context.model
     robots: dict[str, list[Model]] = {"as computed": [nominal], held: [nominal]}
-    for cause, robot in _varied(nominal, asked):
+    for cause, robot in varied_robots(nominal, asked):
         robots.setdefault(cause, []).append(robot)
     forces = asked.force * np.eye(3)[: 2 if nominal.scene.is_planar else 3]
     robots[f"{asked.force:g} N at the tip"] = [_with_force(nominal, runs.points[-1], force) for force in forces]
@@ -84,7 +84,7 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
     return Deviations(tuple(robots), lanes, runs.bandwidth)
 
 
-def _varied(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
+def varied_robots(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
     """Robots with other links and gears, by cause: the same for both signs."""
     scene, bodies = model.scene, _bodies(model)
     for what in ("stiffness", "mass"):
@@ -97,7 +97,7 @@ def _varied(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
 
 
 def _with_gear(joint: AnyJoint, factor: float) -> AnyJoint:
-    if not isinstance(joint, RevoluteJoint) or joint.stiffness is None:
+    if not isinstance(joint, GearedJoint) or joint.stiffness is None:
         return joint
     return joint.model_copy(update={"stiffness": stiffer(joint.stiffness, factor)})
 

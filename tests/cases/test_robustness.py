@@ -175,6 +175,22 @@ def test_every_cause_behind_a_gear_against_a_linear_model():
         np.testing.assert_allclose(found[lane], expected, rtol=1e-3, atol=5e-10, err_msg=lane)
 
 
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_gears_of_slides_vary_like_those_of_hinges(kind):
+    from ffrobot.mbs.scene.robustness import Robustness
+    from ffrobot.run.robustness import varied_robots
+    from ffrobot.run.solve import prepare_scene
+
+    body = {"mass": 2.0, "center": [0.0, 0.0], "inertia": 3.0, "points": {"root": [0.0, 0.0]}}
+    joint = {"name": "j", "type": kind, "between": ["ground", "b.root"], "motor": True, "stiffness": 500.0}
+    joint |= {"rotor_inertia": 1e-3} | ({"axis": [1.0, 0.0]} if kind == "prismatic" else {})
+    tables = {"name": "one", "gravity": [0.0, 0.0], "body": [{"name": "b", "rigid": body}], "joint": [joint]}
+    made = ffrobot.make_scene(**tables, analysis=[{"name": "still", "kind": "static"}])
+    robots = varied_robots(prepare_scene(made).model, Robustness(gears=(0.1,)))
+    stiffness = [robot.scene.joint[0].stiffness for cause, robot in robots if cause.startswith("gear")]
+    assert stiffness == pytest.approx([450.0, 550.0])
+
+
 @pytest.mark.parametrize(
     ("keys", "text"),
     [
