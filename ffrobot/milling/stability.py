@@ -162,8 +162,10 @@ def growth(tip: Tip, cutter: Cutter, depth: float, speed: float) -> float:
 
 
 def limit_depth(tip: Tip, cutter: Cutter, speed: float, bounds: Sequence[float]) -> float:
-    """The depth (m) between `bounds` at which `growth` passes 1, by bisection to 0.1 %; a bound where it does not."""
+    """The depth (m) between `bounds` at which `growth` passes 1, by bisection to 0.1 %; infinite beyond them."""
     low, high = map(float, bounds)
+    if growth(tip, cutter, high, speed) <= 1.0:
+        return np.inf
     while high / low > 1.001:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if growth(tip, cutter, middle, speed) > 1.0 else (middle, high)

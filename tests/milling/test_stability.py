@@ -60,6 +60,7 @@ def test_lobes_of_the_published_mode_by_both_methods():
         lobes = stability_limits(cutter.average, omega, G).lobes(2, speeds)
         exact = [limit_depth(TWO, cutter, speed, (1e-5, 2e-2)) for speed in speeds]
         np.testing.assert_allclose(lobes, exact, rtol=off)
+        assert limit_depth(TWO, cutter, speeds[0], (1e-6 * exact[0], 1e-3 * exact[0])) == np.inf
 
 
 def integrated(tip, cutter, depth, speed, periods, steps):
