@@ -53,7 +53,7 @@ def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
 
 
 def displaced_along(servo: Servo, error: PPoly) -> Servo:
-    """The robot with points off their paths by `error` (k,), m, up to rounding: quintic Hermite pieces."""
+    """The robot with points off their paths by `error` (k,), m, up to round-off: quintic Hermite pieces."""
     start, end = error.x[[0, -1]]
     times = np.union1d(error.x, np.linspace(start, end, PIECES + 1))
     off = np.array([error(times, order) for order in range(3)])
