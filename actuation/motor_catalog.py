@@ -92,12 +92,13 @@ def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
     except csv.Error as error:
         raise InputError(f"{path}: cannot read the catalog of motors: {error}") from None
     if not rows:
-        raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below, found none")
+        raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below", "none")
     for number, row in rows:
         if len(row) != len(header):
             raise InputError(
                 f"{path}: line {number}: expected {len(header)} cells with commas, semicolons or tabs between them, as"
-                f" the header has, found {len(row)}"
+                " the header has",
+                len(row),
             )
     return validate(_Catalog, {"motor": [_of_line(dict(zip(header, row, strict=True))) for _, row in rows]}, path).motor
 

@@ -116,14 +116,14 @@ def make_point_set(
         chosen = _automatic(key, layout.body, body, spatial, "".join(AXES[k] for k in space.translations))
         if space.is_plane and len(chosen.names) < coordinates:  # in 3D forces on an axis do not turn about it
             raise InputError(
-                f"{key}: expected points that carry all {coordinates} generalized forces of the body, found"
-                f" {len(chosen.names)} independent components among all its stations"
+                f"{key}: expected points that carry all {coordinates} generalized forces of the body",
+                f"{len(chosen.names)} independent components among all its stations",
             )
         return chosen
     if len(layout.places) > coordinates:
         raise InputError(
-            f"{key}: expected at most as many components as the body has coordinates ({coordinates}), found"
-            f" {len(layout.places)}"
+            f"{key}: expected at most as many components as the body has coordinates ({coordinates})",
+            len(layout.places),
         )
     points = [_point(key, place, body, spatial) for _, place in layout.places]
     _check_apart(key, layout.places, points, 1e-9 * (spatial.length or 0.0))
@@ -133,8 +133,9 @@ def make_point_set(
     if rank < len(points):
         along_x = "axial ones" if space.is_plane else "those along x"
         raise InputError(
-            f"{key}: expected components that differ in what they do to the body, found {len(points)} of which only"
-            f" {rank} are independent: {along_x} coincide without axial modes, and it has {coordinates} coordinates"
+            f"{key}: expected components that differ in what they do to the body",
+            f"{len(points)} of which only {rank} are independent: {along_x} coincide without axial modes, and it has"
+            f" {coordinates} coordinates",
         )
     return chosen
 
@@ -144,8 +145,7 @@ def _check_apart(key: str, places: Sequence[tuple[str, Place]], points: Sequence
     for (i, (along, first)), (k, (other, second)) in combinations(enumerate(places), 2):
         if along == other and np.allclose(points[i].position, points[k].position, rtol=0, atol=near):
             raise InputError(
-                f"{key}: {along}: expected points apart from each other, found two at {first} and {second} that"
-                " coincide"
+                f"{key}: {along}: expected points apart from each other", f"two at {first} and {second} that coincide"
             )
 
 
@@ -183,7 +183,7 @@ def _candidate_places(key: str, body: ModalBody | None, points: Mapping[str, Bod
     if body is not None:
         return [float(x) for x in np.unique(body.stations.position[:, 0])]
     if not points:
-        raise InputError(f"{key}: expected a rigid body with points, found none")
+        raise InputError(f"{key}: expected a rigid body with points", "none")
     return list(points)
 
 
@@ -197,10 +197,10 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
         check_known(place, points, f"{key}: expected a point of the body ({quoted(points)})")
         return points[place]
     if body is None:
-        raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)}), found {place:g}")
+        raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)})", f"{place:g}")
     slack = 1e-9 * body.length
     if not -slack <= place <= body.length + slack:
-        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
+        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m", f"{place:g} m")
     at, T = body.interpolate(place), spatial.modal_transform
     return BodyPoint(at.position, at.translation @ T, at.rotation @ T)
 
@@ -249,7 +249,8 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Arra
         if body not in chosen and np.abs(Q_a).max(initial=0.0) > DEPENDENT * largest:
             raise InputError(
                 f'{run.model.scene.path}: analysis "{run.analysis.name}": expected [[actuation_points]] on every body'
-                f' that trajectories drive or that has a prescribed shape, found none on "{body}"'
+                " that trajectories drive or that has a prescribed shape",
+                f'none on "{body}"',
             )
     places = tree.places(run.q)
     for body, points in chosen.items():

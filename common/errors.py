@@ -12,10 +12,16 @@ from .tables import shown
 
 
 class FfrobotError(Exception):
-    """Base of all errors whose message is meant for the user: shown without a traceback."""
+    """Base of all errors whose message is meant for the user: shown without a traceback.
+
+    `InputError("… expected a number", "text")` is the message "… expected a number, found text".
+    """
 
     __module__ = "ffrobot"  # where users import them from, and tracebacks name them
     exit_code = 1
+
+    def __init__(self, message: object, *found: object) -> None:
+        super().__init__(", found ".join(map(str, (message, *found))))
 
 
 class InputError(FfrobotError):
@@ -124,7 +130,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def check_known(word: str, known: Collection[str], expected: str) -> None:
     """Raise `InputError` with the text `expected`, and the word as found, unless `word` is one of `known`."""
     if word not in known:
-        raise InputError(f'{expected}, found "{shown(word)}"{did_you_mean(word, known)}')
+        raise InputError(f"{expected}", f'"{shown(word)}"{did_you_mean(word, known)}')
 
 
 def quoted(words: Iterable[str]) -> str:

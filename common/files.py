@@ -78,14 +78,14 @@ def check_output(path: Path, file_format: str) -> None:
     """
     check_not_an_input(path)
     if path.is_dir():
-        raise InputError(f"{path}: output: expected a file name, found a folder")
+        raise InputError(f"{path}: output: expected a file name", "a folder")
     if not path.parent.is_dir():
-        raise InputError(f"{path}: output: expected a file in a folder that exists, found no folder {path.parent}")
+        raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
     replaceable = ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)
     if path.exists() and not (path.is_file() and kind_of_file(path) in replaceable):  # no device, ever
         raise InputError(
-            f'{path}: output: expected a new name or an earlier file of format "{file_format}", found a file of another'
-            " kind"
+            f'{path}: output: expected a new name or an earlier file of format "{file_format}"',
+            "a file of another kind",
         )
     try:
         with tempfile.TemporaryFile(dir=path.resolve().parent):
@@ -98,16 +98,16 @@ def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
     """Refuse an output that is a folder or an input, or whose name has none of the `endings`. Raises `InputError`."""
     check_not_an_input(path)
     if path.is_dir():
-        raise InputError(f"{path}: {label}: expected a file name, found a folder")
+        raise InputError(f"{path}: {label}: expected a file name", "a folder")
     if path.suffix.lower() not in endings:
-        raise InputError(f'{path}: {label}: expected a name that ends in {either(endings)}, found "{path.name}"')
+        raise InputError(f"{path}: {label}: expected a name that ends in {either(endings)}", f'"{path.name}"')
 
 
 def check_new_file(path: Path, *, replace: bool) -> None:
     """Raise `InputError` where an output would overwrite an input, or, unless `replace`, another file."""
     check_not_an_input(path)
     if path.exists() and not (replace and path.is_file()):
-        raise InputError(f"{path}: output: expected a new name, or --force to replace it, found a file there")
+        raise InputError(f"{path}: output: expected a new name, or --force to replace it", "a file there")
 
 
 def holds(path: Path, content: bytes) -> bool:
@@ -121,11 +121,11 @@ def check_folder(folder: Path) -> None:
     """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
     check_not_an_input(folder)
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: output: expected a folder, found a file")
+        raise InputError(f"{folder}: output: expected a folder", "a file")
 
 
 def check_new_folder(folder: Path) -> None:
     """Refuse an output folder that has anything in it. Raises `InputError`."""
     check_folder(folder)
     if folder.exists() and any(folder.iterdir()):
-        raise InputError(f"{folder}: output: expected a new or empty folder, found one with files in it")
+        raise InputError(f"{folder}: output: expected a new or empty folder", "one with files in it")

@@ -52,7 +52,7 @@ def check_links(file: h5py.File, path: Path) -> None:
     outside = file.id.links.visit(lambda name, info: None if info.type == h5py.h5l.TYPE_HARD else name, info=True)
     if outside is not None:
         where = outside.decode(errors="replace")
-        raise InputError(f"{path}: expected members in the file itself, found a link at {where}")
+        raise InputError(f"{path}: expected members in the file itself", f"a link at {where}")
 
 
 @contextmanager
@@ -90,7 +90,7 @@ def read(dataset: h5py.Dataset) -> Any:
 def numbers(item: object, name: str) -> NDArray[np.float64]:
     """A dataset of numbers. Raises `InputError` where `item`, which messages call `name`, is none."""
     if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
-        raise InputError(f"{name}: expected a dataset of numbers, found {type(item).__name__.lower()}")
+        raise InputError(f"{name}: expected a dataset of numbers", type(item).__name__.lower())
     return np.asarray(read(item), dtype=np.float64)
 
 

@@ -42,7 +42,7 @@ def check_not_an_input(path: Path) -> None:
             if path.is_symlink():
                 os.stat(path)
     except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(f"{shown(str(path))}: output: expected a file name, found {why_no_file(error)}") from None
+        raise InputError(f"{shown(str(path))}: output: expected a file name", why_no_file(error)) from None
     for source in _inputs.get():
         same = target == source.absolute() or target == _resolved(source)
         with suppress(OSError, ValueError):
@@ -59,7 +59,7 @@ def check_file_name(text: str) -> Path:
         with suppress(FileNotFoundError, NotADirectoryError):
             os.stat(path)  # `exists` and, from Python 3.13 on, `resolve` are silent about circles
     except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(f"{shown(text)}: expected the name of a file, found {why_no_file(error)}") from None
+        raise InputError(f"{shown(text)}: expected the name of a file", why_no_file(error)) from None
     check_regular(path)
     return path
 
@@ -73,7 +73,7 @@ def check_regular(path: Path) -> None:
         mode = path.stat().st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             kind = next((word for is_kind, word in _SPECIAL.items() if is_kind(mode)), "a device")
-            raise InputError(f"{path}: expected a regular file, found {kind}")
+            raise InputError(f"{path}: expected a regular file", kind)
 
 
 def why_no_file(error: Exception) -> str:
@@ -88,7 +88,7 @@ def check_same_kind(path: Path, content: bytes) -> None:
         return
     old, new = kind_of_file(path), kind(content)
     if old not in ("empty", "unreadable", new) and not (old == DAMAGED and new.startswith("HDF5")):
-        raise InputError(f"{path}: output: expected a new name or a file of kind {new}, found one of kind {old}")
+        raise InputError(f"{path}: output: expected a new name or a file of kind {new}", f"one of kind {old}")
 
 
 def kind(content: bytes) -> str:

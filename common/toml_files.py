@@ -48,7 +48,7 @@ def load_toml(path: Path, kind: str) -> dict[str, Any]:
     data = parse_toml(read_text(path, kind), path, kind)
     for other, (key, command) in _KINDS.items():
         if kind in _KINDS and key in data and _KINDS[kind][0] not in data:
-            raise InputError(f"{path}: expected a {kind}, found a {other} (is it for {command}?)")
+            raise InputError(f"{path}: expected a {kind}", f"a {other} (is it for {command}?)")
     return data
 
 

@@ -155,7 +155,7 @@ def check_texts(value: object, label: str) -> None:
     texts = value if isinstance(value, Collection) else ()  # generators can be read once
     is_list = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
     if not (is_list and all(isinstance(one, str) for one in texts)):
-        raise InputError(f"{label}: expected a list of texts, found {shown(repr(value))}")
+        raise InputError(f"{label}: expected a list of texts", shown(repr(value)))
 
 
 class _Problem(NamedTuple):

@@ -267,4 +267,4 @@ def _both_or_neither(value: object) -> str:
 
 
 def _reject(path: Path, key: str, expected: str, given: object) -> NoReturn:
-    raise InputError(f"{path}: {key}: expected {expected}, found {given}")
+    raise InputError(f"{path}: {key}: expected {expected}", given)

@@ -120,14 +120,15 @@ def is_modal_body_file(path: Path) -> bool:
 
 def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
     if attributes.get("format") != FORMAT:
-        raise InputError(f'{path}: expected format "{FORMAT}", found {attributes.get("format", "no such attribute")!r}')
+        raise InputError(f'{path}: expected format "{FORMAT}"', f"{attributes.get('format', 'no such attribute')!r}")
     version = attributes["format_version"]
     if not isinstance(version, int | np.integer) or version < 1:
-        raise InputError(f"{path}: format_version: expected a whole number, found {version!r}")
+        raise InputError(f"{path}: format_version: expected a whole number", f"{version!r}")
     if version > FORMAT_VERSION:
         raise InputError(
-            f"{path}: written by a newer ffrobot ({attributes.get('ffrobot_version', 'unknown')}): "
-            f"format_version: expected at most {FORMAT_VERSION}, found {version}"
+            f"{path}: written by a newer ffrobot ({attributes.get('ffrobot_version', 'unknown')}): format_version:"
+            f" expected at most {FORMAT_VERSION}",
+            version,
         )
 
 
@@ -185,18 +186,18 @@ def _numbers(item: object) -> NDArray[Any]:
     """A dataset of whole or real numbers, none so large that products of a few were infinite."""
     name = getattr(item, "name", "").lstrip("/")
     if isinstance(item, h5py.Dataset) and item.dtype.kind not in "fiub":
-        raise InputError(f"{name}: expected real numbers, found {_KINDS.get(item.dtype.kind, item.dtype)}")
+        raise InputError(f"{name}: expected real numbers", _KINDS.get(item.dtype.kind, item.dtype))
     values = numbers(item, name)
     if np.any(np.abs(values) > LARGEST):
         worst = values.flat[np.abs(values).argmax()]
-        raise InputError(f"{name}: expected numbers up to {LARGEST:g}, found {worst:.3g}")
+        raise InputError(f"{name}: expected numbers up to {LARGEST:g}", f"{worst:.3g}")
     whole = isinstance(item, h5py.Dataset) and item.dtype.kind in "iu"
     return values.astype(np.int64) if whole else values
 
 
 def _whole_numbers(dataset: h5py.Dataset) -> Integers:
     if dataset.dtype.kind not in "iu":
-        raise InputError(f"{dataset.name}: expected whole numbers, found {dataset.dtype}")
+        raise InputError(f"{dataset.name}: expected whole numbers", dataset.dtype)
     return np.asarray(read(dataset), dtype=np.int64)
 
 

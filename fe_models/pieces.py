@@ -59,17 +59,17 @@ def cut(source: LinkSource, count: int, families: Sequence[Family] = IN_PLANE) -
 
 def _beam(link: Link, path: Path, families: Sequence[Family]) -> BeamLink:
     if not isinstance(link, BeamLink):
-        raise InputError(f'{path}: geometry.kind: expected "beam" of a subdivided body, found "solid"')
+        raise InputError(f'{path}: geometry.kind: expected "beam" of a subdivided body', '"solid"')
     bending = [family for family in families if family in BENDING]
     if not set(bending) & set(link.families):
         raise InputError(
-            f"{path}: modes.family: expected {quoted(bending)} among those of a subdivided body, found"
-            f" {', '.join(link.families)}"
+            f"{path}: modes.family: expected {quoted(bending)} among those of a subdivided body",
+            ", ".join(link.families),
         )
     if link.measured is not None:
         raise InputError(
-            f"{path}: measured: expected none of a subdivided body (they apply to modes of the whole link), found"
-            f" {link.measured.table}"
+            f"{path}: measured: expected none of a subdivided body (they apply to modes of the whole link)",
+            link.measured.table,
         )
     return link
 
@@ -120,9 +120,9 @@ def _stiffness_damping(link: BeamLink, path: Path) -> float:
     ratios = ratio if isinstance(ratio, tuple) else (ratio or 0.0,)
     if any(ratios) or (rayleigh is not None and rayleigh[0]):
         raise InputError(
-            f"{path}: damping: expected none or rayleigh = [0.0, b] of a subdivided body, since ratios are those of the"
-            f" modes of the whole link, found {'ratio' if any(ratios) else 'rayleigh'} ="
-            f" {ratio if any(ratios) else list(rayleigh or ())}"
+            f"{path}: damping: expected none or rayleigh = [0.0, b] of a subdivided body, since ratios are those of"
+            " the modes of the whole link",
+            f"{'ratio' if any(ratios) else 'rayleigh'} = {ratio if any(ratios) else list(rayleigh or ())}",
         )
     return rayleigh[1] if rayleigh else 0.0
 

@@ -58,12 +58,12 @@ def solve(
     from .scene.scene import Scene
 
     if output is None and resume:
-        raise InputError("solve: resume: expected the output of the run that was stopped, found none")
+        raise InputError("solve: resume: expected the output of the run that was stopped", "none")
     if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
     elif not isinstance(scene, Scene):
         wrong = type(scene).__name__
-        raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {wrong}")
+        raise InputError("solve: scene: expected a scene file, or a scene from make_scene(**keys)", wrong)
     path, watcher = None if output is None else Path(output), watcher or Watcher()
     again = "" if path is None else "solve(…, resume=True)"
     shown = Path(MADE_IN_PYTHON) if scene.path.name == MADE_IN_PYTHON else scene.path  # that one is in no folder

@@ -83,7 +83,7 @@ class _Assembled:
             return self.node[instance][number]
         except KeyError:
             where = f" of instance {instance}" if instance else ""
-            raise InputError(f"{of}{where}: expected existing nodes, found node {number}") from None
+            raise InputError(f"{of}{where}: expected existing nodes", f"node {number}") from None
 
     def _regions(self) -> dict[str, Integers]:
         members: dict[str, list[int]] = {}
@@ -92,7 +92,7 @@ class _Assembled:
             if place is not None:
                 members.setdefault(name, []).append(place)
             elif number not in self.scopes[instance].scope.others:
-                raise InputError(f"*ELSET {name}{scope}: expected existing elements, found element {number}")
+                raise InputError(f"*ELSET {name}{scope}: expected existing elements", f"element {number}")
         return {name: np.array(cells, dtype=np.int64) for name, cells in members.items()}
 
     def _node_sets(self) -> dict[str, Integers]:
@@ -112,7 +112,7 @@ class _Assembled:
             for key, name in sets.spelled.items():
                 for of, number, place in sets.numbers(key):
                     if (of or own) not in self.scopes:
-                        raise InputError(f"{place}: expected an instance of the assembly, found {of}")
+                        raise InputError(f"{place}: expected an instance of the assembly", of)
                     yield name, f" of instance {own}" if own else "", of or own, number
 
     def _faces(self) -> dict[str, list[Integers]]:
@@ -140,7 +140,7 @@ class _Assembled:
                 continue
             for instance, number, _ in sets.meant(row[0], place):
                 if (instance or own) not in self.scopes:
-                    raise InputError(f"{place}: expected an instance of the assembly, found {instance}")
+                    raise InputError(f"{place}: expected an instance of the assembly", instance)
                 if (solid := self.scopes[instance or own].scope.solids.get(number)) is None:
                     continue
                 for corners in _SIDES.get(_CORNERS.get(solid[0], 0), [])[int(side[1]) - 1 : int(side[1])]:
@@ -156,7 +156,7 @@ class _Assembled:
         for tie in self.deck.ties:
             for row, place in tie.rows():
                 if len(row) != 2:
-                    raise InputError(f"*TIE, {place}: expected two surfaces, found {len(row)}")
+                    raise InputError(f"*TIE, {place}: expected two surfaces", len(row))
                 pair = [self._surface_nodes(entry) for entry in row]
                 slave, master = (used if nodes is None else np.intersect1d(nodes, used) for nodes in pair)
                 joined = self._join(same, slave, master)
@@ -164,8 +164,8 @@ class _Assembled:
                 wanted = np.setdiff1d(slave, master).size
                 if joined < (wanted if known else 1) or joined == 0:
                     raise InputError(
-                        f"*TIE, {place}: expected the nodes of {row[0]} where {row[1]} has some, found"
-                        f" {joined} of {wanted} there: meshes that do not match cannot be tied"
+                        f"*TIE, {place}: expected the nodes of {row[0]} where {row[1]} has some",
+                        f"{joined} of {wanted} there: meshes that do not match cannot be tied",
                     )
                 if not known:
                     remarks.append(

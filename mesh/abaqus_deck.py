@@ -40,7 +40,7 @@ class Keyword:
     def option(self, name: str) -> str:
         """Return a required option. Raises `InputError` if it is missing."""
         if not self.options.get(name):
-            raise InputError(f"{self}: expected {name}=…, found none")
+            raise InputError(f"{self}: expected {name}=…", "none")
         return self.options[name]
 
 
@@ -54,7 +54,7 @@ def keywords(path: Path) -> Iterator[Keyword]:
             continue
         if not text.startswith("*"):
             if current is None:
-                raise InputError(f'expected a keyword (*NODE …) first, found "{text[:40]}" ({line.place})')
+                raise InputError("expected a keyword (*NODE …) first", f'"{text[:40]}" ({line.place})')
             current.data.append(line)
             continue
         if current is not None:
@@ -75,7 +75,7 @@ def _data_of(keyword: Keyword, path: Path) -> Iterator[Line]:
     name = keyword.options["INPUT"]
     file = included(name, path, path)
     if file is None:
-        raise InputError(f"{keyword}: expected a file of data, found none called {name}")
+        raise InputError(f"{keyword}: expected a file of data", f"none called {name}")
     for line in lines_of(file, lambda *_: None):
         if not line.text.startswith("**"):
             yield Line(line.text, f"{file.name}, {line.place}")
@@ -135,7 +135,7 @@ class Sets:
         for row, place in keyword.rows():
             first, last, step = (whole_of(entry, place) for entry in [*row, "1"][:3])
             if len(row) < 2 or step == 0 or abs(last - first) > abs(step) * MOST:
-                raise InputError(f"{place}: expected first, last and step of {self.what}, found {', '.join(row)}")
+                raise InputError(f"{place}: expected first, last and step of {self.what}", ", ".join(row))
             self.add(name, ((instance, number, place) for number in range(first, last + (step > 0) - (step < 0), step)))
 
     def numbers(self, name: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
@@ -163,4 +163,4 @@ class Sets:
             for instance, number, _ in self.of_instances[of].numbers(short):
                 yield instance or of, number, place
         else:
-            raise InputError(f'{place}: expected {self.what} or a set of them, found "{entry}"')
+            raise InputError(f"{place}: expected {self.what} or a set of them", f'"{entry}"')

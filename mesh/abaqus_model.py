@@ -81,7 +81,7 @@ class Scope:
         values = [[number_of(entry or "0", place) for entry in row] for row, place in keyword.rows()]
         numbers = np.array([value for row in values for value in row])
         if numbers.size not in (0, 3, 6, 9):
-            raise InputError(f"{keyword}: expected three points, found {numbers.size} coordinates")
+            raise InputError(f"{keyword}: expected three points", f"{numbers.size} coordinates")
         points = numbers.reshape(-1, 3)
         if len(points) == 2:  # the z axis stays
             x = points[1] - points[0]
@@ -90,19 +90,19 @@ class Scope:
             frames = {0: GLOBAL, 1: Frame(points[0], np.eye(3)) if len(points) else GLOBAL}
             self.frame = frames[len(points)] if len(points) < 2 else Frame.through(points, "xy")
         except ValueError as error:
-            raise InputError(f"{keyword}: expected three points that span a plane, found {error}") from None
+            raise InputError(f"{keyword}: expected three points that span a plane", error) from None
 
     def _nodes(self, keyword: Keyword) -> None:
         system = (keyword.options.get("SYSTEM") or "R").upper()
         if system not in ("R", "C"):
-            raise InputError(f"{keyword}: expected SYSTEM=R or C, found {system} (spherical): write Cartesian ones")
+            raise InputError(f"{keyword}: expected SYSTEM=R or C", f"{system} (spherical): write Cartesian ones")
         read: dict[int, tuple[list[float], str]] = {}
         for row, place in keyword.rows():
             number = whole_of(row[0], place)
             coordinates = [number_of(entry or "0", place) for entry in row[1:4]]
             coordinates += [0.0] * (3 - len(coordinates))
             if number in read and read[number][0] != coordinates:
-                raise InputError(f"{place}: expected one place of each node, found another one of node {number}")
+                raise InputError(f"{place}: expected one place of each node", f"another one of node {number}")
             read[number] = coordinates, place
         if not read:
             return
@@ -110,7 +110,7 @@ class Scope:
         given = np.array([coordinates for coordinates, _ in read.values()])
         for (number, (_, place)), point in zip(read.items(), frame.points(given).tolist(), strict=True):
             if self.nodes.setdefault(number, tuple(point)) != tuple(point):
-                raise InputError(f"{place}: expected one place of each node, found another one of node {number}")
+                raise InputError(f"{place}: expected one place of each node", f"another one of node {number}")
         if name := keyword.options.get("NSET"):
             self.nsets.add(name, (("", number, place) for number, (_, place) in read.items()))
 
@@ -118,7 +118,7 @@ class Scope:
         kind = keyword.option("TYPE").upper()
         solid, surface = _SOLID.fullmatch(kind), _SURFACE.fullmatch(kind)
         if not solid and _OTHER_SOLID.fullmatch(kind):
-            raise InputError(f"{keyword}: expected solids of the types C3D4, C3D8, C3D10, C3D20, found TYPE={kind}")
+            raise InputError(f"{keyword}: expected solids of the types C3D4, C3D8, C3D10, C3D20", f"TYPE={kind}")
         count = int(solid[1]) if solid else {"65": 6}.get(surface[1], int(surface[1])) if surface else 0
         members: list[tuple[int, str]] = []
         for entries, place in _of_length(keyword, count + 1) if count else keyword.rows():
@@ -135,7 +135,7 @@ class Scope:
             if solid:
                 entry = _KINDS[count], nodes
                 if self.solids.setdefault(number, entry) != entry:
-                    raise InputError(f"{place}: expected elements with unique numbers, found {number} again")
+                    raise InputError(f"{place}: expected elements with unique numbers", f"{number} again")
             else:
                 self.others[number] = kind
                 self.surfaces[number] = nodes[: 3 if count in (3, 6) else 4]
@@ -159,12 +159,12 @@ def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]
         begin = begin if entries else place
         entries += row
         if len(entries) > length:
-            raise InputError(f"{begin}: expected {length - 1} nodes of an element, found {len(entries) - 1}")
+            raise InputError(f"{begin}: expected {length - 1} nodes of an element", len(entries) - 1)
         if len(entries) == length:
             yield entries, begin
             entries = []
     if entries:
-        raise InputError(f"{begin}: expected {length - 1} nodes of an element, found {len(entries) - 1}")
+        raise InputError(f"{begin}: expected {length - 1} nodes of an element", len(entries) - 1)
 
 
 @dataclass
@@ -182,7 +182,7 @@ class Instance:
         """Read *INSTANCE and its data lines: a translation, then a rotation about an axis through two points."""
         name = keyword.option("PART")
         if name.upper() not in parts:
-            raise InputError(f"{keyword}: expected PART= one of {', '.join(parts) or 'none'}, found {name}")
+            raise InputError(f"{keyword}: expected PART= one of {', '.join(parts) or 'none'}", name)
         part = parts[name.upper()]
         own = part.copy()
         rows = [([number_of(entry or "0", place) for entry in row], place) for row, place in keyword.rows()]
@@ -201,7 +201,7 @@ class Instance:
             values, place = rows[1]
             axis = np.subtract(values[3:6], values[:3]) if len(values) == 7 else np.zeros(3)
             if not np.linalg.norm(axis) > 0:
-                raise InputError(f"{place}: expected two points on an axis and an angle, found {values}")
+                raise InputError(f"{place}: expected two points on an axis and an angle", values)
             instance.center = np.array(values[:3])
             instance.rotation = Rotation.from_rotvec(np.radians(values[6]) * axis / np.linalg.norm(axis))
         return instance
@@ -226,7 +226,7 @@ class Deck:
         scope, in_step = self.assembly, False
         for keyword in keywords(path):
             if keyword.name in _MAKING:
-                raise InputError(f"{keyword}: expected nodes and elements one by one, found *{keyword.name}")
+                raise InputError(f"{keyword}: expected nodes and elements one by one", f"*{keyword.name}")
             if keyword.name == "STEP":
                 in_step = True
             elif in_step:
@@ -243,12 +243,12 @@ class Deck:
                 self.masses += [keyword] if keyword.name == "MASS" else []
                 self.not_read[keyword.name] += keyword.name not in _OF_THE_LINK
         if scope is not self.assembly:
-            raise InputError("expected *END PART or *END INSTANCE, found the end of the file: it is cut off")
+            raise InputError("expected *END PART or *END INSTANCE", "the end of the file: it is cut off")
         self.assembly.nsets.of_instances = {name: one.scope.nsets for name, one in self.instances.items()}
         self.assembly.elsets.of_instances = {name: one.scope.elsets for name, one in self.instances.items()}
         if not self.instances and self.parts:
             if len(self.parts) > 1:
-                raise InputError(f"expected an *INSTANCE of each part, found none of {', '.join(self.parts)}")
+                raise InputError("expected an *INSTANCE of each part", f"none of {', '.join(self.parts)}")
             self.instances = {name: Instance(part) for name, part in self.parts.items()}
             self.unused.clear()
         self.unused -= {name for name in self.unused if not self.parts[name].solids}
@@ -256,15 +256,15 @@ class Deck:
     def _new_part(self, keyword: Keyword) -> Scope:
         name = keyword.option("NAME").upper()
         if name in self.parts:
-            raise InputError(f"{keyword}: expected parts with unique names, found {name} again")
+            raise InputError(f"{keyword}: expected parts with unique names", f"{name} again")
         self.unused.add(name)
         return self.parts.setdefault(name, Scope())
 
     def _new_instance(self, keyword: Keyword) -> Scope:
         if {"LIBRARY", "INSTANCE"} & keyword.options.keys():
-            raise InputError(f"{keyword}: expected an instance of a part in this deck, found one of results (LIBRARY=)")
+            raise InputError(f"{keyword}: expected an instance of a part in this deck", "one of results (LIBRARY=)")
         self.unused.discard(keyword.option("PART").upper())
         name = keyword.option("NAME").upper()
         if name in self.instances:
-            raise InputError(f"{keyword}: expected instances with unique names, found {name} again")
+            raise InputError(f"{keyword}: expected instances with unique names", f"{name} again")
         return self.instances.setdefault(name, Instance.of(keyword, self.parts)).scope

@@ -49,8 +49,8 @@ def check_count(count: float, given: str, where: str, hint: str = "") -> None:
     """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `given` explains the number."""
     if count > MOST_CELLS:
         raise InputError(
-            f"{where}: expected a mesh.size that fits the part, found {given}: about {count:.2g} cells,"
-            f" {MOST_CELLS:.0e} at most.{hint}"
+            f"{where}: expected a mesh.size that fits the part",
+            f"{given}: about {count:.2g} cells, {MOST_CELLS:.0e} at most.{hint}",
         )
 
 
@@ -60,7 +60,7 @@ def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
     if extent.min() <= 1e-9 * extent.max():
         axis = "xyz"[int(np.argmin(extent))]
         raise InputError(
-            f"{where}: expected a part of some thickness, found all nodes in one plane: zero elements along {axis}"
+            f"{where}: expected a part of some thickness", f"all nodes in one plane: zero elements along {axis}"
         )
     ratio = extent[0] / geometry.length
     if _LENGTHS[0] < ratio < _LENGTHS[1]:
@@ -68,7 +68,7 @@ def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
     others = {unit: ratio * metres / METRES[geometry.unit] for unit, metres in METRES.items() if unit != geometry.unit}
     likely = [unit for unit, corrected in others.items() if 0.8 < corrected < 1.25]
     hint = f': looks like {_NAMES[likely[0]]}: geometry.unit = "{likely[0]}"' if likely else ""
-    raise InputError(f"{where}: expected a part {geometry.length:g} m long, found {extent[0]:g} m along x{hint}")
+    raise InputError(f"{where}: expected a part {geometry.length:g} m long", f"{extent[0]:g} m along x{hint}")
 
 
 def check_neighbours(part: PartMesh, where: str) -> None:
@@ -106,8 +106,8 @@ def check_connected(part: PartMesh, where: str) -> None:
     ]
     more = f", and {count - 4} more" if count > 4 else ""
     raise InputError(
-        f"{where}: expected one connected part, found {count}: {'; '.join(listed)}{more}. Parts that touch must share "
-        "their nodes"
+        f"{where}: expected one connected part",
+        f"{count}: {'; '.join(listed)}{more}. Parts that touch must share their nodes",
     )
 
 
@@ -141,8 +141,9 @@ def check_boundary(part: PartMesh, where: str) -> None:
     if np.any(inside):
         listed = ", ".join(_show(place) for place in on_facets[inside][:3])
         raise InputError(
-            f"{where}: expected elements side by side, found {np.sum(inside)} of their free sides inside others,"
-            f" e.g. at {listed} m: elements overlap, or nodes at one place are not one"
+            f"{where}: expected elements side by side",
+            f"{np.sum(inside)} of their free sides inside others, e.g. at {listed} m: elements overlap, or nodes at"
+            " one place are not one",
         )
 
 
@@ -203,8 +204,9 @@ def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
     change = after / volume - 1
     if abs(change) > _VOLUME:
         raise InputError(
-            f"{where}: expected a mesh.size at which cells follow curved faces, found a volume {100 * change:+.1f} %"
-            " off where cells that fold are straightened: cells are too long for a thin curved wall"
+            f"{where}: expected a mesh.size at which cells follow curved faces",
+            f"a volume {100 * change:+.1f} % off where cells that fold are straightened: cells are too long for a thin"
+            " curved wall",
         )
 
 
@@ -217,7 +219,7 @@ def _determinants(part: PartMesh) -> Array:
 def _reject_cells(part: PartMesh, bad: Booleans, what: str, expected: str, where: str) -> NoReturn:
     middles = part.points[part.corners[bad]].mean(axis=1)
     listed = ", ".join(_show(middle) for middle in middles[:3])
-    raise InputError(f"{where}: expected {expected}, found {np.sum(bad)} {what} of {len(bad)}, e.g. at {listed} m")
+    raise InputError(f"{where}: expected {expected}", f"{np.sum(bad)} {what} of {len(bad)}, e.g. at {listed} m")
 
 
 def _show(point: Array) -> str:

@@ -155,18 +155,18 @@ def _group(source: Source, boundary: PartBoundary, group: str, where: str) -> Ch
             facets = (
                 f"{outside} of the {wanted.size} facets of the group elsewhere: not connected to the volume, or inside"
             )
-            raise InputError(f"{where}: expected a face on the boundary of the part, found {facets}")
+            raise InputError(f"{where}: expected a face on the boundary of the part", facets)
         return np.flatnonzero(np.isin(own, wanted))
     if group in source.point_groups:
         found_facets = np.flatnonzero(np.all(np.isin(boundary.facets, source.point_groups[group]), axis=1))
         if found_facets.size:
             return found_facets
         number = source.point_groups[group].size
-        raise InputError(f"{where}: expected nodes that make up a face, found {number} nodes and no facet among them")
+        raise InputError(f"{where}: expected nodes that make up a face", f"{number} nodes and no facet among them")
     known = sorted({*source.facet_groups, *source.point_groups})
     raise InputError(
-        f'{where}: expected one of the groups of faces or nodes {quoted(known)}, found "{group}"'
-        f"{did_you_mean(group, known)}"
+        f"{where}: expected one of the groups of faces or nodes {quoted(known)}",
+        f'"{group}"{did_you_mean(group, known)}',
     )
 
 
@@ -176,7 +176,7 @@ def _nearest(boundary: PartBoundary, table: PlaceRecord, path: Path) -> Choice:
     where = f"{path}: interface.position of {table.name}"
     magnitude = np.linalg.norm(normal)
     if magnitude == 0:
-        raise InputError(f"{path}: interface.normal of {table.name}: expected a direction, found {table.normal}")
+        raise InputError(f"{path}: interface.normal of {table.name}: expected a direction", table.normal)
     facing = [face for face in boundary.smooth_faces if face.faces_along(normal / magnitude)]
     distances = np.array([face.distance(boundary, position) for face in facing])
     wanted = (
@@ -212,8 +212,8 @@ def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, outlines: Outli
             area, expected = boundary.area[bed].sum(), (end - begin) * outlines.width
             if abs(area - expected) > 1e-6 * expected:
                 raise InputError(
-                    f"{path}: surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name}), "
-                    f"found {area:.6g} m²"
+                    f"{path}: surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name})",
+                    f"{area:.6g} m²",
                 )
             beds[f"patch/{k}/{name}"] = bed
     return beds
@@ -230,7 +230,7 @@ def _tagged(part: PartMesh, boundary: PartBoundary, chosen: dict[str, Choice], p
             continue
         if met.any():
             others = quoted(other for other, number in faces.items() if number in met)
-            raise InputError(f"{path}: interface {name}: expected faces that do not overlap, found it to meet {others}")
+            raise InputError(f"{path}: interface {name}: expected faces that do not overlap", f"it to meet {others}")
         faces[name] = int(tag.max(initial=0)) + 1
         tag[facets] = faces[name]
     on_faces = np.flatnonzero(tag)
@@ -256,7 +256,7 @@ def _reject(where: str, expected: str, given: str, boundary: PartBoundary) -> No
     faces = boundary.smooth_faces
     listed = "".join(f"\n  {face}" for face in faces[:_LISTED])
     more = f"\n  and {len(faces) - _LISTED} smaller ones" if len(faces) > _LISTED else ""
-    raise InputError(f"{where}: expected {expected}, found {given}. The part's faces:{listed}{more}")
+    raise InputError(f"{where}: expected {expected}", f"{given}. The part's faces:{listed}{more}")
 
 
 def _show(vector: Array) -> str:

@@ -96,7 +96,7 @@ def mesh_model(size: float, metres: float, where: str, around: int = CIRCLE) -> 
             problem = "some are flat"
         gmsh.model.mesh.clear()
     raise InputError(
-        f"{where}: expected a shape that elements of {size * metres:g} m can fill, found that they cannot: {problem}"
+        f"{where}: expected a shape that elements of {size * metres:g} m can fill", f"that they cannot: {problem}"
     )
 
 

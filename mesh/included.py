@@ -103,9 +103,9 @@ def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -
                 continue
             other = included(name, file, first)
             if other is None:
-                raise InputError(f"{place}: expected a file to include, found none called {name}")
+                raise InputError(f"{place}: expected a file to include", f"none called {name}")
             if other in within or len(within) > DEEPEST:
-                raise InputError(f"{place}: expected files that do not include themselves, found {name} again")
+                raise InputError(f"{place}: expected files that do not include themselves", f"{name} again")
             yield from of(other, (*within, other))
 
     return of(first, (first,))
@@ -119,7 +119,7 @@ def number_of(token: str, place: str) -> float:
         exponent = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))[DdEe]?([+-]?\d+)", token.strip())
         value = float(f"{exponent[1]}e{exponent[2]}") if exponent else math.nan
     if not math.isfinite(value):
-        raise InputError(f'{place}: expected a finite number, found "{shown(token.strip())}"')
+        raise InputError(f"{place}: expected a finite number", f'"{shown(token.strip())}"')
     return value
 
 
@@ -128,4 +128,4 @@ def whole_of(token: str, place: str) -> int:
     try:
         return int(token)
     except ValueError:
-        raise InputError(f'{place}: expected a whole number, found "{token}"') from None
+        raise InputError(f"{place}: expected a whole number", f'"{token}"') from None

@@ -70,7 +70,7 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
     Raises `InputError` for a file that is missing or cannot be read or meshed, and for an unsound mesh.
     """
     if not file.is_file():
-        raise InputError(f"{file}: expected a STEP file or a mesh, found no such file")
+        raise InputError(f"{file}: expected a STEP file or a mesh", "no such file")
     declared = _declared(file) if is_step(file) else None
     known = unit or declared
     source = source_of_file(file, SolidMeshRecord(), METRES[known or "m"], str(file))
@@ -109,7 +109,7 @@ def _declared(file: Path) -> Unit | None:
     units: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
     millimeters = declared_unit(file.read_text(encoding="latin-1"))
     if millimeters not in units:
-        raise InputError(f"{file}: expected a part drawn in m, mm or in, found a unit of {millimeters:g} mm")
+        raise InputError(f"{file}: expected a part drawn in m, mm or in", f"a unit of {millimeters:g} mm")
     return units[millimeters]
 
 

@@ -55,11 +55,11 @@ def _mesh(file: h5py.File) -> RawMesh:
     name, mesh = _only(file["ENS_MAA"], "mesh")
     attributes = mesh.attrs
     if attributes.get("TYP", 0) != 0:
-        raise InputError(f"expected a mesh of cells, found a structured grid, {name}")
+        raise InputError("expected a mesh of cells", f"a structured grid, {name}")
     if attributes.get("REP", 0) != 0:
-        raise InputError("expected Cartesian coordinates, found cylindrical or spherical ones")
+        raise InputError("expected Cartesian coordinates", "cylindrical or spherical ones")
     if attributes["ESP"] != 3:
-        raise InputError(f"expected a mesh in 3D, found one in {attributes['ESP']} dimensions")
+        raise InputError("expected a mesh in 3D", f"one in {attributes['ESP']} dimensions")
     step = mesh if "NOE" in mesh else _only(mesh, "step of the mesh")[1]
     points = _columns(step["NOE/COO"], 3).astype(np.float64)
     families = file["FAS"][name] if name in file.get("FAS", ()) else {}
@@ -67,7 +67,7 @@ def _mesh(file: h5py.File) -> RawMesh:
     groups = _groups(families.get("ELEME", {}))
     for kind, of in step["MAI"].items():
         if _text(of.attrs, "PFL") not in ("", _WHOLE):
-            raise InputError(f"expected all cells of type {kind}, found a profile of some")
+            raise InputError(f"expected all cells of type {kind}", "a profile of some")
         if kind in _SOLIDS:
             width, name = _SOLIDS[kind]
             cells = in_gmsh_order(name, _cells(of, width), _AS_VTK)
@@ -81,14 +81,14 @@ def _mesh(file: h5py.File) -> RawMesh:
         elif kind.startswith("POG"):
             polygons = True
         elif kind != "PO1":  # points
-            raise InputError(f"expected cells of {', '.join(_SOLIDS)}, found {kind} (polyhedra, or structure elements)")
+            raise InputError(f"expected cells of {', '.join(_SOLIDS)}", f"{kind} (polyhedra, or structure elements)")
     nodes = _members(step["NOE"], _groups(families.get("NOEUD", {})), len(points))
     return blocks.mesh(points, dict(nodes), _remarks(attributes, polygons))
 
 
 def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:
     if len(parent) != 1:
-        raise InputError(f"expected one {what}, found {len(parent)}: {', '.join(parent)}")
+        raise InputError(f"expected one {what}", f"{len(parent)}: {', '.join(parent)}")
     return next(iter(parent.items()))
 
 
@@ -100,7 +100,7 @@ def _columns(data: h5py.Dataset, width: int) -> Any:
 def _cells(of: h5py.Group, width: int) -> Integers:
     nodes = _columns(of["NOD"], width)
     if nodes.dtype.kind not in "iu":
-        raise InputError(f"expected whole numbers of nodes, found {nodes.dtype}")
+        raise InputError("expected whole numbers of nodes", nodes.dtype)
     return nodes.astype(np.int64) - 1
 
 
@@ -116,7 +116,7 @@ def _groups(families: Mapping[str, Any]) -> dict[int, list[str]]:
 def _members(of: h5py.Group, groups: Mapping[int, list[str]], count: int) -> Iterator[tuple[str, Integers]]:
     family = np.asarray(of["FAM"][()]) if "FAM" in of else np.zeros(count, dtype=np.int64)
     if family.shape != (count,):
-        raise InputError(f"expected a family for each of {count} cells or nodes, found {family.size}")
+        raise InputError(f"expected a family for each of {count} cells or nodes", family.size)
     present = set(np.unique(family).tolist())
     for name in {name: None for number in present for name in groups.get(number, ())}:
         yield name, np.flatnonzero(np.isin(family, [number for number in present if name in groups.get(number, ())]))

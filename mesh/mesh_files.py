@@ -58,7 +58,7 @@ def read_mesh(path: Path, where: str) -> RawMesh:
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:  # of a deck like no other
-        raise InputError(f"{where}: expected a deck that can be read, found one that cannot: {error!r}") from None
+        raise InputError(f"{where}: expected a deck that can be read", f"one that cannot: {error!r}") from None
     if ending == ".msh":
         from .msh import read_msh
 
@@ -86,7 +86,7 @@ def read_foreign(path: Path, where: str) -> RawMesh:
         reason = " ".join(reason.replace(str(path), path.name).split())
         if isinstance(error, meshio.ReadError) and path.suffix.lower() not in meshio.extension_to_filetypes:
             reason = f"its ending is not one of {', '.join(_ENDINGS)}: another program has to convert it"
-        raise InputError(f"{where}: expected a mesh that meshio can read, found that it cannot: {reason}") from None
+        raise InputError(f"{where}: expected a mesh that meshio can read", f"that it cannot: {reason}") from None
     words = " ".join(said.getvalue().replace(str(path), path.name).split())
     return replace(raw, remarks=(f"meshio on {path.name}: {words}",)) if words else raw
 

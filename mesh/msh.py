@@ -31,8 +31,8 @@ def read_msh(path: Path, where: str) -> RawMesh:
     if not content.startswith(_HEADER):
         began = content[:20].decode("ascii", errors="replace").split("\n")[0]
         raise InputError(
-            f'{where}: expected a mesh in gmsh\'s format, which begins with $MeshFormat, found "{began}" '
-            "(gmsh's scripts are not run: save the mesh that they make)"
+            f"{where}: expected a mesh in gmsh's format, which begins with $MeshFormat",
+            f'"{began}" (gmsh\'s scripts are not run: save the mesh that they make)',
         )
     with blaming_file(
         lambda error: f"expected a mesh in gmsh's format, found a damaged one: {' '.join(str(error).split())}", where
@@ -51,7 +51,7 @@ def _by_gmsh(content: bytes) -> RawMesh:
             announced, counted = _counts(content, name)[1], sum(map(len, tags))
             if announced != counted:
                 what = name.decode()
-                raise InputError(f"expected the {announced} {what.lower()} that ${what} announces, found {counted}")
+                raise InputError(f"expected the {announced} {what.lower()} that ${what} announces", counted)
         _check_partitions(content)
         return extract_mesh()
 
@@ -64,7 +64,7 @@ def _check_partitions(content: bytes) -> None:
     partitions = {int(number) for entity in entities for number in gmsh.model.getPartitions(*entity)}
     announced = _counts(content, b"PartitionedEntities")[0]
     if len(partitions) < announced:
-        raise InputError(f"expected all {announced} partitions of the mesh in one file, found {len(partitions)}")
+        raise InputError(f"expected all {announced} partitions of the mesh in one file", len(partitions))
 
 
 def _counts(content: bytes, name: bytes) -> tuple[int, int]:
@@ -94,7 +94,7 @@ class _Version2:
         header = self._section(content, b"MeshFormat").split(b"\n")
         self._is_binary = header[0].split()[1] != b"0"
         if self._is_binary and header[1][:4] != np.int32(1).tobytes():
-            raise InputError("expected little-endian numbers, found big-endian ones")
+            raise InputError("expected little-endian numbers", "big-endian ones")
         self._content = content
 
     def mesh(self) -> RawMesh:
@@ -124,7 +124,7 @@ class _Version2:
         _, mark, rest = content.partition(b"$" + name)
         inside, end, _ = rest.partition(b"$End" + name)
         if mark and not end:
-            raise InputError(f"expected ${name.decode()} to end with $End{name.decode()}, found the end of the file")
+            raise InputError(f"expected ${name.decode()} to end with $End{name.decode()}", "the end of the file")
         return inside.partition(b"\n")[2]
 
     def _nodes(self) -> tuple[Callable[[Integers], Integers], Array]:
@@ -144,12 +144,12 @@ class _Version2:
         order = np.argsort(tags, kind="stable")
         ordered = tags[order]
         if np.any(ordered[1:] == ordered[:-1]):
-            raise InputError("expected nodes with unique numbers, found two nodes of one number")
+            raise InputError("expected nodes with unique numbers", "two nodes of one number")
 
         def number(wanted: Integers) -> Integers:
             place = np.minimum(np.searchsorted(ordered, wanted), max(len(ordered) - 1, 0))
             if not len(ordered) or np.any(ordered[place] != wanted):
-                raise InputError("expected elements of the nodes in $Nodes, found some of others")
+                raise InputError("expected elements of the nodes in $Nodes", "some of others")
             return order[place]
 
         return number, points
@@ -168,12 +168,12 @@ class _Version2:
             rows.setdefault((int(line[1]), int(line[2]), len(line)), []).append(line)
             count += 1
         if count != int(lines[0]):
-            raise InputError(f"expected the {int(lines[0])} elements that $Elements announces, found {count}")
+            raise InputError(f"expected the {int(lines[0])} elements that $Elements announces", count)
         for (kind, tags, length), of in rows.items():
             data = np.array(of, dtype=np.int64)
             if length - 3 - tags != GMSH_NODES.get(kind):
                 known = GMSH_NODES.get(kind, "elements of a known type, not")
-                raise InputError(f"expected {known} nodes of elements of type {kind}, found {length - 3 - tags}")
+                raise InputError(f"expected {known} nodes of elements of type {kind}", length - 3 - tags)
             yield kind, data[:, 3 : 3 + tags], data[:, 3 + tags :]
 
     def _binary_elements(self) -> Iterator[tuple[int, Integers, Integers]]:
@@ -182,7 +182,7 @@ class _Version2:
         while done < int(announced):
             kind, count, tags = (int(value) for value in np.frombuffer(data, dtype="<i4", count=3, offset=at))
             if kind not in GMSH_NODES or count < 1 or tags < 0:
-                raise InputError(f"expected elements of a known type, found {count} of type {kind}")
+                raise InputError("expected elements of a known type", f"{count} of type {kind}")
             width = 1 + tags + GMSH_NODES[kind]
             rows = np.frombuffer(data, dtype="<i4", count=count * width, offset=at + 12).reshape(count, width)
             at, done = at + 12 + 4 * count * width, done + count

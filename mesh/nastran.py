@@ -82,7 +82,7 @@ def cards(path: Path) -> Iterator[Card]:
         if row.end:
             ends[row.end] = -1 if row.end in ends else k
     if rows and rows[0].follows and rows[0].begin not in ends:
-        raise InputError(f"expected a card (GRID …) first, found a line that continues none ({rows[0].place})")
+        raise InputError("expected a card (GRID …) first", f"a line that continues none ({rows[0].place})")
     after: dict[int, int] = {}
     for k, row in enumerate(rows):
         if not row.follows:
@@ -92,11 +92,11 @@ def cards(path: Path) -> Iterator[Card]:
             by_mark = ends.get(row.begin)
             before = before if by_mark is None and k and not rows[before].end else -1 if by_mark is None else by_mark
         if before < 0 or before in after:
-            raise InputError(f"{row.place}: expected one card that this line continues, found none or several")
+            raise InputError(f"{row.place}: expected one card that this line continues", "none or several")
         after[before] = k
     for k, row in enumerate(rows):
         if row.is_half and k not in after:
-            raise InputError(f"{row.place}: expected a line that continues this one (*), found none")
+            raise InputError(f"{row.place}: expected a line that continues this one (*)", "none")
         if row.follows:
             continue
         fields = list(row.fields)
@@ -112,9 +112,9 @@ def _bulk(path: Path) -> Iterator[Line]:
     lines = [Line(line.text.partition("$")[0].rstrip(), line.place) for line in lines_of(path, _included)]
     begins = [k for k, line in enumerate(lines) if _BEGIN.match(line.text)]
     if len(begins) > 1:
-        raise InputError(f"{lines[begins[1]].place}: expected one BEGIN BULK, found another (superelements)")
+        raise InputError(f"{lines[begins[1]].place}: expected one BEGIN BULK", "another (superelements)")
     if not begins and any(_CONTROL.match(line.text) for line in lines):
-        raise InputError("expected BEGIN BULK after CEND, found none")
+        raise InputError("expected BEGIN BULK after CEND", "none")
     for line in islice(lines, begins[0] + 1 if begins else 0, None):
         if line.text.strip().upper().startswith("ENDDATA"):
             return
@@ -142,7 +142,7 @@ def _row(line: Line) -> _Row:
         width = 4 if "*" in name else 8
         entries += [""] * (width + 2 - len(entries))
         if any(entries[width + 2 :]):
-            raise InputError(f"{line.place}: expected {width} fields in a line at most, found {len(entries) - 1}")
+            raise InputError(f"{line.place}: expected {width} fields in a line at most", len(entries) - 1)
     else:
         text = text.expandtabs(8)
         name = text[:8].strip()
@@ -154,10 +154,10 @@ def _row(line: Line) -> _Row:
         ]
     if first := _BY_BLANKS.match(name):
         raise InputError(
-            f'{line.place}: expected fields of 8 columns or commas between them, found "{first[0]}" and a blank'
+            f"{line.place}: expected fields of 8 columns or commas between them", f'"{first[0]}" and a blank'
         )
     if name.startswith("=") or any(entry.startswith("=") for entry in entries):
-        raise InputError(f"{line.place}: expected cards one by one, found replicated ones (=)")
+        raise InputError(f"{line.place}: expected cards one by one", "replicated ones (=)")
     follows = not name or name[0] in "+*"
     last = entries[width + 1]
     return _Row(
@@ -225,7 +225,7 @@ class _Deck:
         name = card.name
         if name == "GRID":
             if len(card.fields) > 8:
-                raise InputError(f"{card}: expected 8 fields of a grid point at most, found {len(card.fields)}")
+                raise InputError(f"{card}: expected 8 fields of a grid point at most", len(card.fields))
             _add(self.grids, card, card.whole(0))
         elif name == "GRDSET":
             self.system = card.whole(1, 0)
@@ -236,9 +236,7 @@ class _Deck:
                 if card.text(begin):
                     number = card.whole(begin)
                     if self.systems.setdefault(number, (card, begin))[0].fields != card.fields:
-                        raise InputError(
-                            f"{card}: expected coordinate systems with unique numbers, found {number} again"
-                        )
+                        raise InputError(f"{card}: expected coordinate systems with unique numbers", f"{number} again")
         elif name in _SHELLS:
             _add(self.shells, card, card.whole(0))
             self.others[name] += 1
@@ -247,7 +245,7 @@ class _Deck:
             if name in ("CONM1", "CONM2"):
                 self.masses.append(card)
         elif _OTHER_SOLIDS.fullmatch(name):
-            raise InputError(f"{card}: expected solids of {', '.join(_SOLIDS)}, found {name}")
+            raise InputError(f"{card}: expected solids of {', '.join(_SOLIDS)}", name)
         elif name == "PARAM" and card.text(0).upper() == "WTMASS":
             self.not_read["PARAM WTMASS"] += 1
         else:
@@ -255,7 +253,7 @@ class _Deck:
 
     def mesh(self) -> RawMesh:
         if not self.grids and not self.solids:
-            raise InputError("expected GRID and CTETRA or CHEXA cards, found none")
+            raise InputError("expected GRID and CTETRA or CHEXA cards", "none")
         place = {number: k for k, number in enumerate(self.grids)}
         cells: dict[str, list[list[int]]] = {}
         properties: dict[str, list[int]] = {}
@@ -291,7 +289,7 @@ class _Deck:
     @staticmethod
     def _place(place: dict[int, int], node: int, card: Card) -> int:
         if node not in place:
-            raise InputError(f"{card}: expected existing grid points, found {node}")
+            raise InputError(f"{card}: expected existing grid points", node)
         return place[node]
 
     def _points(self) -> Array:
@@ -311,12 +309,10 @@ class _Deck:
         if number in self._frames:
             frame = self._frames[number]
             if frame is None:
-                raise InputError(
-                    f"{asked}: expected coordinate systems that do not refer to themselves, found {number}"
-                )
+                raise InputError(f"{asked}: expected coordinate systems that do not refer to themselves", number)
             return frame
         if number not in self.systems:
-            raise InputError(f"{asked}: expected a coordinate system of CORD1x or CORD2x cards, found {number}")
+            raise InputError(f"{asked}: expected a coordinate system of CORD1x or CORD2x cards", number)
         self._frames[number] = None
         card, begin = self.systems[number]
         if card.name[4] == "2":
@@ -327,14 +323,14 @@ class _Deck:
         try:
             frame = Frame.through(points, "zx", _SYSTEMS[card.name[5]])
         except ValueError as error:
-            raise InputError(f"{card}: expected three points that span a plane, found {error}") from None
+            raise InputError(f"{card}: expected three points that span a plane", error) from None
         self._frames[number] = frame
         return frame
 
     def _point(self, number: int, asked: Card) -> Array:
         """(3,) of a grid point, in the basic system."""
         if number not in self.grids:
-            raise InputError(f"{asked}: expected existing grid points, found {number}")
+            raise InputError(f"{asked}: expected existing grid points", number)
         card = self.grids[number]
         given = np.array([[card.real(k) for k in (2, 3, 4)]])
         return self._frame(card.whole(1, self.system), card).points(given)[0]
@@ -351,18 +347,18 @@ def _add(cards: dict[int, Card], card: Card, number: int) -> None:
     """Add a card by its number; twice the same is once."""
     other = cards.setdefault(number, card)
     if other is not card and (other.name, other.fields) != (card.name, card.fields):
-        raise InputError(f"{card}: expected cards with unique numbers, found {number} again ({other.place})")
+        raise InputError(f"{card}: expected cards with unique numbers", f"{number} again ({other.place})")
 
 
 def _nodes(card: Card) -> tuple[str, list[int]]:
     corners, most, linear, quadratic = _SOLIDS[card.name]
     fields = card.fields[2:]
     if any(fields[most:]):
-        raise InputError(f"{card}: expected {corners} or {most} grid points, found {len(fields)}")
+        raise InputError(f"{card}: expected {corners} or {most} grid points", len(fields))
     nodes = [card.whole(2 + k, None if k < corners else 0) for k in range(most)]
     middles = [node for node in nodes[corners:] if node]
     if not middles:
         return linear, nodes[:corners]
     if len(middles) < most - corners:
-        raise InputError(f"{card}: expected midside grid points on all edges or none, found {len(middles)}")
+        raise InputError(f"{card}: expected midside grid points on all edges or none", len(middles))
     return quadratic, nodes

@@ -100,8 +100,7 @@ def _source(tables: PartTables, where: str) -> Source:
         for key in ("cell", "size", "divisions"):
             if getattr(record, key) is not None:
                 raise InputError(
-                    f"{tables.path}: mesh.{key}: expected none, since {file.name} is a mesh, found"
-                    f" {getattr(record, key)}"
+                    f"{tables.path}: mesh.{key}: expected none, since {file.name} is a mesh", getattr(record, key)
                 )
     return source_of_file(file, record, METRES[tables.geometry.unit], where)
 

@@ -52,8 +52,8 @@ def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: ob
     if done.returncode == -signal.SIGXCPU:
         seconds = done.stderr.decode().split()[-1]
         raise InputError(
-            f"{where}: expected a part that is read and meshed within {float(seconds):.0f} s of processor time, found"
-            f" no end: a damaged file, or one that needs longer, which {SECONDS}=SECONDS in the environment allows"
+            f"{where}: expected a part that is read and meshed within {float(seconds):.0f} s of processor time",
+            f"no end: a damaged file, or one that needs longer, which {SECONDS}=SECONDS in the environment allows",
         )
     if done.returncode < 0:
         name = signal.Signals(-done.returncode).name

@@ -154,4 +154,4 @@ def _dim_tags(entities: DimTags) -> DimTags:
 
 
 def _reject(path: Path, key: str, expected: str, given: str) -> NoReturn:
-    raise InputError(f"{path}: geometry.hole.{key}: expected {expected}, found {given}")
+    raise InputError(f"{path}: geometry.hole.{key}: expected {expected}", given)

@@ -173,7 +173,7 @@ def _onto_plane(cells: _Cells, cell: Integers, X: Array, along: Array) -> Array:
             return X
     f, gradient = cells.distance(cell, X)
     if np.any(np.abs(f) > GRAZING * np.linalg.norm(gradient, axis=1)):
-        raise SolveError("expected curved cells that a section cuts in points, found none in one: use smaller elements")
+        raise SolveError("expected curved cells that a section cuts in points", "none in one: use smaller elements")
     return X
 
 

@@ -115,7 +115,7 @@ def source_from(raw: RawMesh, where: str) -> Source:
     straight = degree == 2 and _is_straight(raw.points, cells, cell)
     if kind == "hexahedron20" and not straight:
         raise InputError(
-            f"{where}: expected hexahedra of 8 or 27 nodes where edges are curved, found hexahedra of 20 nodes"
+            f"{where}: expected hexahedra of 8 or 27 nodes where edges are curved", "hexahedra of 20 nodes"
         )
     if straight:
         cells, degree = cells[:, : len(CELLS[cell].corners)], 1
@@ -163,15 +163,15 @@ def _check_nodes(raw: RawMesh, cells: Integers, where: str) -> None:
         if np.any(outside):
             first = int(np.argmax(outside)) + 1
             raise InputError(
-                f"{where}: expected {what} with nodes 1 to {len(raw.points)} of the file, found {np.sum(outside)} of "
-                f"{len(nodes)} with others, first in number {first}"
+                f"{where}: expected {what} with nodes 1 to {len(raw.points)} of the file",
+                f"{np.sum(outside)} of {len(nodes)} with others, first in number {first}",
             )
     if any(np.any((group < 0) | (group >= len(raw.points))) for group in raw.point_groups.values()):
-        raise InputError(f"{where}: expected sets of nodes of the file, found missing nodes")
+        raise InputError(f"{where}: expected sets of nodes of the file", "missing nodes")
     with np.errstate(over="ignore"):
         lost = ~np.isfinite(np.sum(raw.points[np.unique(cells)] ** 2, axis=1))
     if np.any(lost):
-        raise InputError(f"{where}: expected nodes with finite coordinates, found {np.sum(lost)} without")
+        raise InputError(f"{where}: expected nodes with finite coordinates", f"{np.sum(lost)} without")
 
 
 def _left_out(raw: RawMesh, cells: Integers, cell: CellName) -> Iterator[str]:
@@ -216,13 +216,13 @@ def _only_kind(raw: RawMesh, where: str) -> str:
     if not listed:
         shells = sum(map(len, raw.surfaces))
         hint = f": {shells} triangles or quadrilaterals (shells) only" if shells else ""
-        raise InputError(f"{where}: expected a mesh of volume elements, found none{'; '.join((hint, *raw.remarks))}")
+        raise InputError(f"{where}: expected a mesh of volume elements", f"none{'; '.join((hint, *raw.remarks))}")
     unsupported = [kind for kind in counts if kind not in _SUPPORTED]
     if unsupported:
         known = "tetrahedra of 4 or 10 nodes, hexahedra of 8 or 27 nodes"
-        raise InputError(f"{where}: expected {known}, found unsupported elements: {listed}")
+        raise InputError(f"{where}: expected {known}", f"unsupported elements: {listed}")
     if len(counts) > 1:
-        raise InputError(f"{where}: expected volume elements of one type, found a mixture: {listed}")
+        raise InputError(f"{where}: expected volume elements of one type", f"a mixture: {listed}")
     return next(iter(counts))
 
 

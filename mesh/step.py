@@ -35,7 +35,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
     """
     text = file.read_text(encoding="latin-1")
     if "ISO-10303-21" not in text[:4096]:
-        raise InputError(f"{where}: expected a STEP file, which begins with ISO-10303-21, found none")
+        raise InputError(f"{where}: expected a STEP file, which begins with ISO-10303-21", "none")
     declared = declared_unit(text)
     with gmsh_session() as printed:
         gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
@@ -45,7 +45,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         _check_volumes(text, where)
         # Of a damaged file OpenCASCADE makes a part of what is left, and says so.
         if complaints := [f"{what.lower()} ({count})" for what, count in _COMPLAINT.findall(printed())]:
-            raise InputError(f"{where}: expected a sound STEP file, found one damaged: {', '.join(complaints)}")
+            raise InputError(f"{where}: expected a sound STEP file", f"one damaged: {', '.join(complaints)}")
         _check_edges(where)
         remarks = tuple(_left_out(text))
         _join()
@@ -76,7 +76,7 @@ def declared_unit(content: str) -> float:
 def _check_volumes(text: str, where: str) -> None:
     volumes, declared = len(gmsh.model.getEntities(3)), len(_SOLID.findall(text))
     if 0 < volumes < declared:
-        raise InputError(f"{where}: expected the {declared} solids of the file, found {volumes} that can be read")
+        raise InputError(f"{where}: expected the {declared} solids of the file", f"{volumes} that can be read")
     if volumes:
         return
     faces = len(gmsh.model.getEntities(2))
@@ -85,7 +85,7 @@ def _check_volumes(text: str, where: str) -> None:
         if faces
         else "nothing: the file is empty or corrupt"
     )
-    raise InputError(f"{where}: expected a closed volume, found {instead}")
+    raise InputError(f"{where}: expected a closed volume", instead)
 
 
 def _check_edges(where: str) -> None:
@@ -105,8 +105,8 @@ def _check_edges(where: str) -> None:
             if not max(off) <= most:
                 place = ", ".join(f"{value:.4g}" for value in points[2])
                 raise InputError(
-                    f"{where}: expected edges that lie on their faces and end at their vertices, found one"
-                    f" {max(off):.3g} mm off, near ({place}) mm: a damaged file"
+                    f"{where}: expected edges that lie on their faces and end at their vertices",
+                    f"one {max(off):.3g} mm off, near ({place}) mm: a damaged file",
                 )
 
 

@@ -119,7 +119,8 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
     if gain.shape != size:
         raise InputError(
             f"{setup.robot.path}: controller state-feedback: expected gain with {size[0]} × {size[1]} numbers (inputs,"
-            f" states of the observer), found {' × '.join(map(str, gain.shape))}"
+            " states of the observer)",
+            " × ".join(map(str, gain.shape)),
         )
     K[np.ix_(setup.places(*record.inputs), np.array(states, dtype=int))] = gain
     return LinearFeedback(setup, K)
@@ -163,7 +164,7 @@ class PythonControl:
         except (Exception, SystemExit) as error:  # the user's code may raise anything
             raise SolveError(f"{label}: {_in_words(error)}") from error
         if not callable(self.act):
-            raise SolveError(f"{label}: expected it to return a function (k, y) → u, found {self.act!r}")
+            raise SolveError(f"{label}: expected it to return a function (k, y) → u", f"{self.act!r}")
 
     def __call__(self, k: int, y: Array) -> Array:
         """What the user's function commands at sample k."""
@@ -173,7 +174,7 @@ class PythonControl:
             raise SolveError(f"{self._at(k)}: {_in_words(error)}") from error
         if u.shape != (self.size,) or not np.isfinite(u).all():
             raise SolveError(
-                f"{self._at(k)}: expected {self.size} finite commands, shape ({self.size},), found shape {u.shape}: {u}"
+                f"{self._at(k)}: expected {self.size} finite commands, shape ({self.size},)", f"shape {u.shape}: {u}"
             )
         return u
 
@@ -205,7 +206,7 @@ def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[i
     finally:
         imported_files()  # as they are now
     if not callable(found.get(name)):
-        raise InputError(f'{path}: controller: expected the function "{name}", found none')
+        raise InputError(f'{path}: controller: expected the function "{name}"', "none")
     return found[name]
 
 

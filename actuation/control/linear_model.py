@@ -233,7 +233,7 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
         cells = {k: np.array(v, dtype=object) if isinstance(v, tuple) else v for k, v in arrays.items()}
         savemat(content, cells, oned_as="column")
     else:
-        raise InputError(f'{path}: expected a file name that ends in .npz or .mat, found "{path.name}"')
+        raise InputError(f"{path}: expected a file name that ends in .npz or .mat", f'"{path.name}"')
     write_atomically(path, content.getvalue(), "linear model")
 
 

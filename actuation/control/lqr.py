@@ -52,22 +52,22 @@ class LqrControl:
         self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
         names = [setup.inputs[i] for i in self.inputs]
         if not names:
-            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as inputs, found none")
+            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as inputs", "none")
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)
         waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)
         if len(model.A) + waiting > MOST_STATES:
             raise InputError(
-                f"{setup.robot.path}: controller lqr: expected at most {MOST_STATES} states, found {len(model.A)}"
-                f" of the model and {waiting} commands on their way: a shorter delay or fewer inputs"
+                f"{setup.robot.path}: controller lqr: expected at most {MOST_STATES} states",
+                f"{len(model.A)} of the model and {waiting} commands on their way: a shorter delay or fewer inputs",
             )
         discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
         try:
             self.K = gains(discrete, Q, R)
         except ValueError as error:
             raise InputError(
-                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilize,"
-                f" found none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}"
+                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilize",
+                f"none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}",
             ) from None
         self.bandwidth = _bandwidth(model.A, discrete.A - discrete.B @ self.K, setup.sample_time)
         self.values, self.rates, differences = _estimates(record, setup, model)

@@ -152,8 +152,8 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
         unseen, still = hidden(A, C, states), hidden(A.T, Q, states)
         if not unseen and not still:
             raise InputError(
-                "expected noise with which the Riccati equation has a solution to round-off, found sensors far more"
-                f" exact than `process` moves the robot? ({' '.join(str(error).split())})"
+                "expected noise with which the Riccati equation has a solution to round-off",
+                f"sensors far more exact than `process` moves the robot? ({' '.join(str(error).split())})",
             ) from None
         why = f"they cannot see {', '.join(unseen)}" if unseen else f"`process` does not reach {', '.join(still)}"
         raise InputError(f"expected sensors that see every motion that does not decay, found: {why}") from None
@@ -187,12 +187,12 @@ def given(record: GainsObserver, setup: Setup) -> Observer:
     for name, of, size in (("A", A, (n, n)), ("B", B, (n, m)), ("C", C, (p, n)), ("gain", gain, (n, p))):
         if of.shape != size:
             raise InputError(
-                f"expected {name} with {size[0]} × {size[1]} numbers ({n} states, {m} inputs, {p} outputs), found"
-                f" {of.shape[0]} × {of.shape[1]}"
+                f"expected {name} with {size[0]} × {size[1]} numbers ({n} states, {m} inputs, {p} outputs)",
+                f"{of.shape[0]} × {of.shape[1]}",
             )
     scale = np.array(record.scale or (1.0,) * p)
     if len(scale) != p:
-        raise InputError(f"expected {p} numbers as scale, one of each output, found {len(scale)}")
+        raise InputError(f"expected {p} numbers as scale, one of each output", len(scale))
     rows, columns = setup.columns(*record.outputs), setup.places(*record.inputs)
     C_all, M = np.zeros((len(setup.outputs), n)), np.zeros((n, len(setup.outputs)))
     B_all = np.zeros((n, len(setup.inputs)))
@@ -202,7 +202,7 @@ def given(record: GainsObserver, setup: Setup) -> Observer:
         A, B_all, C_all, np.zeros_like(M), M, np.vstack([C / scale[:, None], np.eye(n)]), np.full((n, n), np.nan), names
     )
     if found.radius >= 1.0:
-        raise InputError(f"expected eigenvalues of A − gain C below 1 in size, found {found.radius:.6g}")
+        raise InputError("expected eigenvalues of A − gain C below 1 in size", f"{found.radius:.6g}")
     return found
 
 
@@ -396,7 +396,7 @@ def make_observed(
             schedule = Schedule(np.zeros(1), (given(record, setup),))
             reference = origin[:, setup.columns(*record.outputs)]
         if (radius := schedule.radius) >= 1.0:
-            raise InputError(f"expected errors that die out along the path, found |eigenvalue| = {radius:.6g}")
+            raise InputError("expected errors that die out along the path", f"|eigenvalue| = {radius:.6g}")
     except InputError as error:
         raise InputError(f"{robot.path}: observer: {str(error).removeprefix(f'{robot.path}: controller: ')}") from None
     every = schedule.observers[0].estimates

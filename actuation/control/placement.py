@@ -152,18 +152,18 @@ def place(
     count = wanted.count or link.layout.patch_count
     modes = wanted.modes or min(count, link.served)
     if link.layout.coupling == "surface":
-        raise InputError(f'{key}: expected patches with coupling = "rotation", found "surface", outlined in the mesh')
+        raise InputError(f'{key}: expected patches with coupling = "rotation"', '"surface", outlined in the mesh')
     if wanted.pzt not in (None, link.layout.label):
-        raise InputError(f'{key}.pzt: expected "{link.layout.label}", found "{wanted.pzt}"')
+        raise InputError(f'{key}.pzt: expected "{link.layout.label}"', f'"{wanted.pzt}"')
     if modes > link.served or (F_p is not None and modes > count):
         most = link.served if F_p is None else min(count, link.served)
-        raise InputError(f"{key}.modes: expected at most {most}, found {modes}")
+        raise InputError(f"{key}.modes: expected at most {most}", modes)
     candidates = _candidates(scene_path, wanted, link, count)
     reach = locked_modes(model, link, modes) if model is not None else link_modes(link, modes)
     even = link.patches(count=count, centers=None)
     largest = np.square(reach.shape @ candidates.Phi_V).max(axis=1)
     if not np.all(largest > 0.0):
-        raise InputError(f'{key}: expected modes that patches on "{link.name}" can reach, found some they cannot')
+        raise InputError(f'{key}: expected modes that patches on "{link.name}" can reach', "some they cannot")
 
     def gain(Phi_V: Array) -> Array:
         return np.asarray(np.square(reach.shape @ Phi_V) / largest[:, None])
@@ -261,8 +261,9 @@ def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count:
     gap = ceil(length / spacing * (1 - 1e-9))
     if steps < 0 or steps + 1 <= (count - 1) * gap:
         raise InputError(
-            f'{scene_path}: placement.count: expected patches that fit side by side on "{link.name}"'
-            f" ({link.length:g} m, centers every {spacing:g} m), found {count} of {length:g} m"
+            f'{scene_path}: placement.count: expected patches that fit side by side on "{link.name}" ({link.length:g}'
+            f" m, centers every {spacing:g} m)",
+            f"{count} of {length:g} m",
         )
     centers = length / 2 + spacing * np.arange(steps + 1)
     columns, capacitance = np.zeros((len(link.stiffness), len(centers))), np.ones(len(centers))
@@ -382,7 +383,7 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
     if label not in of_link.arrays:
         found = f'"{label}"' if label else "none"
         raise InputError(
-            f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}", found {found}'
+            f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}"', found
         )
     reached, layout = of_link.modes[label], of_link.arrays[label].layout
 

@@ -49,8 +49,7 @@ class RigidArm:
         freedom, count = rigid_freedom(model), sum(len(columns) for columns in model.motors.values())
         if count != freedom:
             raise InputError(
-                f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them), found"
-                f" {count}"
+                f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them)", count
             )
         scene = model.scene.model_copy(update={"load": (), "trajectory": ()})
         free = build_model(scene, [_rigid(node.body) for node in model.tree.nodes])
@@ -83,9 +82,9 @@ class RigidArm:
         q, left = self._model.constraints.postures(self._q[None], now, self._search, beside)
         if not left[0] <= MET:
             raise SolveError(
-                f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have, found"
-                f" {np.round(gamma, 6)}, {left[0]:.2g} (rad, sizes of the robot) from such: smaller steps of the path,"
-                " or a loop that stays nearer to it"
+                f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have",
+                f"{np.round(gamma, 6)}, {left[0]:.2g} (rad, sizes of the robot) from such: smaller steps of the path,"
+                " or a loop that stays nearer to it",
             )
         self._q = q[0]
         return self._q, constraint_values(self._model, q, now)[1][0]
@@ -324,7 +323,7 @@ class Setup:
 
     def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
         if missing := [name for name in names if name not in among]:
-            raise InputError(f"{self.robot.path}: controller: expected {of}, {quoted(among)}, found {quoted(missing)}")
+            raise InputError(f"{self.robot.path}: controller: expected {of}, {quoted(among)}", quoted(missing))
         return np.array([among.index(name) for name in names], dtype=int)
 
     def patch_places(self, body: str) -> Indices:

@@ -262,11 +262,12 @@ def check_joint(model: Model, joint: str) -> None:
     if not record.units or joint not in model.tree.carried:
         why = "at which a loop is cut" if record.units else "whose orientation is no list of coordinates"
         raise InputError(
-            f"{scene.path}: sensor or controller: joint: expected one with coordinates, found"
-            f' "{joint}", a {record.type} joint {why}'
+            f"{scene.path}: sensor or controller: joint: expected one with coordinates",
+            f'"{joint}", a {record.type} joint {why}',
         )
     if record.type == "planar" and model.tree.nodes[model.tree.carried[joint]].backwards:
         raise InputError(
             f"{scene.path}: {record.label}: between: expected the side nearer to the ground first where sensors read a"
-            " planar joint, found it second"
+            " planar joint",
+            "it second",
         )

@@ -58,7 +58,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     K, D, B, C = model.second_order
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
     if b.shape[1] != len(c):
-        raise InputError(f"zeros: expected as many inputs as outputs, found {b.shape[1]} and {len(c)}")
+        raise InputError("zeros: expected as many inputs as outputs", f"{b.shape[1]} and {len(c)}")
     scale = _pace(K, D)
     s = scale * (0.1 + 0.1j)  # any that is no pole
     passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)

@@ -314,7 +314,7 @@ def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSecti
     slack = np.minimum(1e-9 * body.length, 0.25 * (ends - starts))
     covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
     if not covered.any(axis=1).all():  # round-off: it begins where it ends
-        raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
+        raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m", "less")
     extents = sections.extent(layout.normal, side(layout))[:-1]
     jump = np.abs(np.diff(extents)) / np.maximum(extents[1:], extents[:-1])
     jumps = np.where(covered[:, 1:] & covered[:, :-1], jump, 0.0)
@@ -323,9 +323,9 @@ def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSecti
         k = int(jumps[number].argmax())
         what = "height" if layout.normal == "y" else "width"
         raise InputError(
-            f"{key}: expected patches on one section each, found patch {number + 1} ({starts[number]:g} to"
-            f" {ends[number]:g} m) across a step of the {what} from {extents[k]:g} to {extents[k + 1]:g} m at"
-            f" {x[k + 1]:g} m"
+            f"{key}: expected patches on one section each",
+            f"patch {number + 1} ({starts[number]:g} to {ends[number]:g} m) across a step of the {what} from"
+            f" {extents[k]:g} to {extents[k + 1]:g} m at {x[k + 1]:g} m",
         )
     last, cut = covered.copy(), covered.copy()
     last[:, :-1] &= ~covered[:, 1:]
@@ -347,24 +347,24 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
     patches = body.surface_patches
     if patches is None:
         raise InputError(
-            f'{key}: coupling: expected "rotation", or a link whose file outlines the patches ([surface_patch]), found'
-            ' "surface" and none outlined'
+            f'{key}: coupling: expected "rotation", or a link whose file outlines the patches ([surface_patch])',
+            '"surface" and none outlined',
         )
     found = (*edges.ravel(), layout.width)
     outlined = (*patches.edges.ravel(), patches.width)
     if len(found) != len(outlined) or not np.allclose(found, outlined, rtol=0.0, atol=1e-6 * body.length):
         raise InputError(
             f"{key}: coupling: expected the {len(patches.edges)} patches that the link file outlines, from"
-            f" {_places(patches.edges)} m and {patches.width:g} m wide, found {len(edges)}, from {_places(edges)} m and"
-            f" {layout.width:g} m wide"
+            f" {_places(patches.edges)} m and {patches.width:g} m wide",
+            f"{len(edges)}, from {_places(edges)} m and {layout.width:g} m wide",
         )
     outlined_on = {"+y": patches.top, "-y": patches.bottom}
     if layout.strain == "biaxial":
         across = {"+y": patches.top_across, "-y": patches.bottom_across}
         if any((of is None) != (across[face] is None) for face, of in outlined_on.items()):
             raise InputError(
-                f'{key}: strain: expected "uniaxial", or a modal body file with strains across outlined patches, found'
-                " one of an earlier version: recompute it from its link file with `ffrobot link`"
+                f'{key}: strain: expected "uniaxial", or a modal body file with strains across outlined patches',
+                "one of an earlier version: recompute it from its link file with `ffrobot link`",
             )
         outlined_on = {
             face: None if of is None or (more := across[face]) is None else of + more
@@ -373,8 +373,8 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
     wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else []
     if missing := [face for face in wanted if outlined_on[face] is None]:
         raise InputError(
-            f"{key}: face: expected patches on faces that the link file outlines ([surface_patch] faces), found"
-            f' "{layout.face}", of which {missing[0]} has none outlined'
+            f"{key}: face: expected patches on faces that the link file outlines ([surface_patch] faces)",
+            f'"{layout.face}", of which {missing[0]} has none outlined',
         )
     signs = {"+y": -1.0, "-y": 1.0}
     faces = [signs[name] * of for name, of in outlined_on.items() if of is not None and (not wanted or name in wanted)]

@@ -250,12 +250,12 @@ def _check_charges(path: Path, array: PatchArray, cuts: Array) -> None:
     layout, slack = array.layout, 1e-6 * array.layout.length
     where = f"{_key(path, layout.label)}: {'shunt' if layout.shunt is not None else 'electrodes'}"
     if layout.shunt is not None:
-        raise InputError(f"{where}: expected a link in one piece with a shunt, found {len(cuts) + 1} pieces")
+        raise InputError(f"{where}: expected a link in one piece with a shunt", f"{len(cuts) + 1} pieces")
     through = ((cuts > array.edges[:, :1] + slack) & (cuts < array.edges[:, 1:] - slack)).any(axis=0)
     if layout.gives_way and through.any():
         raise InputError(
-            f'{where}: expected no cut between pieces through a patch with electrodes = "open", found one at'
-            f" {cuts[through][0]:g} m: change pieces, or centers"
+            f'{where}: expected no cut between pieces through a patch with electrodes = "open"',
+            f"one at {cuts[through][0]:g} m: change pieces, or centers",
         )
 
 
@@ -289,9 +289,9 @@ def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: Mod
     if not modes.served:
         families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
         raise InputError(
-            f"{_key(path, layout.label)}: bends: expected eigenmodes of the link that patches for"
-            f' "{layout.acts_in}" reach, found eigenmodes in {families}: add such modes ([modes] family, a'
-            " larger count), or move the patches"
+            f'{_key(path, layout.label)}: bends: expected eigenmodes of the link that patches for "{layout.acts_in}"'
+            " reach",
+            f"eigenmodes in {families}: add such modes ([modes] family, a larger count), or move the patches",
         )
 
 
@@ -313,7 +313,7 @@ def _together(
     for layout in layouts:
         if layout.mode_weights is not None or layout.point_weights is not None:
             beside = f'with other layouts on "{layout.body}"'
-            raise InputError(f"{_key(path, layout.label)}: expected no weights {beside}, found them")
+            raise InputError(f"{_key(path, layout.label)}: expected no weights {beside}", "them")
     Phi_V = reached.seen(per_volt).T
     return Reach(
         Phi_V=Phi_V,

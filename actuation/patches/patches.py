@@ -78,8 +78,8 @@ def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: 
     if layout.mode_weights is not None:
         if len(layout.mode_weights) != served:
             raise InputError(
-                f"{key}: mode_weights: expected {served} weights, one for each mode that the patches serve,"
-                f" found {len(layout.mode_weights)}"
+                f"{key}: mode_weights: expected {served} weights, one for each mode that the patches serve",
+                len(layout.mode_weights),
             )
         shares = np.array(layout.mode_weights) / max(layout.mode_weights)
         root = np.ones(len(order))
@@ -90,13 +90,12 @@ def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: 
     unknown = layout.point_weights.keys() - points.keys()
     if unknown:
         raise InputError(
-            f"{key}: point_weights: expected points of the link, {', '.join(points)}, found"
-            f" {', '.join(sorted(unknown))}"
+            f"{key}: point_weights: expected points of the link, {', '.join(points)}", ", ".join(sorted(unknown))
         )
     rows = np.vstack([np.sqrt(weight) * points[name] / stiffness for name, weight in layout.point_weights.items()])
     size = np.linalg.norm(rows, 2)
     if not size > 0.0:
-        raise InputError(f"{key}: point_weights: expected points that move with the modes, found none that do")
+        raise InputError(f"{key}: point_weights: expected points that move with the modes", "none that do")
     softest = np.sqrt(stiffness.min() / stiffness)
     return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
 
@@ -106,16 +105,16 @@ def check_all_served(key: str, reach: Reach) -> None:
     advice = 'or accept unmet modal forces: allocation = "least-squares"'
     n, k = reach.served, reach.Phi_V.shape[1]
     if not n:
-        raise InputError(f"{key}: expected modes of the link for the patches to serve, found none")
+        raise InputError(f"{key}: expected modes of the link for the patches to serve", "none")
     if k < n:
-        raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
+        raise InputError(f"{key}: expected as many patches as modes ({n}) or more", f"{k}: add patches, {advice}")
     unreached = reach.unreached_modes
     if unreached.size:
         modes = ", ".join(f"{j + 1} ({reach.frequency[j]:.4g} Hz)" for j in unreached)
         raise InputError(
-            f"{key}: expected patches that excite every mode, found a singular Φ_V (condition number"
-            f" {min(reach.condition_number, MOST_CONDITION):.1g}): no voltages serve mode {modes};"
-            f" move patches, {advice}"
+            f"{key}: expected patches that excite every mode",
+            f"a singular Φ_V (condition number {min(reach.condition_number, MOST_CONDITION):.1g}): no voltages serve"
+            f" mode {modes}; move patches, {advice}",
         )
 
 
@@ -315,14 +314,13 @@ def check_edges(key: str, edges: Array, length: float) -> None:
     for k, (start, end) in enumerate(edges, 1):
         if start < -slack or end > length + slack:
             raise InputError(
-                f"{key}: expected patches within the link, 0 … {length:g} m, found patch {k} from {start:g} to"
-                f" {end:g} m"
+                f"{key}: expected patches within the link, 0 … {length:g} m", f"patch {k} from {start:g} to {end:g} m"
             )
     for k, following in pairwise(np.argsort(edges[:, 0])):
         if edges[following, 0] < edges[k, 1] - slack:
             first, second = sorted((k + 1, following + 1))
             (a, b), (c, d) = edges[first - 1], edges[second - 1]
             raise InputError(
-                f"{key}: expected patches side by side, found patch {first} ({a:g} to {b:g} m) and patch {second}"
-                f" ({c:g} to {d:g} m) on the same place"
+                f"{key}: expected patches side by side",
+                f"patch {first} ({a:g} to {b:g} m) and patch {second} ({c:g} to {d:g} m) on the same place",
             )

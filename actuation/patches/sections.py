@@ -97,13 +97,13 @@ def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twis
     """Raise `InputError` where the modal body lacks the section data for patches on faces with that normal."""
     if np.isnan(link_sections(body).extent(normal)).any():
         raise InputError(
-            f"{key}: expected a modal body file with the width of the link (stations/width), found one of an earlier"
-            " version: recompute it from its link file with `ffrobot link`"
+            f"{key}: expected a modal body file with the width of the link (stations/width)",
+            "one of an earlier version: recompute it from its link file with `ffrobot link`",
         )
     if twists and body.stations.outline is None:
         raise InputError(
-            f'{key}: bends: expected a beam link for "twist", found a {body.kind}: how twist shears its surface is not'
-            " known"
+            f'{key}: bends: expected a beam link for "twist"',
+            f"a {body.kind}: how twist shears its surface is not known",
         )
 
 
@@ -119,8 +119,8 @@ def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> N
         k = int(beyond.argmax())
         where = f", {layout.offset:g} m off its axis," if layout.offset else ""
         raise InputError(
-            f"{key}: width: expected patches on the face of the link, {face[k]:.3g} m wide at {x[k]:.3g} m, found"
-            f" patches {layout.width:g} m wide{where} which stand out: units are SI; is this in mm?"
+            f"{key}: width: expected patches on the face of the link, {face[k]:.3g} m wide at {x[k]:.3g} m",
+            f"patches {layout.width:g} m wide{where} which stand out: units are SI; is this in mm?",
         )
 
 

@@ -254,9 +254,9 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
     if wanted[-1] > available:
         key = "count" if link.modes.indices is None else "indices"
         raise InputError(
-            f"{path}: modes.{key}: expected at most {available}, the number of modes available in family "
-            f'"{link.modes.family if isinstance(link.modes.family, str) else " + ".join(link.families)}" on this mesh,'
-            f" found {wanted[-1]}"
+            f"{path}: modes.{key}: expected at most {available}, the number of modes available in family"
+            f' "{link.modes.family if isinstance(link.modes.family, str) else " + ".join(link.families)}" on this mesh',
+            wanted[-1],
         )
     return wanted
 

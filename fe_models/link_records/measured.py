@@ -53,11 +53,11 @@ def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMo
     _check_header(path, header)
     rows = [_row(path, line, header, row, families) for line, row in table]
     if not rows:
-        raise InputError(f"{path}: expected at least one measured mode below the header, found none")
+        raise InputError(f"{path}: expected at least one measured mode below the header", "none")
     seen = set[tuple[str, int]]()
     for row in rows:
         if (row.family, row.number) in seen:
-            raise InputError(f"{path}: line {row.line}: expected each mode once, found {row.label} again")
+            raise InputError(f"{path}: line {row.line}: expected each mode once", f"{row.label} again")
         seen.add((row.family, row.number))
     return rows
 
@@ -68,24 +68,24 @@ def _check_header(path: Path, header: list[str]) -> None:
         check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
     if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
         columns = shown(",".join(header))
-        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio, found {columns!r}")
+        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio", f"{columns!r}")
 
 
 def _row(path: Path, line: int, header: list[str], row: list[str], families: tuple[str, ...]) -> MeasuredMode:
     where = f"{path}: line {line}"
     if len(row) != len(header):
-        raise InputError(f"{where}: expected as many entries as the header has, found more or fewer")
+        raise InputError(f"{where}: expected as many entries as the header has", "more or fewer")
     texts = dict(zip(header, row, strict=True))
     number = texts["mode"]
     if not (number.isascii() and number.isdecimal() and int(number[:9]) > 0):
-        raise InputError(f'{where}: mode: expected a whole number from 1 on, found "{shown(number)}"')
+        raise InputError(f"{where}: mode: expected a whole number from 1 on", f'"{shown(number)}"')
     family = texts.get("family", "")
     if family:
         known = quoted(families) if families else "none of a robot, whose modes have no family"
         check_known(family, families, f"{where}: family: expected {known}")
     frequency, damping, spread = (_number(where, name, texts.get(name, "")) for name in COLUMNS[2:])
     if frequency is None and damping is None:
-        raise InputError(f"{where}: expected a frequency or a damping_ratio, found neither")
+        raise InputError(f"{where}: expected a frequency or a damping_ratio", "neither")
     return MeasuredMode(line, int(number[:9]), family, frequency, damping, spread)
 
 
@@ -100,7 +100,7 @@ def _number(where: str, name: str, text: str) -> float | None:
     least = value >= 0.0 if name == "damping_ratio" else value > 0.0
     if not (isfinite(value) and least and value < LARGEST):
         bound = "not below 0" if name == "damping_ratio" else "above 0, in Hz"
-        raise InputError(f'{where}: {name}: expected a number {bound}, or nothing, found "{shown(text)}"')
+        raise InputError(f"{where}: {name}: expected a number {bound}, or nothing", f'"{shown(text)}"')
     return value
 
 

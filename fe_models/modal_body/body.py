@@ -161,8 +161,8 @@ class ModalBody(Integrals, Frozen):
         outside = x[~((positions[0] - slack <= x) & (x <= positions[-1] + slack))]
         if outside.size:
             raise InputError(
-                f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's, found"
-                f" {outside[0]:g} m"
+                f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's",
+                f"{outside[0]:g} m",
             )
         return interpolate(self.stations, x.clip(positions[0], positions[-1]))
 

@@ -97,8 +97,8 @@ def interface_coordinates(
     rows = np.concatenate(motions)
     if len(rows) != static:
         raise InputError(
-            f"craig-bampton: expected interfaces that can move freely ({', '.join(names)}), found only {static}"
-            " independent static shapes: interfaces too near to each other, or to the root"
+            f"craig-bampton: expected interfaces that can move freely ({', '.join(names)})",
+            f"only {static} independent static shapes: interfaces too near to each other, or to the root",
         )
     omega = np.sqrt(omega2)
     size = np.linalg.norm(rows / omega, axis=1)  # √ of the flexibility

@@ -72,8 +72,9 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
         across = integrals.S_bar_kl[2, 2] - integrals.S_spin
         if np.linalg.eigvalsh(across).min(initial=0.0) < -IDENTITY_TOLERANCE * np.abs(across).max(initial=0.0):
             raise InputError(
-                f"interface.inertia of {lump.name}: expected moments of inertia of which none is larger than the sum of"
-                f" the others, found {lump.inertia.tolist()}"
+                f"interface.inertia of {lump.name}: expected moments of inertia of which none is larger than the sum"
+                " of the others",
+                lump.inertia.tolist(),
             )
     return integrals
 

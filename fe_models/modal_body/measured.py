@@ -36,7 +36,7 @@ def with_measured(body: ModalBody, link: Link) -> ModalBody:
     path = link.measured.table
     rows = dict(paired(read_measured(path, FAMILIES), body.family[: body.eigenmode_count]))
     if not rows:
-        raise InputError(f"{path}: expected rows of modes that the link has ({body.modes_in_words}), found none")
+        raise InputError(f"{path}: expected rows of modes that the link has ({body.modes_in_words})", "none")
     frequency = body.frequency.copy()
     for k, row in rows.items():
         if row.frequency is not None:
@@ -75,7 +75,8 @@ def _check_distance(path: Path, row: MeasuredMode, computed: float) -> None:
     if not 1 / FARTHEST <= row.frequency / computed <= FARTHEST:
         raise InputError(
             f"{path}: line {row.line}: frequency: expected {row.label} within a factor of {FARTHEST:g} of the computed"
-            f" {computed:.6g} Hz, found {row.frequency:g} Hz: is it another mode? (ffrobot fit brings the model nearer)"
+            f" {computed:.6g} Hz",
+            f"{row.frequency:g} Hz: is it another mode? (ffrobot fit brings the model nearer)",
         )
 
 

@@ -174,17 +174,15 @@ def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
     for region in link.region:
         if region.group not in solid.regions:
             groups = ", ".join(sorted(solid.regions)) or "none"
-            raise InputError(
-                f"{path}: region.group: expected a volume group of the mesh ({groups}), found {region.group}"
-            )
+            raise InputError(f"{path}: region.group: expected a volume group of the mesh ({groups})", region.group)
     largest_first = list(solid.regions)
     ordered = sorted(link.region, key=lambda region: largest_first.index(region.group))
     for k, region in enumerate(ordered):
         inside = [other.group for other in ordered[k + 1 :]]
         if set(solid.cells_of(region.group)) <= {tag for group in inside for tag in solid.cells_of(group)}:
             raise InputError(
-                f"{path}: region.group of {region.group}: expected a volume group with own cells, found all of"
-                f" them in {', '.join(inside)} too"
+                f"{path}: region.group of {region.group}: expected a volume group with own cells",
+                f"all of them in {', '.join(inside)} too",
             )
     find = solid.cell_tags.find
     regions = [
@@ -212,8 +210,9 @@ def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Int
         own = nodes[nodes < model.owned]
         if model.total(np.array([np.sum(taken[own])]))[0]:
             raise InputError(
-                f"{path}: interface.coupling of {name}: expected rigid faces that do not touch each other "
-                f'({", ".join(plates)}), found nodes that two of them share: coupling = "mean" lets a face deform'
+                f"{path}: interface.coupling of {name}: expected rigid faces that do not touch each other"
+                f" ({', '.join(plates)})",
+                'nodes that two of them share: coupling = "mean" lets a face deform',
             )
         taken[own] = True
         supported = supports.get(name, ()) if link.coupling == "rigid" else ()

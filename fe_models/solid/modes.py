@@ -56,9 +56,10 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: 
     while True:
         if (family == "all" and needed > available) or sought == available:
             raise InputError(
-                f"{where}: modes.{key}: expected at most the number of modes available in family "
-                f'"{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
-                f" all families, found {needed}"
+                f"{where}: modes.{key}: expected at most the number of modes available in family"
+                f' "{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
+                " all families",
+                needed,
             )
         sought = min(sought + batch, most)
         X = search.candidates(sought)
@@ -80,7 +81,8 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: 
         if sought == most < available:
             raise InputError(
                 f"{where}: modes.{key}: expected {needed} modes of family {quoted(link.families)} among the lowest"
-                f" {sought}, found {len(hits)} (short, wide parts hardly bend): request fewer"
+                f" {sought}",
+                f"{len(hits)} (short, wide parts hardly bend): request fewer",
             )
         share = max(len(hits), 1) / sought
         batch = int(np.ceil((needed - len(hits)) / share)) + 2

@@ -144,8 +144,9 @@ def point_stresses(
         if not count[k]:
             distance, nearest = _nearest(space, positions[k])
             raise InputError(
-                f"{path}: stress.points.{name}: expected a point of the part, found {list(points[name])}, "
-                f"{distance:.3g} m from the nearest node of its mesh ({', '.join(f'{c:.6g}' for c in nearest)})"
+                f"{path}: stress.points.{name}: expected a point of the part",
+                f"{list(points[name])}, {distance:.3g} m from the nearest node of its mesh"
+                f" ({', '.join(f'{c:.6g}' for c in nearest)})",
             )
     return {name: StressPoint(positions[k], stress[k], strain[k]) for k, name in enumerate(points)}
 

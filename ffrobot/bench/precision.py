@@ -131,20 +131,18 @@ def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
     integrated = [a for a in scene.analysis if isinstance(a, IntegratedAnalysis) and a.is_resumable]
     if not integrated:
         kinds = quoted(sorted({analysis.kind for analysis in scene.analysis}))
-        raise InputError(
-            f"{scene.path}: analysis: expected one that integrates over time, pcid or forward, found {kinds}"
-        )
+        raise InputError(f"{scene.path}: analysis: expected one that integrates over time, pcid or forward", kinds)
     for one in integrated:
         if name in (None, one.name):
             return one
     if other := next((analysis for analysis in scene.analysis if analysis.name == name), None):
         raise InputError(
-            f'{scene.path}: analysis "{name}": expected one that integrates over time, pcid or forward, found'
-            f' kind = "{other.kind}"'
+            f'{scene.path}: analysis "{name}": expected one that integrates over time, pcid or forward',
+            f'kind = "{other.kind}"',
         )
     names = [analysis.name for analysis in integrated]
     raise InputError(
-        f'{scene.path}: analysis: expected one of {quoted(names)}, found "{name}"{did_you_mean(name or "", names)}'
+        f"{scene.path}: analysis: expected one of {quoted(names)}", f'"{name}"{did_you_mean(name or "", names)}'
     )
 
 
@@ -218,10 +216,10 @@ class Settings:
         for tolerance in self.tolerances:
             if not TIGHTEST_TOLERANCE <= tolerance < 1:
                 raise InputError(
-                    f"--tolerances: expected numbers from {TIGHTEST_TOLERANCE:g} to below 1, found {tolerance:g}"
+                    f"--tolerances: expected numbers from {TIGHTEST_TOLERANCE:g} to below 1", f"{tolerance:g}"
                 )
         if not self.integrators or not self.tolerances:
-            raise InputError("--integrators, --tolerances: expected one at least, found none")
+            raise InputError("--integrators, --tolerances: expected one at least", "none")
 
 
 @dataclass(frozen=True)

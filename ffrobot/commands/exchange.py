@@ -67,22 +67,22 @@ def import_(
     of_urdf = links or fix_inertia or density or radius or keep_rest
     if file.suffix.lower() in MOTIONS or file.is_dir():
         if of_urdf:
-            raise InputError(f"{file}: expected a URDF for options other than --output and --force, found a motion")
+            raise InputError(f"{file}: expected a URDF for options other than --output and --force", "a motion")
         protect([file])
         print_export(import_motion(file, output, force=force), summary_console())
         return
     if file.suffix.lower() in READERS:
         if of_urdf or force:
-            raise InputError(f"{file}: expected a URDF for options other than --output, found a body")
+            raise InputError(f"{file}: expected a URDF for options other than --output", "a body")
         protect([file])
         print_export(import_body(file, output), summary_console())
         return
     if instead := ELSEWHERE.get(file.suffix.lower()):
-        raise InputError(f"{file}: expected a URDF, a body or a motion, found none of these: {instead}")
+        raise InputError(f"{file}: expected a URDF, a body or a motion", f"none of these: {instead}")
     if radius and density is None:
-        raise InputError("--radius: expected --density with it, found none")
+        raise InputError("--radius: expected --density with it", "none")
     if keep_rest and not links:
-        raise InputError("--keep-rest: expected --flexible with it, found none")
+        raise InputError("--keep-rest: expected --flexible with it", "none")
     protect([file, *links.values()])
     filling = None if density is None else Filling(density, radius)
     imported = import_urdf(
@@ -97,9 +97,9 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     for pair in pairs:
         name, sign, path = pair.partition("=")
         if not (name and sign and path):
-            raise InputError(f'--flexible: expected LINK=FILE.toml, found "{pair}"')
+            raise InputError("--flexible: expected LINK=FILE.toml", f'"{pair}"')
         if name in files:
-            raise InputError(f'--flexible: expected one file for link "{name}", found two')
+            raise InputError(f'--flexible: expected one file for link "{name}"', "two")
         files[name] = Path(path)
     return files
 

@@ -41,7 +41,7 @@ def link(
         _inspect(link_file, output, unit, density, force=force)
         return
     if unit is not None or density is not None:
-        raise InputError("--unit, --density: expected --inspect with them, found none")
+        raise InputError("--unit, --density: expected --inspect with them", "none")
     from ..fe_models.link import make_link
     from ..fe_models.link_file import read_link
     from ..fe_models.remarks import remarks_on_link

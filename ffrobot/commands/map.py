@@ -102,5 +102,5 @@ def _frequencies(text: str | None) -> Array:
     except ValueError:
         ends, number = (0.0, 0.0), 0
     if not (0.0 <= ends[0] <= ends[1] < np.inf and 1 <= number <= 10_000):
-        raise InputError(f'--response: expected FIRST:LAST:COUNT in Hz, such as 1:100:200, found "{text}"')
+        raise InputError("--response: expected FIRST:LAST:COUNT in Hz, such as 1:100:200", f'"{text}"')
     return np.linspace(*ends, number)

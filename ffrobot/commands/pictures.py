@@ -54,7 +54,7 @@ def plot(
             return
         source = click.get_current_context().get_parameter_source
         if given := [name for name in options if source(name) is not ParameterSource.DEFAULT]:
-            raise InputError(f"--{given[0]}: expected it with --movie only, found figures")
+            raise InputError(f"--{given[0]}: expected it with --movie only", "figures")
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
     _tell(paths)
 

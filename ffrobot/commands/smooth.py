@@ -105,5 +105,5 @@ def _servo(texts: tuple[str, ...]) -> str | dict[str, str]:
     pairs = [text.rpartition("=") for text in texts] or [("", "", "20")]
     values = {name: value for name, _, value in pairs}
     if len(values) < len(pairs) or ("" in values and len(values) > 1):
-        raise InputError(f"--servo: expected one for all joints, or JOINT=… for each, found {', '.join(texts)}")
+        raise InputError("--servo: expected one for all joints, or JOINT=… for each", ", ".join(texts))
     return values.get("", values)

@@ -138,7 +138,7 @@ def runs_of(
     Raises `InputError` under mpirun.
     """
     if of_mpi() > 1:
-        raise InputError(f"{command}: expected one process, found several under mpirun: -j runs designs in parallel")
+        raise InputError(f"{command}: expected one process", "several under mpirun: -j runs designs in parallel")
     path, places = Path(scene), [Path(place) for place in allow_python]
     with ExitStack() as stack:
         folder = output if output is not None else stack.enter_context(TemporaryDirectory())
@@ -276,5 +276,5 @@ def parse_key(text: str, option: str) -> Key:
     """Return the parts of a key such as `payload.0.mass`. Raises `InputError` if `text` is none."""
     parts = tuple(text.strip().split("."))
     if not all(parts) or len(parts) > DEEPEST:
-        raise InputError(f'{option}: expected a key such as payload.0.mass, found "{text[:100]}"')
+        raise InputError(f"{option}: expected a key such as payload.0.mass", f'"{text[:100]}"')
     return parts

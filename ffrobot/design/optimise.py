@@ -75,12 +75,12 @@ def _method(space: DesignSpace, method: str, most: int) -> str:
         return "slsqp" if not catalogues else "all" if 0 < combined <= min(EVERY, most) else "differential-evolution"
     if method in ("slsqp", "trust-constr") and catalogues:
         raise InputError(
-            f'optimise: method: expected "differential-evolution" where there are discrete sets, found "{method}"'
+            'optimise: method: expected "differential-evolution" where there are discrete sets', f'"{method}"'
         )
     if method == "all" and not combined:
-        raise InputError('optimise: method: expected discrete sets alone for "all", found a number between bounds')
+        raise InputError('optimise: method: expected discrete sets alone for "all"', "a number between bounds")
     if method == "all" and combined > most:
-        raise InputError(f"optimise: expected at most {most} designs in the discrete sets (--runs), found {combined}")
+        raise InputError(f"optimise: expected at most {most} designs in the discrete sets (--runs)", combined)
     return method
 
 
@@ -91,7 +91,8 @@ def check_start(path: Path, space: DesignSpace, method: str) -> None:
             values = [value for key, value in zip(space.keys, space.own, strict=True) if key in variable.keys]
             raise InputError(
                 f"{path}: --vary: expected bounds of {variable.name} that hold the value where the search begins,"
-                f" {' and '.join(f'{value:g}' for value in values)}, found {variable.low:g}:{variable.high:g}"
+                f" {' and '.join(f'{value:g}' for value in values)}",
+                f"{variable.low:g}:{variable.high:g}",
             )
 
 
@@ -107,7 +108,7 @@ def _designs(runner: Runs, space: DesignSpace, responses: Sequence[Response], to
             points = (space.point((*place[:j], end, *place[j + 1 :])) for place in others)
             if problem := designs.problem(*points):
                 raise InputError(
-                    f"--vary: expected bounds that designs can have, found {variable.name} = {bound:g}:\n{problem}"
+                    "--vary: expected bounds that designs can have", f"{variable.name} = {bound:g}:\n{problem}"
                 )
     return designs
 
@@ -315,7 +316,7 @@ def find_front(
     if other.text == problem.objective.text:
         raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
     if catalogue := next((v for v in space.variables if v.is_catalogue), None):
-        raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
+        raise InputError("--against: expected numbers between bounds", f"the discrete set of {catalogue.name}")
     check_start(path, space, "slsqp")
     designs = _designs(runner, space, (*problem.responses, other), tolerance, runs)
     return _Searches(runner, space, designs, problem, other, tolerance).front(points)

@@ -165,8 +165,8 @@ def read_history(results: Results, name: str, option: str) -> History:
     if dataset is None:
         known = sorted((key for key in _known(results) if "." in key), key=lambda key: not key.startswith("joints."))
         raise InputError(
-            f'{option}: expected the name of a history, such as "{next(iter(known), "tip_error")}", found'
-            f' "{wanted}"{did_you_mean(wanted.replace("/", "."), known)}'
+            f'{option}: expected the name of a history, such as "{next(iter(known), "tip_error")}"',
+            f'"{wanted}"{did_you_mean(wanted.replace("/", "."), known)}',
         )
     is_power = dataset.endswith(f"/{POWER}")
     values = _power(results, dataset) if is_power else results.data(dataset)
@@ -177,7 +177,7 @@ def read_history(results: Results, name: str, option: str) -> History:
     if match:
         k = int(match["column"])
         if k >= values.shape[1]:
-            raise InputError(f'{option}: expected a column below {values.shape[1]} of "{wanted}", found {k}')
+            raise InputError(f'{option}: expected a column below {values.shape[1]} of "{wanted}"', k)
         if len(sizes[1]) < values.shape[1]:  # those of a vector's length
             length = root_mean_square(time, np.linalg.norm(values, axis=1))
             in_doubt = bool(abs(sizes[1][0] - length) > MISSED * sizes[1][0])
@@ -204,7 +204,7 @@ def read_column(results: Results, name: str, option: str) -> History:
     """The history `name` as in `read_history`. Raises `InputError` also where it has several columns."""
     history = read_history(results, name, option)
     if (count := history.values.shape[1]) > 1:
-        raise InputError(f'{option}: expected one column, such as "{name}[0]", found {count} of "{name}"')
+        raise InputError(f'{option}: expected one column, such as "{name}[0]"', f'{count} of "{name}"')
     return history
 
 

@@ -36,14 +36,14 @@ class OfMotors(Response):
     def read(self, results: Results) -> Reading:
         """Return the response for the motors in the scene of `results`; shares also depend on the motion there."""
         if not self.chosen:
-            raise InputError(f'"{self.text}": expected `optimise` with --vary "motor JOINT in CATALOG", found none')
+            raise InputError(f'"{self.text}": expected `optimise` with --vary "motor JOINT in CATALOG"', "none")
         motors = {variable.keys[0][1]: _of_scene(results, variable) for variable in self.chosen}
         if self.what == "share":
             return Reading(max(self._share(results, joint, *motor) for joint, motor in motors.items()), "")
         values = []
         for motor, _ in motors.values():
             if (value := getattr(motor, self.what)) is None:
-                raise InputError(f'"{self.text}": expected a {self.what} of motor "{motor.name}", found none')
+                raise InputError(f'"{self.text}": expected a {self.what} of motor "{motor.name}"', "none")
             values.append(value)
         return Reading(sum(values), "kg" if self.what == "mass" else "")
 
@@ -51,7 +51,7 @@ class OfMotors(Response):
         tasks = (task for name in results.analyses for of, task in joint_tasks(results, name) if of == joint)
         shares = [max(choice_of(task, motor, ratio).shares) for task in tasks]
         if not shares:
-            raise InputError(f'"{self.text}": expected a motion of joint "{joint}" with its torque, found none')
+            raise InputError(f'"{self.text}": expected a motion of joint "{joint}" with its torque', "none")
         return max(shares)
 
 
@@ -136,8 +136,7 @@ class OfFrequency(Response):
         body = self._body(results)
         if not 1 <= self.number <= body.eigenmode_count:
             raise InputError(
-                f'"{self.text}": expected the number of a mode of {self.body}, 1 to {body.eigenmode_count}, found'
-                f" {self.number}"
+                f'"{self.text}": expected the number of a mode of {self.body}, 1 to {body.eigenmode_count}', self.number
             )
         return Reading(float(body.frequency[self.number - 1]), "Hz", mode=_modes(body)[self.number - 1])
 
@@ -186,7 +185,7 @@ class OfValue(Response):
         value = value_of(results.scene, parts, option=f'"{self.text}"')
         if isinstance(value, bool) or not isinstance(value, int | float):
             what = "none" if value is None else repr(value)
-            raise InputError(f'"{self.text}": expected a number of the scene file at {self.key}, found {what}')
+            raise InputError(f'"{self.text}": expected a number of the scene file at {self.key}', what)
         return Reading(float(value))
 
 
@@ -214,7 +213,7 @@ def parse_response(text: str, option: str = "--of") -> Response:
             return OfMotors(text, what)
         case "value", [key] if all(key.split(".")):
             return OfValue(text, key)
-    raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')
+    raise InputError(f"{option}: expected {either(FORMS)}", f'"{text}"')
 
 
 def _reduced(word: str, history: History, by_all: bool) -> float:
@@ -228,7 +227,7 @@ def _reduced(word: str, history: History, by_all: bool) -> float:
 def _value_at(t: float, text: str, history: History, _: bool) -> float:
     first, last = history.time[[0, -1]]
     if not first <= t <= last:
-        raise InputError(f'"{text}": expected a time from {first:g} to {last:g} s, found {t:g}')
+        raise InputError(f'"{text}": expected a time from {first:g} to {last:g} s', f"{t:g}")
     return history.at(t, 0)
 
 
@@ -336,9 +335,7 @@ def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequenc
     """Return the problem of the command line's objective and limits. Raises `InputError` without one objective."""
     if (minimise is None) == (maximise is None):
         objectives = "both" if minimise is not None else "none"
-        raise InputError(
-            f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {objectives}"
-        )
+        raise InputError("optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE", objectives)
     objective = (
         parse_response(minimise, "--minimise") if minimise is not None else parse_response(maximise or "", "--maximise")
     )
@@ -368,6 +365,7 @@ def parse_limit(text: str) -> Limit:
     if match is None or not np.isfinite(bound):
         raise InputError(
             '--subject-to: expected "RESPONSE <= NUMBER" or "RESPONSE >= NUMBER", such as "peak joints.elbow.moment <='
-            f' 20", found "{shown(text)}"'
+            ' 20"',
+            f'"{shown(text)}"',
         )
     return Limit(parse_response(match["response"], "--subject-to"), 1.0 if match["sense"] == "<=" else -1.0, bound)

@@ -433,7 +433,7 @@ def _check_steps(designs: Designs, base: Base) -> None:
             continue
         if problem := designs.problem(base.moved(k, base.steps[k]), base.moved(k, -base.steps[k])):
             name = ".".join(key)
-            raise InputError(f"--to: expected keys that may be a little larger or smaller, found {name}:\n{problem}")
+            raise InputError("--to: expected keys that may be a little larger or smaller", f"{name}:\n{problem}")
 
 
 def _all_samples(designs: Designs, base: Base) -> list[Sample]:

@@ -191,7 +191,8 @@ def parse_spread(text: str, path: Path) -> Spread:
                     return Spread(key, text, own, "uniform", (a + b) / 2.0, (b - a) / math.sqrt(12.0))
     raise InputError(
         "--spread: expected KEY=±2%, KEY=±0.1, KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=normal:2%, with positive"
-        f' spreads, found "{shown(text)}"'
+        " spreads",
+        f'"{shown(text)}"',
     )
 
 
@@ -206,7 +207,7 @@ def _size(text: str, own: float, whole: str) -> float:
     percent = text.strip().endswith("%")
     value = float(text.strip().removesuffix("%"))
     if percent and own == 0.0:
-        raise InputError(f'--spread: expected a spread in the unit of a key whose value is 0, found "{shown(whole)}"')
+        raise InputError("--spread: expected a spread in the unit of a key whose value is 0", f'"{shown(whole)}"')
     size = value / 100.0 * abs(own) if percent else value
     if not 0.0 < size < math.inf:
         raise ValueError

@@ -266,9 +266,9 @@ def find_uncertainty(
 ) -> Uncertainty:
     """Propagate distributions of keys: see `ffrobot.uncertainty`."""
     if by == "samples" and samples < FEWEST:
-        raise InputError(f"uncertainty: expected at least {FEWEST} samples, found {samples}")
+        raise InputError(f"uncertainty: expected at least {FEWEST} samples", samples)
     if by == "gradients" and indices:
-        raise InputError("uncertainty: expected Sobol indices of samples, found --by gradients")
+        raise InputError("uncertainty: expected Sobol indices of samples", "--by gradients")
     names = list(dict.fromkeys(of))
     responses = tuple(parse_response(text) for text in names if not _is_history(text))
     curves = tuple(WholeHistory(text, text) for text in names if _is_history(text))
@@ -305,7 +305,7 @@ class _Study:
             for end in one.ends:
                 if problem := self._designs.problem(self._moved(k, end)):
                     raise InputError(
-                        f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
+                        "--spread: expected spreads with which the scene makes sense", f"{one.text}:\n{problem}"
                     )
         middle = self._designs.run_first(self._point)
         self._readings = middle.read(responses)
@@ -423,7 +423,7 @@ class _Study:
         history, time = curve.history(design), nominal.time
         if history.time.shape != time.shape or not np.allclose(history.time, time, rtol=1e-9, atol=1e-12):
             raise InputError(
-                f'--of: expected the same times of "{history.name}" in all runs, found others: {self._where(design)}'
+                f'--of: expected the same times of "{history.name}" in all runs', f"others: {self._where(design)}"
             )
         return history.values[:, 0]
 

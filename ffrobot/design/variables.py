@@ -154,11 +154,11 @@ def parse_variable(text: str) -> DesignVariable:
         low = high = np.nan
     logarithmic = len(pieces) == 3 and pieces[2].strip() == "log"
     if not equals or not (len(pieces) == 2 or logarithmic) or not np.isfinite([low, high]).all():
-        raise InputError(f'--vary: expected {FORMS}, found "{shown(text)}"')
+        raise InputError(f"--vary: expected {FORMS}", f'"{shown(text)}"')
     if not low < high:
-        raise InputError(f'--vary: expected a lower bound and a higher one, LOW:HIGH, found "{shown(text)}"')
+        raise InputError("--vary: expected a lower bound and a higher one, LOW:HIGH", f'"{shown(text)}"')
     if logarithmic and low <= 0.0:
-        raise InputError(f'--vary: expected bounds above 0 for steps in the logarithm, found "{shown(text)}"')
+        raise InputError("--vary: expected bounds above 0 for steps in the logarithm", f'"{shown(text)}"')
     return DesignVariable(_keys(name), low, high, logarithmic)
 
 
@@ -172,14 +172,14 @@ def _motors(joint: str, mass: str | None, catalog: Path) -> DesignVariable:
     rows: dict[tuple[Any, ...], CatalogMotor] = {}
     for motor in read_catalog(catalog):
         if mass is not None and motor.mass is None:
-            raise InputError(f'{catalog}: expected a mass of motor "{motor.name}", for {mass}, found none')
+            raise InputError(f'{catalog}: expected a mass of motor "{motor.name}", for {mass}', "none")
         for N in motor.gear_ratio:
             limits = N * motor.peak_torque * motor.efficiency, motor.max_speed / N
             row = (N, motor.rotor_inertia, *limits, *(() if mass is None else (motor.mass,)))
             if row in rows:
                 raise InputError(
-                    f'{catalog}: expected motors that differ in inertia, peak torque or speed, found "{rows[row].name}"'
-                    f' and "{motor.name}"'
+                    f"{catalog}: expected motors that differ in inertia, peak torque or speed",
+                    f'"{rows[row].name}" and "{motor.name}"',
                 )
             rows[row] = motor
     more = () if mass is None else (parse_key(mass, "--vary"),)
@@ -202,6 +202,7 @@ def _rows(text: str, columns: int, whole: str) -> tuple[tuple[Any, ...], ...]:
     if nested or not 0 < len(rows) <= MOST_RUNS or any(len(row) != columns for row in rows):
         raise InputError(
             f"--vary: expected rows of {columns} value{'s' if columns > 1 else ''} (texts in quotes, columns with"
-            f' colons), {FORMS}, found "{shown(whole)}"'
+            f" colons), {FORMS}",
+            f'"{shown(whole)}"',
         )
     return tuple(dict.fromkeys(rows))

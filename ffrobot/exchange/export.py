@@ -117,15 +117,15 @@ def export_file(
         SolveError: it cannot be written.
     """
     if not path.exists():
-        raise InputError(f"{path}: expected a scene, a modal body or a results file, found no such file")
+        raise InputError(f"{path}: expected a scene, a modal body or a results file", "no such file")
     is_scene = path.suffix.lower() == ".toml"
     kind = "a scene" if is_scene else "a modal body" if is_modal_body_file(path) else "results"
     known = FORMATS[kind]
     check_known(file_format, known, f"{path}: --format: expected one of {quoted(known)} of {kind}")
     if analysis is not None and (kind == "a modal body" or file_format == "urdf"):
-        raise InputError(f"{path}: --analysis: expected it with results and FMUs only, found {kind} as {file_format}")
+        raise InputError(f"{path}: --analysis: expected it with results and FMUs only", f"{kind} as {file_format}")
     if side is not None and file_format not in SIDED:
-        raise InputError(f"{path}: --side: expected it with {either(SIDED)} only, found {file_format}")
+        raise InputError(f"{path}: --side: expected it with {either(SIDED)} only", file_format)
     suffix, make = known[file_format]
     if output is not None:
         check_not_an_input(output)
@@ -189,7 +189,7 @@ def import_body(path: Path, output: Path) -> Exported:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except (FloatingPointError, np.linalg.LinAlgError) as error:
-        raise InputError(f"{path}: expected numbers of a body, found ones that are too large: {error}") from None
+        raise InputError(f"{path}: expected numbers of a body", f"ones that are too large: {error}") from None
     check_output(output, FORMAT)
     write_modal_body(output, body)
     return Exported(output, f"{body.name}, {body.modes_in_words}, interfaces {', '.join(body.interfaces)}", remarks)

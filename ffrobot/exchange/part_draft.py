@@ -113,8 +113,8 @@ def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
     ]
     if not pairs:
         raise InputError(
-            "expected two bores across the part, or plane faces at both of its ends, for root and tip of a draft, found"
-            " neither: write the link file from the faces listed here"
+            "expected two bores across the part, or plane faces at both of its ends, for root and tip of a draft",
+            "neither: write the link file from the faces listed here",
         )
     _, root, tip = max(pairs, key=lambda pair: float(pair[0]))
     return root, tip

@@ -235,7 +235,7 @@ class VariedKeys:
         self._groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
         keys = [key for group in self._groups for key in group]
         if twice := {".".join(key) for key in keys if keys.count(key) > 1}:
-            raise InputError(f"--vary: expected each key once, found {quoted(sorted(twice))} again")
+            raise InputError("--vary: expected each key once", f"{quoted(sorted(twice))} again")
         self._starts = {key: _start(path, target, key) for key in keys}
         self.names = ["=".join(".".join(key) for key in group) for group in self._groups]
         self.start = np.array([self._starts[group[0]] for group in self._groups])
@@ -274,7 +274,7 @@ def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
     if "geometry" not in tables:
         return RobotTarget(path, motors or "free")
     if motors is not None:
-        raise InputError(f"{path}: --motors: expected a scene file next to it, found a link file")
+        raise InputError(f"{path}: --motors: expected a scene file next to it", "a link file")
     return LinkTarget(path)
 
 
@@ -282,7 +282,7 @@ def _start(path: Path, target: LinkTarget | RobotTarget, key: Key) -> float:
     value = target.start(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
         text = "none" if value is None else repr(value)
-        raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}, found {text}")
+        raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}", text)
     return float(value)
 
 
@@ -292,7 +292,7 @@ def _of_rows(path: Path, rows: Sequence[MeasuredMode], family: tuple[str, ...], 
     for row in rows:
         if row not in places:
             raise InputError(
-                f"{path}: line {row.line}: expected modes that the model has ({len(family)} of them), found {row.label}"
+                f"{path}: line {row.line}: expected modes that the model has ({len(family)} of them)", row.label
             )
     return as_floats(frequency[[places[row] for row in rows]])
 
@@ -301,7 +301,7 @@ def _uncertainty(path: Path, rows: Sequence[MeasuredMode]) -> Array | None:
     """(m,) Hz, where the table has them."""
     given = [row.uncertainty for row in rows if row.uncertainty is not None]
     if given and len(given) < len(rows):
-        raise InputError(f"{path}: uncertainty: expected it of all frequencies or of none, found {len(given)}")
+        raise InputError(f"{path}: uncertainty: expected it of all frequencies or of none", len(given))
     return np.array(given) if given else None
 
 

@@ -59,7 +59,7 @@ def fit_responses(
     check_texts(vary, "fit_responses: vary")
     path = Path(scene)
     if "geometry" in load_toml(path, "link or scene file"):
-        raise InputError(f"{path}: --frf: expected a scene file, found a link file: weld the link to the ground in one")
+        raise InputError(f"{path}: --frf: expected a scene file", "a link file: weld the link to the ground in one")
     target = RobotTarget(path, motors)
     varied = VariedKeys(path, target, vary, output)
     varied.check_new(replace=force)

@@ -37,10 +37,10 @@ def read_columns(path: Path) -> list[Column]:
     readers = {".uff": _universal, ".unv": _universal, ".58": _universal, ".csv": _of_csv, ".mat": _of_mat}
     suffix = path.suffix.lower()
     if suffix not in readers:
-        raise InputError(f'{path}: expected a file with {quoted(readers)}, found "{path.name}"')
+        raise InputError(f"{path}: expected a file with {quoted(readers)}", f'"{path.name}"')
     columns = list(readers[suffix](path))
     if not columns:
-        raise InputError(f"{path}: expected frequency response functions (type 4 of dataset 58), found none")
+        raise InputError(f"{path}: expected frequency response functions (type 4 of dataset 58)", "none")
     return columns
 
 
@@ -62,7 +62,8 @@ def _universal(path: Path) -> Iterator[Column]:
         if kind not in ORDERS or by != FORCE:
             raise InputError(
                 f"{path}: node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per"
-                f" force (13), found types {kind} and {by}"
+                " force (13)",
+                f"types {kind} and {by}",
             )
         force, response = (f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:]))
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
@@ -73,7 +74,7 @@ def _universal(path: Path) -> Iterator[Column]:
 
 def _axis(path: Path, code: float) -> str:
     if abs(code) not in (1, 2, 3):
-        raise InputError(f"{path}: expected translations along x, y, z (directions ±1, ±2, ±3), found {code:g}")
+        raise InputError(f"{path}: expected translations along x, y, z (directions ±1, ±2, ±3)", f"{code:g}")
     return "-" * (code < 0) + "xyz"[int(abs(code)) - 1]
 
 
@@ -84,10 +85,10 @@ def _of_csv(path: Path) -> Iterator[Column]:
         for name in header:
             check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
         if missing := [name for name in COLUMNS[:-1] if name not in header]:
-            raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}, found no {quoted(missing)}")
+            raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
         for line, row in table:
             if len(row) != len(header):
-                raise InputError(f"{path}: line {line}: expected {len(header)} cells, found {len(row)}")
+                raise InputError(f"{path}: line {line}: expected {len(header)} cells", len(row))
         cells = [dict(zip(header, row, strict=True)) for _, row in table]
         ends = [(one["force"], one["response"]) for one in cells]
         numbers = np.array(

@@ -166,8 +166,8 @@ def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> l
         for one, h in zip(pose.responses, H.T, strict=True):
             if np.abs(h).max() <= NO_MOTION * np.abs(one.receptance).max():
                 raise InputError(
-                    f'test "{pose.test.name}": {one.label}: expected an FRF of directions in which the model moves,'
-                    " found one without motion in the model: leave it out"
+                    f'test "{pose.test.name}": {one.label}: expected an FRF of directions in which the model moves',
+                    "one without motion in the model: leave it out",
                 )
     return found
 
@@ -185,7 +185,7 @@ def fit_receptances(
     """
     used = [k for k, pose in enumerate(poses) if not pose.test.validation]
     if not used:
-        raise InputError("fit: expected a test that is not for validation, found none")
+        raise InputError("fit: expected a test that is not for validation", "none")
     fitted = [poses[k] for k in used]
 
     def of_used(values: Array) -> list[Array]:

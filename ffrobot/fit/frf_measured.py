@@ -147,7 +147,7 @@ def read_tests(path: Path) -> list[MeasuredPose]:
     tests = validate(ResponseTests, load_toml(path, "file of tests"), path).test
     for test in tests:
         if len(tests) > 1 and not test.pose:
-            raise InputError(f'{path}: test "{test.name}": pose: expected one for each of several tests, found none')
+            raise InputError(f'{path}: test "{test.name}": pose: expected one for each of several tests', "none")
     return [_read(path, test) for test in tests]
 
 
@@ -159,15 +159,13 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
     for column in columns:
         where = f"{test.file}: {column.force} → {column.response}"
         if len(column.frequency) != len(frequency) or not np.allclose(column.frequency, frequency, rtol=1e-9):
-            raise InputError(f"{where}: expected the frequencies of the other functions, found others")
+            raise InputError(f"{where}: expected the frequencies of the other functions", "others")
         _check(where, column, inside)
     if not inside.any():
-        raise InputError(f'{path}: test "{test.name}": band: expected frequencies of the file within it, found none')
+        raise InputError(f'{path}: test "{test.name}": band: expected frequencies of the file within it', "none")
     responses = tuple(_response(test, column, inside) for column in columns)
     if test.averages is not None and any(np.isnan(one.coherence).any() for one in responses):
-        raise InputError(
-            f'{path}: test "{test.name}": averages: expected them with a coherence in the file, found none'
-        )
+        raise InputError(f'{path}: test "{test.name}": averages: expected them with a coherence in the file', "none")
     return MeasuredPose(test, as_floats(frequency[inside]), responses)
 
 
@@ -175,17 +173,17 @@ def _check(where: str, column: Column, inside: Booleans) -> None:
     """Raise `InputError` for numbers that no FRF has."""
     at, values = column.frequency[inside], column.values[inside]
     if not (np.diff(column.frequency) > 0.0).all():
-        raise InputError(f"{where}: expected each frequency once, in rising order, found others")
+        raise InputError(f"{where}: expected each frequency once, in rising order", "others")
     if len(at) and not at.min() > 0.0:
         raise InputError(
-            f"{where}: expected frequencies above 0 Hz, found {at.min():g}: the key band, such as [5.0, 200.0], leaves"
-            " them out"
+            f"{where}: expected frequencies above 0 Hz",
+            f"{at.min():g}: the key band, such as [5.0, 200.0], leaves them out",
         )
     if not (np.isfinite(values).all() and np.abs(values).all()):
-        raise InputError(f"{where}: expected finite values that are not 0, found others")
+        raise InputError(f"{where}: expected finite values that are not 0", "others")
     coherence = np.ones(1) if column.coherence is None else column.coherence[inside]
     if not ((coherence >= 0.0) & (coherence <= 1.0)).all():
-        raise InputError(f"{where}: coherence: expected values from 0 to 1, found {_worst(coherence):g}")
+        raise InputError(f"{where}: coherence: expected values from 0 to 1", f"{_worst(coherence):g}")
 
 
 def _worst(coherence: Array) -> float:
@@ -196,10 +194,10 @@ def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredR
     where = f"{test.file}: {column.force} → {column.response}"
     order, factor = UNITS[test.unit] if test.unit else (column.order, 1.0)
     if test.unit is None and not column.is_si:
-        raise InputError(f"{where}: expected the key unit of the test, one of {quoted(UNITS)}, found none")
+        raise InputError(f"{where}: expected the key unit of the test, one of {quoted(UNITS)}", "none")
     if order is None or column.order not in (None, order):
         units = either(unit for unit, (of, _) in UNITS.items() if of == column.order)
-        raise InputError(f'{where}: unit: expected that of the file, {units}, found "{test.unit}"')
+        raise InputError(f"{where}: unit: expected that of the file, {units}", f'"{test.unit}"')
     axes = of_rpy(*test.rpy)
     force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
     receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order
@@ -211,8 +209,8 @@ def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) ->
     name, _, axis = text.rpartition("/")
     sign, letter = (-1.0 if axis.startswith("-") else 1.0), axis.lstrip("+-")
     if not name or len(letter) != 1 or letter not in "xyz":
-        raise InputError(f'{where}: expected POINT/x, POINT/-z, …, found "{shown(text)}"')
+        raise InputError(f"{where}: expected POINT/x, POINT/-z, …", f'"{shown(text)}"')
     if name not in points and "." not in name:
-        raise InputError(f'{where}: points: expected the point of the robot for "{shown(name)}", found none')
+        raise InputError(f'{where}: points: expected the point of the robot for "{shown(name)}"', "none")
     x, y, z = (sign * axes[:, "xyz".index(letter)]).tolist()
     return Direction(points.get(name, name), (x, y, z))

@@ -114,8 +114,8 @@ def fit_frequencies(
 
     if len(measured) < len(keys):
         raise InputError(
-            f"fit: expected at least as many measured frequencies as keys to vary, found {len(measured)} of"
-            f" {', '.join(labels)} for {len(keys)}: {', '.join(keys)}"
+            "fit: expected at least as many measured frequencies as keys to vary",
+            f"{len(measured)} of {', '.join(labels)} for {len(keys)}: {', '.join(keys)}",
         )
     weight = 1.0 if uncertainty is None else measured / uncertainty
 
@@ -165,11 +165,12 @@ def check_distinguishable(
     named = [(key, part) for key, part in zip(keys, vector, strict=True) if abs(part) > SHARE]
     if without or len(named) == 1:
         key = (*without, named[0][0])[0]
-        raise InputError(f"fit: expected keys on which the measured {measured} depend, found {key}: leave it out")
+        raise InputError(f"fit: expected keys on which the measured {measured} depend", f"{key}: leave it out")
     change = ", ".join(f"{key} times c" + ("" if part > 1 - 1e-3 else f"^{part:.3g}") for key, part in named)
     raise InputError(
-        f"fit: expected keys that the measured {measured} distinguish, found no change of these with {change}, for"
-        f" any c: vary only {len(named) - 1} of these {len(named)}, or measure with a known mass or spring attached"
+        f"fit: expected keys that the measured {measured} distinguish",
+        f"no change of these with {change}, for any c: vary only {len(named) - 1} of these {len(named)}, or measure"
+        " with a known mass or spring attached",
     )
 
 

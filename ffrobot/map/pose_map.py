@@ -51,13 +51,13 @@ def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
     axes = tuple(_axis(text, scene) for text in texts)
     names = [axis.name for axis in axes]
     if twice := {name for name in names if names.count(name) > 1}:
-        raise InputError(f"--over: expected each joint or direction once, found {quoted(sorted(twice))} again")
+        raise InputError("--over: expected each joint or direction once", f"{quoted(sorted(twice))} again")
     if len({axis.is_place for axis in axes}) > 1:
-        raise InputError(f"--over: expected joints alone or directions of a point alone, found {quoted(names)}")
+        raise InputError("--over: expected joints alone or directions of a point alone", quoted(names))
     if not 1 <= len(axes) <= MOST_AXES:
-        raise InputError(f"--over: expected one to {MOST_AXES} axes, found {len(axes)}")
+        raise InputError(f"--over: expected one to {MOST_AXES} axes", len(axes))
     if (count := math.prod(len(axis.values) for axis in axes)) > MOST_RUNS:
-        raise InputError(f"--over: expected at most {MOST_RUNS} poses, found {count}")
+        raise InputError(f"--over: expected at most {MOST_RUNS} poses", count)
     return axes
 
 
@@ -68,8 +68,8 @@ def _axis(text: str, scene: Scene) -> GridAxis:
     joints = list(units)
     if not equals or name not in (*joints, *places):
         raise InputError(
-            f"--over: expected NAME=FIRST:LAST:COUNT of a joint ({quoted(joints)}) or of {quoted(places)}, found"
-            f' "{shown(text)}"{did_you_mean(name, joints)}'
+            f"--over: expected NAME=FIRST:LAST:COUNT of a joint ({quoted(joints)}) or of {quoted(places)}",
+            f'"{shown(text)}"{did_you_mean(name, joints)}',
         )
     return GridAxis(name, _values(values, text), name not in joints, units.get(name, "m"))
 
@@ -87,8 +87,8 @@ def _values(text: str, whole: str) -> Array:
     except (ValueError, ValidationError):
         pass
     raise InputError(
-        f"--over: expected NAME=FIRST:LAST:COUNT or NAME=VALUE,VALUE, such as shoulder=-90*deg:90*deg:31, found"
-        f' "{shown(whole)}"'
+        "--over: expected NAME=FIRST:LAST:COUNT or NAME=VALUE,VALUE, such as shoulder=-90*deg:90*deg:31",
+        f'"{shown(whole)}"',
     )
 
 
@@ -189,8 +189,8 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     solution = prepare_scene(plan.scene, watcher)
     if not solution.model.motors:
         raise InputError(
-            f"{plan.scene}: joint: expected motors that keep the poses of a map, found none: joints of kinematic loops"
-            " have them with motor = true alone"
+            f"{plan.scene}: joint: expected motors that keep the poses of a map",
+            "none: joints of kinematic loops have them with motor = true alone",
         )
     check_point(solution, plan.point)
     watcher.stage("postures")
@@ -313,7 +313,7 @@ def _kept_postures(plan: MapPlan, request: Mapping[str, Any]) -> Postures | None
     with suppress(OSError, ValueError):
         before = json.loads((plan.folder / PLAN).read_text(encoding="utf-8"))
     if not before and plan.folder.exists() and any(plan.folder.iterdir()):
-        raise InputError(f"{plan.folder}: output: expected a new folder or one of a map, found one with other files")
+        raise InputError(f"{plan.folder}: output: expected a new folder or one of a map", "one with other files")
     if before.get("asked") != request["asked"] or changed(before.get("inputs", {}), request["inputs"]):
         return None
     stored = _read(plan.folder / POSTURES) or {}

@@ -43,7 +43,7 @@ def _moving_analysis(results: Results, wanted: str | None) -> str:
     if (wanted is None and not moving) or (wanted is not None and wanted not in moving):
         other = "none" if wanted is None else f'"{wanted}"{did_you_mean(wanted, moving)}'
         names = f" ({', '.join(moving)})" if moving else ""
-        raise InputError(f"{results.path}: movie: expected an analysis that goes through time{names}, found {other}")
+        raise InputError(f"{results.path}: movie: expected an analysis that goes through time{names}", other)
     return wanted or moving[0]
 
 

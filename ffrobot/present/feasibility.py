@@ -24,8 +24,8 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
         judged = [name for name in results.analyses if results.has(f"{name}/feasibility")]
         if not judged:
             raise InputError(
-                f"{path}: expected an analysis with motors or patches, found none: joints of kinematic loops have"
-                " motors with motor = true alone"
+                f"{path}: expected an analysis with motors or patches",
+                "none: joints of kinematic loops have motors with motor = true alone",
             )
         if analysis is not None:
             known = f"an analysis with motors or patches, {quoted(judged)}"
@@ -180,7 +180,7 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
     judged = [name for name, task in tasks.items() if task]
     wanted = judged if analysis is None else [analysis]
     if not wanted or not set(wanted) <= set(judged):
-        raise InputError(f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}, found {analysis}")
+        raise InputError(f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}", analysis)
     for name in wanted:
         console.print(f'analysis "{name}", motors of {catalog}', soft_wrap=True)
         rows = (row for joint, task in tasks[name].items() for row in _rows(joint, choices(task, motors)))

@@ -34,14 +34,14 @@ def describe(path: Path) -> str:
         reason = f"not a readable HDF5 file ({error})"
         if not path.is_file():
             reason = "a folder" if path.is_dir() else "no such file"
-        raise InputError(f"{path}: expected a modal body file or a results file, found {reason}") from None
+        raise InputError(f"{path}: expected a modal body file or a results file", reason) from None
     if kind == MODAL_FORMAT:
         body = read_modal_body(path)
         with open_checked(path) as file:
             datasets = Table("dataset", "shape", "unit", "what")
             _add_datasets(datasets, file, MODAL_BODY)
         return _modal_body(body) + _rendered(datasets)
-    raise InputError(f"{path}: expected a modal body file or a results file, found format {kind!r}")
+    raise InputError(f"{path}: expected a modal body file or a results file", f"format {kind!r}")
 
 
 def _modal_body(body: ModalBody) -> str:

@@ -105,7 +105,7 @@ class AnalysisAccess(Datasets):
         """Linear models of an analysis, one for each of its times. Raises `InputError` if there is none."""
         if not self.has(f"{analysis}/linear"):
             raise InputError(
-                f'{self.path}: expected a linear analysis ({quoted(self._with("linear"))}), found "{analysis}"'
+                f"{self.path}: expected a linear analysis ({quoted(self._with('linear'))})", f'"{analysis}"'
             )
         from .linear import read_linear
 
@@ -125,7 +125,7 @@ class AnalysisAccess(Datasets):
         """
         if not self.has(f"{analysis}/control/controller"):
             known = quoted(self._with("control/controller"))
-            raise InputError(f'{self.path}: expected a closed loop of linear controllers ({known}), found "{analysis}"')
+            raise InputError(f"{self.path}: expected a closed loop of linear controllers ({known})", f'"{analysis}"')
         from .linear import read_controllers
 
         return read_controllers(self._file, analysis)
@@ -141,7 +141,7 @@ class AnalysisAccess(Datasets):
         if analysis is None and not known:
             loops = self._with("control/controller")
             hint = f"; the name of closed-loop control ({quoted(loops)}) selects its controllers" if loops else ""
-            raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none{hint}')
+            raise InputError(f'{self.path}: expected an analysis of kind = "linear"', f"none{hint}")
         return analysis or known[0]
 
     def export_linear(self, analysis: str | None, path: Path) -> str:

@@ -32,7 +32,7 @@ class _Attributes(dict[str, Any]):
         self._where = where
 
     def __missing__(self, name: str) -> Any:
-        raise InputError(f'{self._where}: expected the attribute "{name}", found none')
+        raise InputError(f'{self._where}: expected the attribute "{name}"', "none")
 
 
 class Datasets:
@@ -51,10 +51,10 @@ class Datasets:
             reason = "no such file" if not self.path.exists() else f"not a readable HDF5 file ({error})"
             if self.path.suffix.lower() == ".toml" and self.path.exists():
                 reason = f"a scene or link file: solve it first (ffrobot solve {path}, which writes .results.h5)"
-            raise InputError(f"{path}: expected a results file, found {reason}") from None
+            raise InputError(f"{path}: expected a results file", reason) from None
         if "scene" not in self._file.attrs:
             self._file.close()
-            raise InputError(f"{path}: expected a results file, found an HDF5 file without a scene")
+            raise InputError(f"{path}: expected a results file", "an HDF5 file without a scene")
         with blaming(path):
             self.scene_text: str = self._file.attrs["scene"]
             self.scene: dict[str, Any] = tomllib.loads(self.scene_text)
@@ -112,7 +112,7 @@ class Datasets:
         Raises `InputError` where there is no such group, or no such attribute.
         """
         if group not in self._file:
-            raise InputError(f'{self.path}: expected the group "{group}", found none{self._near(group)}')
+            raise InputError(f'{self.path}: expected the group "{group}"', f"none{self._near(group)}")
         return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
 
     def settling(self, point: str, option: str = "settling") -> tuple[str, Mapping[str, Any]]:
@@ -128,8 +128,8 @@ class Datasets:
                 return of, self.attributes(f"{of}/settling/{name}")
         points = quoted(known) if known else "none: paths move to the end of their analyses"
         raise InputError(
-            f'{option}: expected "BODY.POINT" or "ANALYSIS/BODY.POINT" with residual vibration, {points}, found'
-            f' "{point}"{did_you_mean(point, known)}'
+            f'{option}: expected "BODY.POINT" or "ANALYSIS/BODY.POINT" with residual vibration, {points}',
+            f'"{point}"{did_you_mean(point, known)}',
         )
 
     def names(self, group: str) -> list[str]:
@@ -149,9 +149,9 @@ class Datasets:
         item = self._file.get(dataset)
         if isinstance(item, h5py.Group):
             inside = quoted(f"{dataset}/{name}" for name in item)
-            raise InputError(f'{self.path}: expected the name of a dataset, found the group "{dataset}" of {inside}')
+            raise InputError(f"{self.path}: expected the name of a dataset", f'the group "{dataset}" of {inside}')
         if not isinstance(item, h5py.Dataset):
-            raise InputError(f'{self.path}: expected the dataset "{dataset}", found none{self._near(dataset)}')
+            raise InputError(f'{self.path}: expected the dataset "{dataset}"', f"none{self._near(dataset)}")
         return numbers(item, f"{self.path}: {dataset}")
 
     def time(self, dataset: str) -> Array:
@@ -172,7 +172,7 @@ class Datasets:
             return values
         k = int(match["column"])
         if k >= values.shape[1]:
-            raise InputError(f'{self.path}: expected column {k} of "{dataset}", found {values.shape[1]} columns')
+            raise InputError(f'{self.path}: expected column {k} of "{dataset}"', f"{values.shape[1]} columns")
         return values[:, k : k + 1]
 
     def peak(self, name: str) -> tuple[float, float]:

@@ -62,7 +62,7 @@ class LinkAccess(Datasets):
             if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
                 return path
         now = "another" if file.path.is_file() else "none"
-        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with, found {now}')
+        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with', now)
 
     def modal(self, analysis: str, body: str) -> Array:
         """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""

@@ -73,8 +73,8 @@ def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Resul
     change = next(_changes(scene, bodies, file), None)
     if change is not None:
         raise InputError(
-            f"{file.path}: resume: expected results of the same input, found that {change} has changed; solve it from"
-            " the start, or undo the change"
+            f"{file.path}: resume: expected results of the same input",
+            f"that {change} has changed; solve it from the start, or undo the change",
         )
 
 

@@ -124,8 +124,8 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
         parts *= 2
     if bent > BETWEEN * parts:
         raise InputError(
-            f"{key}: expected no more than about {MOST_PARTS // 80} reversals of voltages on patches with hysteresis,"
-            f" found more from {first:g} to {last:g} s: shorten the analyses"
+            f"{key}: expected no more than about {MOST_PARTS // 80} reversals of voltages on patches with hysteresis",
+            f"more from {first:g} to {last:g} s: shorten the analyses",
         )
     return times, values
 

@@ -97,8 +97,8 @@ def records_on(
             continue
         if point not in points:
             raise InputError(
-                f'{scene}: {kind}: point: expected a point of "{name}" ({quoted(points)}), found'
-                f' "{record.point}"{did_you_mean(point, points)}'
+                f'{scene}: {kind}: point: expected a point of "{name}" ({quoted(points)})',
+                f'"{record.point}"{did_you_mean(point, points)}',
             )
         yield point, record
 
@@ -141,7 +141,7 @@ def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str]
     made = projected(made) if scene.is_planar else made
     for _, tool in records_on("tool", scene.tool, made.name, made.points, scene.path):
         if tool.name in made.points:
-            raise InputError(f'tool: name: expected one that no point of "{made.name}" has, found "{tool.name}"')
+            raise InputError(f'tool: name: expected one that no point of "{made.name}" has', f'"{tool.name}"')
         made = with_tool(made, tool)
     return LoadedBody(
         spatial=made,

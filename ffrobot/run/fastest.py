@@ -70,9 +70,9 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
             else "A later end helps"
         )
         raise InputError(
-            f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within"
-            f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, with required/available ='
-            f" {factor:.3g} at stretch = {most:.4g}. {helps}"
+            f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within end ="
+            f' {search.analysis.end:g} s of "{search.analysis.name}"',
+            f"{name}, with required/available = {factor:.3g} at stretch = {most:.4g}. {helps}",
         )
     factor, name = search.tried[stretch]
     at = f"{name} is at {100 * factor:.3g} % of its limit"
@@ -113,15 +113,15 @@ def judging(scene: Scene) -> TimedAnalysis:
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
     if not inverse:
         raise InputError(
-            f"{where}: expected an inverse analysis (pcid, fcid, motors-only) with feasibility results, found none"
+            f"{where}: expected an inverse analysis (pcid, fcid, motors-only) with feasibility results", "none"
         )
     limited = any(of != MotorLimits() for joint in scene.motor_joints for of in joint.motor_limits)
     if not limited and not any(layout.limit or layout.amplifier for layout in scene.pzt):
-        raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
+        raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches", "none")
     if any(body.modes == "auto" for body in scene.body):
         raise InputError(
-            f'{where}: expected bodies with a number of modes, found modes = "auto": solve once without fastest and'
-            " write the numbers of modes that its summary prints"
+            f"{where}: expected bodies with a number of modes",
+            'modes = "auto": solve once without fastest and write the numbers of modes that its summary prints',
         )
     return inverse[0]
 
@@ -134,7 +134,8 @@ def _bounds(scene: Scene, analysis: TimedAnalysis) -> tuple[float, float]:
     if most < least:
         raise InputError(
             f'{scene.path}: trajectory {_names(scene)}: fastest: expected a path that is over before "{analysis.name}"'
-            f" ends at {analysis.end:g} s, found one that takes until {one:.4g} s"
+            f" ends at {analysis.end:g} s",
+            f"one that takes until {one:.4g} s",
         )
     return least, most
 

@@ -84,8 +84,9 @@ def _with_twice_the_modes(
         if modal is not None:
             if body.link is None:
                 raise InputError(
-                    f'{path}: analysis: check: expected "link" in body "{body.name}" for "finer", which computes'
-                    f" it with twice the modes, found only the modal body file {body.modal}"
+                    f'{path}: analysis: check: expected "link" in body "{body.name}" for "finer", which computes it'
+                    " with twice the modes",
+                    f"only the modal body file {body.modal}",
                 )
             table = LinkTable(_twice_as_many(link_keys(body.link), modal), link_path(body.link))
             body = body.model_copy(update={"link": table, "modes": None})

@@ -63,8 +63,8 @@ def _take_joint(whole: Model, node: Node, run: Run, states: tuple[Array, Array, 
     if number is None or not (same or len(node.joint.units) == 1):
         raise InputError(
             f"{whole.scene.path}: {node.joint.label}: expected joints that have the same place in the tree with"
-            " subdivided links as with whole ones if these are controlled, found another. List it before the others"
-            " of its loop"
+            " subdivided links as with whole ones if these are controlled",
+            "another. List it before the others of its loop",
         )
     sign, other = 1.0 if same else -1.0, tree.nodes[number]
     for to, values, slices in zip(states, (run.q, run.v, run.a), ("q", "v", "v"), strict=True):

@@ -99,7 +99,7 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:
     try:
         text = tomli_w.dumps(plain(keys, functions))
     except (TypeError, RecursionError) as error:
-        raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
+        raise InputError(f"{path}: expected numbers, text, lists and tables", f"something else: {error}") from None
     return validated_scene(parse_toml(text, path, "scene"), path, text, functions)
 
 
@@ -203,7 +203,7 @@ def _check_orientation(law: OrientationLaw, times: Array, label: str) -> None:
         sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
         if sizes.min() <= 1e-9 * sizes.max():
             at = times[sizes.argmin()]
-            raise InputError(f"{label}: expected a direction at all times, found none at t = {at:.9g} s")
+            raise InputError(f"{label}: expected a direction at all times", f"none at t = {at:.9g} s")
 
 
 def _check_path(function: TimeFunction, times: Array, label: str) -> None:

@@ -69,7 +69,7 @@ def axis_of(servo: float | str, ratio: float) -> Axis:
         (omega,) = 2 * np.pi * parts[0]
         if not (0.0 < omega < np.inf and 0.0 < ratio < np.inf):
             found = f"{omega / 2 / np.pi:g} Hz and {ratio:g}"
-            raise InputError(f"servo: expected a frequency above 0 Hz and a damping ratio above 0, found {found}")
+            raise InputError("servo: expected a frequency above 0 Hz and a damping ratio above 0", found)
         words = f"{parts[0][0]:.3g} Hz, damping ratio {ratio:.3g}"
         return Axis(np.ones(1), np.array([omega**-2, 2 * ratio / omega, 1.0]), words=words)
     numerator, denominator, delay = (
@@ -81,7 +81,8 @@ def axis_of(servo: float | str, ratio: float) -> Axis:
             and abs(numerator[-1] - denominator[-1]) <= UNITY * abs(denominator[-1])):  # fmt: skip
         raise InputError(
             'servo: expected "NUMERATOR / DENOMINATOR" or "… / … / DELAY", stable, equal to 1 at s = 0, with at least'
-            f' two poles more than zeros, found "{servo}"'
+            " two poles more than zeros",
+            f'"{servo}"',
         )
     return Axis(numerator / numerator[-1], denominator / denominator[-1], float(delay[0]), str(servo))
 
@@ -94,10 +95,10 @@ def _measured(path: Path) -> Axis:
         raise InputError(f"{path}: cannot read the table of a frequency response: {error}") from None
     if header != COLUMNS or len(rows) < LEAST:
         expected = f"columns {','.join(COLUMNS)} and at least {LEAST} rows"
-        raise InputError(f"{path}: expected {expected}, found {','.join(header)!r} and {len(rows)}")
+        raise InputError(f"{path}: expected {expected}", f"{','.join(header)!r} and {len(rows)}")
     frequency, magnitude, phase = np.transpose([numbers_of(path, line, row, 3) for line, row in rows])
     if min(frequency.min(), magnitude.min()) <= 0.0 or len(np.unique(frequency)) < LEAST:
-        raise InputError(f"{path}: expected magnitudes above 0 at {LEAST} or more frequencies above 0, found others")
+        raise InputError(f"{path}: expected magnitudes above 0 at {LEAST} or more frequencies above 0", "others")
     response = magnitude * np.exp(1j * np.radians(phase))
     axis = fitted(frequency, response)
     missed, size = (np.sqrt(np.mean(np.abs(of) ** 2)) for of in (axis.at(2j * np.pi * frequency) - response, response))
@@ -105,7 +106,8 @@ def _measured(path: Path) -> Axis:
     if not off <= POOR:
         raise InputError(
             f"{path}: expected magnitudes (1 at low frequencies, not dB) and phases (degrees, negative where motors"
-            f" lag) of a controller, found ones that {2 * PAIRS[-1]} poles are {100 * off:.0f} % off (RMS)"
+            " lag) of a controller",
+            f"ones that {2 * PAIRS[-1]} poles are {100 * off:.0f} % off (RMS)",
         )
     return axis
 

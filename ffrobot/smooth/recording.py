@@ -75,7 +75,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     joints = scene.motor_joints
     names = [joint.name for joint in joints]
     if several := [joint.name for joint in joints if len(joint.units) != 1]:
-        raise InputError(f"{scene.path}: expected joints of one coordinate each, found {quoted(several)}")
+        raise InputError(f"{scene.path}: expected joints of one coordinate each", quoted(several))
     columns = _columns(path, record, names)
     scale = np.array([1 / TURN if is_in_degrees and joint.units[0] == "rad" else 1.0 for joint in joints])
     values = record.values[:, columns] * scale
@@ -86,9 +86,9 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     good = record.times > np.append(-np.inf, np.maximum.accumulate(record.times)[:-1])
     times, values = record.times[good], values[good]
     if len(times) < 4:
-        raise InputError(f"{path}: expected at least 4 set points with times that increase, found {len(times)}")
+        raise InputError(f"{path}: expected at least 4 set points with times that increase", len(times))
     if np.ptp(values, axis=0).max() <= STILL:
-        raise InputError(f"{path}: expected joints that move, found none")
+        raise InputError(f"{path}: expected joints that move", "none")
     rates = None if record.rates is None else record.rates[good][:, columns] * scale
     found = Recording(tuple(names), times - times[0], values, record.times - times[0], rates, (*record.remarks, *left))
     return without_rest(found)
@@ -109,7 +109,7 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     """
     timed = [analysis for analysis in scene.analysis if isinstance(analysis, TimedAnalysis)]
     if not scene.trajectory or not timed:
-        raise InputError(f"{scene.path}: expected --path, or trajectories and an analysis with an end, found neither")
+        raise InputError(f"{scene.path}: expected --path, or trajectories and an analysis with an end", "neither")
     paths = tuple(path.changed(joint=path.motor, motor=None) if path.motor else path for path in scene.trajectory)
     outputs = int(np.ceil(timed[0].end / step - STILL))
     analysis = Pcid(name="plan", kind="pcid", end=outputs * step, output_step=step)
@@ -130,8 +130,8 @@ def _columns(path: Path, record: Recorded, names: Sequence[str]) -> list[int]:
     if len(columns) < len(names):
         missing = [name for name, k in zip(names, found, strict=True) if k is None] or names  # one column is no joint's
         raise InputError(
-            f"{path}: expected a column of every joint with a motor (constant where it rests), found none of"
-            f" {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}"
+            f"{path}: expected a column of every joint with a motor (constant where it rests)",
+            f"none of {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}",
         )
     return columns
 
@@ -144,8 +144,8 @@ def _check_unit(path: Path, joints: Sequence[JointRecord], values: Array) -> Non
         beyond = max(float(column.max()) - high, low - float(column.min()))
         if joint.units[0] == "rad" and beyond > np.pi and low <= column.min() / TURN and column.max() / TURN <= high:
             raise InputError(
-                f'{path}: expected angles in rad, found "{joint.name}" from {column.min():.4g} to {column.max():.4g}:'
-                " --degrees takes angles in degrees"
+                f"{path}: expected angles in rad",
+                f'"{joint.name}" from {column.min():.4g} to {column.max():.4g}: --degrees takes angles in degrees',
             )
 
 

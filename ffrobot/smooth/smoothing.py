@@ -62,7 +62,7 @@ class Smoothed:
             raise SolveError(f"expected a motion to be improved, found: {self.verdict}")
         if not self.candidates[0].name.startswith(self.kind):
             names = quoted(one.name for one in self.candidates)
-            raise SolveError(f"expected a motion that is {self.kind}, found {names}")
+            raise SolveError(f"expected a motion that is {self.kind}", names)
         return self.candidates[0]
 
     @property
@@ -103,7 +103,7 @@ MAKERS: Mapping[str, Callable[[JointMotions], Content]] = {
 def maker_of(path: Path) -> Callable[[JointMotions], Content]:
     """Return the writer for a motion file by its suffix. Raises `InputError` unless it is one of `MAKERS`."""
     if path.suffix not in MAKERS:
-        raise InputError(f'{path}: expected a name that ends in {either(MAKERS)}, found "{path.name}"')
+        raise InputError(f"{path}: expected a name that ends in {either(MAKERS)}", f'"{path.name}"')
     return MAKERS[path.suffix]
 
 
@@ -164,11 +164,11 @@ def smooth_motion(
     """
     loaded, watcher = load_robot(Path(scene)), watcher or Watcher()
     if not loaded.motor_joints:
-        raise InputError(f"{loaded.path}: expected joints with motors, found none")
+        raise InputError(f"{loaded.path}: expected joints with motors", "none")
     if kind:
         check_known(kind, KINDS, f"kind: expected one of {quoted(KINDS)}")
     if not 10.0 <= rate <= 10_000.0:
-        raise InputError(f"rate: expected 10 to 10000 Hz, found {rate:g}")
+        raise InputError("rate: expected 10 to 10000 Hz", f"{rate:g}")
     controllers = _servo(loaded, servo, damping_ratio)
     watcher.stage("motion")
     read = planned(loaded, 1 / rate, watcher) if path is None else read_recording(
@@ -191,5 +191,5 @@ def _servo(scene: Scene, servo: float | str | Mapping[str, float | str], ratio: 
     for joint in by_joint:
         check_known(joint, joints, expected)
     if missing := [joint for joint in joints if joint not in by_joint]:
-        raise InputError(f"{expected}, found none of {quoted(missing)}")
+        raise InputError(f"{expected}", f"none of {quoted(missing)}")
     return Servo(tuple(axis_of(by_joint[joint], ratio) for joint in joints))

@@ -64,7 +64,7 @@ def parse_variation(text: str) -> Variation:
     keys = tuple(tuple(one.strip().split(".")) for one in key.split(","))
     text = shown(text)
     if not equals or not all(map(all, keys)) or max(map(len, keys)) > DEEPEST:
-        raise InputError(f'--vary: expected KEY=VALUES, such as gravity.1=-9.81:0:5, found "{text}"')
+        raise InputError("--vary: expected KEY=VALUES, such as gravity.1=-9.81:0:5", f'"{text}"')
     pieces = values.split(":")
     if len(pieces) in (3, 4) and '"' not in values:
         return _range(keys, pieces, text)
@@ -74,8 +74,8 @@ def parse_variation(text: str) -> Variation:
         listed = []
     if not listed:
         raise InputError(
-            "--vary: expected FIRST:LAST:COUNT, FIRST:LAST:COUNT:log or a list with commas (texts in quotes), found"
-            f' "{text}"'
+            "--vary: expected FIRST:LAST:COUNT, FIRST:LAST:COUNT:log or a list with commas (texts in quotes)",
+            f'"{text}"',
         )
     return Variation(keys, tuple(listed))
 
@@ -85,13 +85,13 @@ def _range(keys: tuple[tuple[str, ...], ...], pieces: Sequence[str], text: str) 
     try:
         first, last, count = float(pieces[0]), float(pieces[1]), int(pieces[2])
     except ValueError:
-        raise InputError(f'--vary: expected two numbers and a count, FIRST:LAST:COUNT, found "{text}"') from None
+        raise InputError("--vary: expected two numbers and a count, FIRST:LAST:COUNT", f'"{text}"') from None
     if count < 1 or not np.isfinite([first, last]).all() or (logarithmic and pieces[3] != "log"):
-        raise InputError(f'--vary: expected FIRST:LAST:COUNT with a count of at least 1, or …:log, found "{text}"')
+        raise InputError("--vary: expected FIRST:LAST:COUNT with a count of at least 1, or …:log", f'"{text}"')
     if count > MOST_RUNS:
-        raise InputError(f'--vary: expected at most {MOST_RUNS} values, found "{text}"')
+        raise InputError(f"--vary: expected at most {MOST_RUNS} values", f'"{text}"')
     if logarithmic and not np.sign(first) * np.sign(last) > 0:
-        raise InputError(f'--vary: expected two ends of one sign for a logarithmic range, found "{text}"')
+        raise InputError("--vary: expected two ends of one sign for a logarithmic range", f'"{text}"')
     spaced = np.geomspace(first, last, count) if logarithmic else np.linspace(first, last, count)
     return Variation(keys, tuple(float(value) for value in spaced), (first, last), logarithmic)
 
@@ -99,7 +99,7 @@ def _range(keys: tuple[tuple[str, ...], ...], pieces: Sequence[str], text: str) 
 def grid(variations: Sequence[Variation]) -> list[tuple[Value, ...]]:
     """Every combination of the values; the last key varies fastest. Raises `InputError` where these are too many."""
     if (count := math.prod(len(variation.values) for variation in variations)) > MOST_RUNS:
-        raise InputError(f"--vary: expected at most {MOST_RUNS} runs, found {count}: --sample takes some of them")
+        raise InputError(f"--vary: expected at most {MOST_RUNS} runs", f"{count}: --sample takes some of them")
     return list(product(*(variation.values for variation in variations)))
 
 
@@ -271,7 +271,7 @@ def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ..
             data.setdefault(part, {})
         inner = data[_index(data, part, whole)]  # type: ignore[index]
         if not isinstance(inner, dict | list):
-            raise InputError(f'--vary: expected a table or a list at "{part}" of "{".".join(whole)}", found {inner!r}')
+            raise InputError(f'--vary: expected a table or a list at "{part}" of "{".".join(whole)}"', f"{inner!r}")
         data = inner
     data[_index(data, key[-1], whole)] = value  # type: ignore[index]
 
@@ -286,5 +286,5 @@ def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary"
         return int(part)
     known = names or [str(k) for k in range(len(data))]
     raise InputError(
-        f'{option}: expected one of {quoted(known)} in "{".".join(whole)}", found "{part}"{did_you_mean(part, known)}'
+        f'{option}: expected one of {quoted(known)} in "{".".join(whole)}"', f'"{part}"{did_you_mean(part, known)}'
     )

@@ -348,5 +348,5 @@ def collected(request: str) -> tuple[str, str]:
     name, _, reduction = request.partition(":")
     if not name or reduction not in ("", *REDUCTIONS):
         reductions, of_point = "|".join(REDUCTIONS), " or ".join(f"{word} POINT" for word in SETTLING)
-        raise InputError(f'--collect: expected DATASET, DATASET:{reductions}, {of_point}, found "{request}"')
+        raise InputError(f"--collect: expected DATASET, DATASET:{reductions}, {of_point}", f'"{request}"')
     return name, reduction or "max"

@@ -91,7 +91,7 @@ class Sweep:
 def check_once(keys: Sequence[Key], option: str = "--vary") -> None:
     """Raise `InputError` for a key that the `option` names several times."""
     if twice := next((key for key in keys if keys.count(key) > 1), None):
-        raise InputError(f"{option}: expected every key once, found {'.'.join(twice)} several times")
+        raise InputError(f"{option}: expected every key once", f"{'.'.join(twice)} several times")
 
 
 def plan_sweep(
@@ -237,9 +237,9 @@ def claim_folder(sweep: Sweep) -> None:
     plan = json.dumps({"scene": scene, **({"growing": True} if sweep.growing else of_points)})
     path = sweep.folder / PLAN
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != plan:
-        raise InputError(f"{sweep.folder}: output: expected a new folder or one of this very sweep, found another's")
+        raise InputError(f"{sweep.folder}: output: expected a new folder or one of this very sweep", "another's")
     if not path.exists() and sweep.folder.exists() and any(sweep.folder.iterdir()):
-        raise InputError(f"{sweep.folder}: output: expected a new folder, found one that holds other files")
+        raise InputError(f"{sweep.folder}: output: expected a new folder", "one that holds other files")
     write_atomically(path, plan.encode(), "plan of the sweep", make_folder=True, ours=True)
 
 

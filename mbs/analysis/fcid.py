@@ -87,7 +87,8 @@ class Fcid(TimedAnalysis):
         if rows != freedom:
             raise InputError(
                 f'{model.scene.path}: analysis "{self.name}": kind: expected as many trajectory components as the'
-                f' mechanism has degrees of freedom ({freedom}) for "fcid", found {rows}'
+                f' mechanism has degrees of freedom ({freedom}) for "fcid"',
+                rows,
             )
 
         def equations() -> _core.SpatialPrescribedMotion:
@@ -149,8 +150,9 @@ def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
         in_file = len(body.modal_transform)
         if len(functions) > in_file:
             raise InputError(
-                f'{scene_path}: analysis "{analysis.name}": modal.{body.name}: expected at most {in_file}'
-                f" expressions, one for each mode, found {len(functions)}"
+                f'{scene_path}: analysis "{analysis.name}": modal.{body.name}: expected at most {in_file} expressions,'
+                " one for each mode",
+                len(functions),
             )
         functions += [ZERO] * (in_file - len(functions))
         selected = np.argmax(body.modal_transform, axis=0) if body.n_modes else np.zeros(0, dtype=int)

@@ -151,7 +151,8 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
     if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints with'
-            f' stiffness, found "{analysis.apply}"'
+            " stiffness",
+            f'"{analysis.apply}"',
         )
     _check_motors(source.model, analysis, source.q[0])
     in_motors = with_motor_coordinates(source, model)
@@ -214,11 +215,11 @@ def _check_motors(model: Model, analysis: Forward, q: Array) -> None:
     key = f'{model.scene.path}: analysis "{analysis.name}": apply'
     if not model.motors:
         raise InputError(
-            f'{key}: expected joints with motors for "{analysis.apply}", found none: name them with motor = true'
+            f'{key}: expected joints with motors for "{analysis.apply}"', "none: name them with motor = true"
         )
     count, freedom = sum(map(len, model.motors.values())), mobility(model, q).freedom
     if model.scene.is_planar and count != freedom:
         raise InputError(
-            f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}", found {count};'
-            ' name them with motor = true, or use apply = "trajectory"'
+            f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}"',
+            f'{count}; name them with motor = true, or use apply = "trajectory"',
         )

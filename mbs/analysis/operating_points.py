@@ -183,8 +183,9 @@ def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
     if abs(source.time[row] - t) > NEAR * source.analysis.last_time:
         every = f"every {source.analysis.output_step:g} s " if isinstance(source.analysis, TimedAnalysis) else ""
         raise InputError(
-            f'{path}: analysis "{analysis.name}": times: expected output times of "{source.analysis.name}",'
-            f" {every}up to {source.time[-1]:g} s, found {t:g}"
+            f'{path}: analysis "{analysis.name}": times: expected output times of "{source.analysis.name}", {every}up'
+            f" to {source.time[-1]:g} s",
+            f"{t:g}",
         )
     return row
 

@@ -33,8 +33,8 @@ def user_function(function: object) -> TimeFunction:
         values = called(function, t, t)
         if values.shape not in ((), (3,)):
             raise InputError(
-                f"{_name_of(function)}: expected (value, rate, acceleration), or the value of a load, found an array of"
-                f" shape {values.shape} at t = {t:g} s"
+                f"{_name_of(function)}: expected (value, rate, acceleration), or the value of a load",
+                f"an array of shape {values.shape} at t = {t:g} s",
             )
         value, rate, acceleration = (float(values), np.nan, np.nan) if values.ndim == 0 else map(float, values)
         return value, rate, acceleration
@@ -55,9 +55,7 @@ def called(function: Callable[..., object], t: float, *arguments: object) -> Arr
     try:
         return np.asarray(returned, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(
-            f"{_name_of(function)}: expected numbers, found {shown(repr(returned))} at t = {t:g} s"
-        ) from None
+        raise InputError(f"{_name_of(function)}: expected numbers", f"{shown(repr(returned))} at t = {t:g} s") from None
 
 
 def _name_of(function: object) -> str:
@@ -74,16 +72,17 @@ def check_domain(function: TimeFunction, times: Array, describe: str, derivative
     bad = np.flatnonzero(~np.isfinite(samples).all(axis=0))
     if bad.size == len(times) and np.isfinite(samples[0]).all() and np.isnan(samples[1:]).all():
         raise InputError(
-            f"{describe}: expected a function of t that returns (value, rate, acceleration), found one that returns the"
-            " value alone"
+            f"{describe}: expected a function of t that returns (value, rate, acceleration)",
+            "one that returns the value alone",
         )
     if bad.size:
         first = bad[0]
         order = int(np.flatnonzero(~np.isfinite(samples[:, first]))[0])
         quantity = ("value", "velocity", "acceleration")[order]
         raise InputError(
-            f"{describe}: expected a finite {quantity} during the whole run, found none at t = {times[first]:.9g} s"
-            " (a domain error, an overflow, or a time that the waypoints do not cover)"
+            f"{describe}: expected a finite {quantity} during the whole run",
+            f"none at t = {times[first]:.9g} s (a domain error, an overflow, or a time that the waypoints do not"
+            " cover)",
         )
 
 
@@ -114,9 +113,9 @@ def check_derivatives(function: TimeFunction, end: float, describe: str) -> None
             k = int(np.flatnonzero(wrong)[0])
             said = slope[np.flatnonzero(known[:, k])[0], k]
             raise InputError(
-                f"{describe}: expected the derivatives of the value, (value, rate, acceleration), found the {quantity}"
-                f" {given[order, k]:.6g} at t = {times[k]:.6g} s, where differences of the"
-                f" {('value', 'rate')[order - 1]} are {said:.6g}"
+                f"{describe}: expected the derivatives of the value, (value, rate, acceleration)",
+                f"the {quantity} {given[order, k]:.6g} at t = {times[k]:.6g} s, where differences of the"
+                f" {('value', 'rate')[order - 1]} are {said:.6g}",
             )
 
 
@@ -162,7 +161,8 @@ def _checked(
         if values.shape not in ((linear,), (all_of_them,)):
             raise InputError(
                 f"{_name_of(function)}: expected a force ({', '.join(components[:linear])}), or"
-                f" ({', '.join(components)}), found an array of shape {values.shape} at t = {t:g} s"
+                f" ({', '.join(components)})",
+                f"an array of shape {values.shape} at t = {t:g} s",
             )
         return [*map(float, values), *[0.0] * (all_of_them - len(values))]
 

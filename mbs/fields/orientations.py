@@ -59,7 +59,7 @@ def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:
     e = table.values[:, columns]
     length = np.linalg.norm(e, axis=1)
     if (bad := np.flatnonzero(np.abs(length - 1) > UNIT)).size:
-        raise InputError(f"row {bad[0] + 1}: expected qw, qx, qy, qz of length 1, found {length[bad[0]]:.6g}")
+        raise InputError(f"row {bad[0] + 1}: expected qw, qx, qy, qz of length 1", f"{length[bad[0]]:.6g}")
     psi, reference = about_their_middle(of_quaternion(e / length[:, None]), "row")
     return Waypoints(("rx", "ry", "rz"), table.times, psi), reference
 
@@ -74,8 +74,8 @@ def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
     psi = logarithm(A @ middle.T)
     if (far := np.linalg.norm(psi, axis=1)).max() > WIDEST:
         raise InputError(
-            f"{each} {far.argmax() + 1}: expected orientations within {np.degrees(WIDEST):.0f} degrees of their middle,"
-            f" found {np.degrees(far.max()):.0f}: divide the motion, or give rotation_vector or rpy as expressions"
+            f"{each} {far.argmax() + 1}: expected orientations within {np.degrees(WIDEST):.0f} degrees of their middle",
+            f"{np.degrees(far.max()):.0f}: divide the motion, or give rotation_vector or rpy as expressions",
         )
     x, y, z = as_list(logarithm(middle))
     return psi, (x, y, z)

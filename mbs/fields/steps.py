@@ -38,12 +38,13 @@ def load_steps(path: Path, analysis: str) -> Steps:
             dataset = file.get(f"{analysis}/{DATASET}")
             if dataset is None:
                 raise InputError(
-                    f'{path}: expected the steps of an analysis "{analysis}", found none: they are there of a run with'
-                    " keep_steps = true that one explicit integrator has made as a whole"
+                    f'{path}: expected the steps of an analysis "{analysis}"',
+                    "none: they are there of a run with keep_steps = true that one explicit integrator has made as a"
+                    " whole",
                 )
             ends, method = numbers(dataset, f"{path}: {analysis}/{DATASET}"), str(dataset.attrs.get(METHOD, ""))
     except OSError:
-        raise InputError(f"{path}: expected a results file of ffrobot, found something else") from None
+        raise InputError(f"{path}: expected a results file of ffrobot", "something else") from None
     if ends.ndim != 1 or not len(ends) or not np.all(np.diff(ends) > 0.0):
-        raise InputError(f"{path}: {analysis}/{DATASET}: expected times that ascend, found others")
+        raise InputError(f"{path}: {analysis}/{DATASET}: expected times that ascend", "others")
     return Steps(path, method, ends)

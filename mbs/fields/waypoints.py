@@ -199,9 +199,9 @@ def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Cal
     if late.size:
         before, after = times[late[0]], times[late[0] + 1]
         where = place(int(rows[late[0] + 1]))
-        raise InputError(f"{where}: expected times that increase, found t = {after:g} after {before:g}")
+        raise InputError(f"{where}: expected times that increase", f"t = {after:g} after {before:g}")
     if len(times) < 2:
-        raise InputError(f"expected at least 2 waypoints, found {len(times)}")
+        raise InputError("expected at least 2 waypoints", len(times))
     remarks += [*_gaps(times, np.any(np.diff(values, axis=0), axis=1)), *_moving_ends(times, values)]
     return Waypoints(tuple(columns), times, values, (*remarks, *_jumps(columns, times, values)))
 
@@ -310,13 +310,11 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
     if len(header) > 2 and not header[0] and TIME.fullmatch(header[1]):  # row numbers, as pandas writes them
         header, rows = header[1:], [(line, row[1:]) for line, row in rows]
     if header and header[0].startswith(("{", "[")):
-        raise InputError(
-            f"{path}: expected a table, found JSON: ffrobot import {path.name} -o path.csv makes one of it"
-        )
+        raise InputError(f"{path}: expected a table", f"JSON: ffrobot import {path.name} -o path.csv makes one of it")
     if len(header) < 2 or TIME.fullmatch(header[0]) is None or not all(header) or len(set(header)) < len(header):
-        raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value, found {','.join(header)!r}")
+        raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value", f"{','.join(header)!r}")
     if len(rows) < 2:
-        raise InputError(f"{path}: expected at least 2 waypoints, found {len(rows)}")
+        raise InputError(f"{path}: expected at least 2 waypoints", len(rows))
     table = np.array([numbers_of(path, line, row, len(header)) for line, row in rows])
     return header, table, np.array([line for line, _ in rows])
 
@@ -329,7 +327,7 @@ def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]
         numbers = []
     if len(numbers) != count or not all(abs(number) <= LARGEST for number in numbers):  # False of NaN
         text = shown(",".join(row))
-        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}, found {text!r}")
+        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}", f"{text!r}")
     return numbers
 
 

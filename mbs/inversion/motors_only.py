@@ -89,9 +89,9 @@ def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> 
             rate = target.function(t)[1]
             if abs(rate) * analysis.end > REST * largest:
                 raise InputError(
-                    f'{servo.where}: trajectory "{target.owner}": {target.component}: expected'
-                    f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
-                    f" {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does"
+                    f'{servo.where}: trajectory "{target.owner}": {target.component}: expected a path at rest at t ='
+                    f' {t:g} s, before or after which "{analysis.name}" holds it',
+                    f"the rate {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does",
                 )
 
 
@@ -287,9 +287,9 @@ def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple
         _check_relative_degree(servo, linear)
         if analysis.output == "redefined" and not is_minimum_phase(linear):
             raise InputError(
-                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward,"
-                f" found {analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a"
-                ' smaller factor, leave it out, or use output = "tip"'
+                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward",
+                f"{analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a smaller"
+                ' factor, leave it out, or use output = "tip"',
             )
         return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
     joints = make(0.0)
@@ -299,8 +299,8 @@ def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple
         if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
             return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), end)
     raise InputError(
-        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined", found zeros in'
-        f" the right half plane even then: {describe_zeros(linear)}"
+        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined"',
+        f"zeros in the right half plane even then: {describe_zeros(linear)}",
     )
 
 
@@ -322,8 +322,8 @@ def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
     worst = int((values[:, -1] / values[:, 0]).argmin())
     if values[worst, -1] < SINGULAR * values[worst, 0]:
         raise InputError(
-            f"{servo.where}: expected motors that accelerate every component of the path, found at"
-            f" t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}"
+            f"{servo.where}: expected motors that accelerate every component of the path",
+            f"at t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}",
         )
 
 

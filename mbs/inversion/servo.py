@@ -183,12 +183,12 @@ def make_servo(
         if count != freedom:
             raise InputError(
                 f'{where}: expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom'
-                f" ({freedom}), found {count}"
+                f" ({freedom})",
+                count,
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "{kind}", found only rigid ones: use kind'
-            ' = "pcid"'
+            f'{where}: expected at least one flexible body for kind = "{kind}"', 'only rigid ones: use kind = "pcid"'
         )
     for path in model.scene.trajectory:
         targets = ((f'trajectory "{path.name}": {name}', target) for name, target in path.targets)

@@ -201,7 +201,8 @@ def _check(model: Model) -> None:
         if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
             raise InputError(
                 f"{model.scene.path}: {node.joint.label}: between: expected the side nearer to the ground first for"
-                " linear models, found it second"
+                " linear models",
+                "it second",
             )
 
 

@@ -115,8 +115,9 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
         q = solve_posture(model, float(t), state.q)
         if q is None:
             raise InputError(
-                f"{model.scene.path}: trajectory: expected paths within reach, found no posture of the undeformed robot"
-                f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
+                f"{model.scene.path}: trajectory: expected paths within reach",
+                f"no posture of the undeformed robot at t = {t:.6g} s that meets"
+                f" {quoted(dict.fromkeys(row.owner for row in model.rows))}",
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
         spectra.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
@@ -129,7 +130,8 @@ def common_modes(path: Path, spectra: Sequence[tuple[Array, Array]], modes: int)
     if most < modes:
         raise InputError(
             f"{path}: trajectory: shaper.modes: expected at most {most}, the number of vibrations on the constrained"
-            f" path, found {modes}"
+            " path",
+            modes,
         )
     frequency = np.array([omega[:modes] for omega, _ in spectra]) / (2 * np.pi)
     return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in spectra]))

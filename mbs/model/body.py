@@ -257,8 +257,8 @@ def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_p
     if stiffened and stiffening is None:
         raise InputError(
             "geometric_stiffening: expected modal bodies with the geometric stiffness of all accelerations"
-            f' (geometric_stiffness/t_x to omega_yz), found none in that of "{name}": make it again from its link file'
-            " with `ffrobot link`"
+            " (geometric_stiffness/t_x to omega_yz)",
+            f'none in that of "{name}": make it again from its link file with `ffrobot link`',
         )
     J_spin, h_spin, S_spin = _spin_inertia(name, body, is_planar=is_planar)
     S_bar_kl = body.S_bar_kl.copy()
@@ -321,8 +321,8 @@ def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float
         return 0.0, np.zeros(body.mode_count), np.zeros((body.mode_count, body.mode_count))
     raise InputError(
         f'body "{name}": expected a modal body file with the inertia of the beam about its own axis'
-        ' (invariants/J_spin, h_spin, S_spin), which space = "spatial" needs, found one of an earlier version without'
-        " it. Recompute it from its link file with `ffrobot link`"
+        ' (invariants/J_spin, h_spin, S_spin), which space = "spatial" needs',
+        "one of an earlier version without it. Recompute it from its link file with `ffrobot link`",
     )
 
 

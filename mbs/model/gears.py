@@ -30,7 +30,7 @@ def elastic_joints(model: Model) -> list[Node]:
     for joint in model.scene.joint:
         if getattr(joint, "stiffness", None) is not None and joint.name not in model.motors:
             raise InputError(
-                f"{model.scene.path}: {joint.label}: stiffness: expected a joint with a motor, found one without"
+                f"{model.scene.path}: {joint.label}: stiffness: expected a joint with a motor", "one without"
             )
     return [node for node in model.tree.nodes if compliance(node) is not None]
 
@@ -74,7 +74,8 @@ def with_prescribed_motors(model: Model) -> Model:
         if row.is_trajectory and (row.kind != "coordinate" or row.coordinate in behind):
             raise InputError(
                 f'{model.scene.path}: trajectory: expected motors ("motor") in all of them, or in none, with compliant'
-                f' gears, found "{row.owner}" with trajectories of motors'
+                " gears",
+                f'"{row.owner}" with trajectories of motors',
             )
     return geared
 
@@ -84,7 +85,8 @@ def refuse_prescribed_motors(model: Model, analysis: Analysis) -> None:
     if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" with trajectories of'
-            f' motors with compliant gears, found "{analysis.kind}": the robot behind them is not prescribed'
+            " motors with compliant gears",
+            f'"{analysis.kind}": the robot behind them is not prescribed',
         )
 
 

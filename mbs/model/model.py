@@ -164,16 +164,16 @@ def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
         if key := joint.asks_for_coordinate:
             raise InputError(
                 f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
-                f" rotor_inertia nor a compliant gear, to be cut, found {quoted(key)} here and one of them in each of"
-                " the others. Such loops are not available in 3D"
+                " rotor_inertia nor a compliant gear, to be cut",
+                f"{quoted(key)} here and one of them in each of the others. Such loops are not available in 3D",
             )
 
 
 def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
     if joint.loop_equations is None:
         raise InputError(
-            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes, found a {joint.type}"
-            " joint: list it before the other joints of its loop"
+            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes",
+            f"a {joint.type} joint: list it before the other joints of its loop",
         )
     first, second = joint.triads()
     a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
@@ -217,10 +217,10 @@ def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory
     label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
     if len(joint.units) != 1:
         raise InputError(
-            f'{label}: expected a joint with one coordinate, found "{joint.name}", {len(joint.units)} coordinates'
+            f"{label}: expected a joint with one coordinate", f'"{joint.name}", {len(joint.units)} coordinates'
         )
     if path.motor is not None and joint not in scene.motor_joints:
-        raise InputError(f'{label}: expected a joint with a motor, found "{joint.name}", which has none')
+        raise InputError(f"{label}: expected a joint with a motor", f'"{joint.name}", which has none')
     return row_of_joint(tree, joint, path.name, path.components["value"])
 
 
@@ -271,15 +271,15 @@ def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
         if point not in bodies[body].points:
             known = bodies[body].points
             raise InputError(
-                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)}), found'
-                f' "{reference.name}"{did_you_mean(point, known)}'
+                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)})',
+                f'"{reference.name}"{did_you_mean(point, known)}',
             )
         stiffening = bodies[body].stiffening
         if stiffening is not None and point not in stiffening.K_points:
             raise InputError(
                 f"{scene.path}: {reference.key}: expected, with geometric_stiffening, a point whose loads' geometric"
-                f" stiffness is in the modal body file ({quoted(stiffening.K_points)}), found"
-                f' "{reference.name}"'
+                f" stiffness is in the modal body file ({quoted(stiffening.K_points)})",
+                f'"{reference.name}"',
             )
 
 

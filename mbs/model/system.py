@@ -171,12 +171,14 @@ class MultibodySystem:
             if node.joint.type == "planar" and node.joint.frictions and node.backwards:
                 raise InputError(
                     f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a planar"
-                    " joint has friction, found it second"
+                    " joint has friction",
+                    "it second",
                 )
             if node.joint.type == "planar" and node.backwards and node.joint.name in loaded:
                 raise InputError(
                     f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a load"
-                    " acts along a planar joint, found it second"
+                    " acts along a planar joint",
+                    "it second",
                 )
 
     @property

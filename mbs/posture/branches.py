@@ -90,15 +90,14 @@ def chosen_start(model: Model) -> StartPosture | None:
     starts, tree = start_postures(model), model.tree
     if cut := [joint for joint in wanted if joint not in tree.carried]:
         raise InputError(
-            f'{model.scene.path}: initial.branch: expected joints of the tree, found "{cut[0]}", which is cut'
+            f"{model.scene.path}: initial.branch: expected joints of the tree", f'"{cut[0]}", which is cut'
         )
     for one in starts:
         if all(is_so(model, one.q, tree.nodes[tree.carried[joint]], word) for joint, word in wanted.items()):
             return one
     raise InputError(
-        f"{model.scene.path}: initial.branch: expected one of the {len(starts)} postures that were found, found"
-        f" {in_words(wanted)},"
-        " which none of them is: see ffrobot pose without this key"
+        f"{model.scene.path}: initial.branch: expected one of the {len(starts)} postures that were found",
+        f"{in_words(wanted)}, which none of them is: see ffrobot pose without this key",
     )
 
 

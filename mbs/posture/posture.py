@@ -260,13 +260,13 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
     if rows > free.freedom:
         raise InputError(
             f"{path}: trajectory: expected at most {free.freedom} components, as many as the mechanism has degrees of"
-            f" freedom with rigid links, found {rows} in {names}: only vibrations could follow the others"
+            " freedom with rigid links",
+            f"{rows} in {names}: only vibrations could follow the others",
         )
     if free.followed < rows:
         raise InputError(
-            f"{path}: initial: expected a posture in which the links can follow trajectory {names} in every direction,"
-            " found a singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the"
-            " path"
+            f"{path}: initial: expected a posture in which the links can follow trajectory {names} in every direction",
+            "a singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the path",
         )
     if free.ratio < NEARLY_SINGULAR:
         yield f"near a singular posture at the start: {names} can hardly be followed (ratio {free.ratio:.1e})"
@@ -286,7 +286,8 @@ def _check_motors(model: Model, seen: Mobility) -> Iterator[str]:
     if count > seen.freedom or (count < seen.freedom and named and model.scene.is_planar):
         raise InputError(
             f"{model.scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
-            f" ({seen.freedom}), found {count} ({quoted(motors)})"
+            f" ({seen.freedom})",
+            f"{count} ({quoted(motors)})",
         )
     if count < seen.freedom and (named or model.scene.topology.is_open_chain):
         joints = [node.joint for node in model.tree.nodes if node.joint.freedoms and node.joint.type != "free"]
@@ -316,9 +317,9 @@ def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: f
             if jump is not None:
                 t, before, after = jump
                 raise InputError(
-                    f"{path}: {label}: expected a continuous {quantity}, found a jump from {before:.6g} to {after:.6g}"
-                    f" at t = {t:.9g} s: no finite force can make the robot follow; round it off (waypoints make a"
-                    " smooth curve)"
+                    f"{path}: {label}: expected a continuous {quantity}",
+                    f"a jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
+                    " follow; round it off (waypoints make a smooth curve)",
                 )
 
 

@@ -50,9 +50,7 @@ def check_reach(model: Model, end: float) -> None:
     Flexible links would stretch beyond all sense instead of failing.
     """
     for name, how in _all_beyond(model, as_floats(np.linspace(0.0, end, REACH_CHECKS))):
-        raise InputError(
-            f'{model.scene.path}: trajectory "{name}": expected a target within reach, found one that {how}'
-        )
+        raise InputError(f'{model.scene.path}: trajectory "{name}": expected a target within reach', f"one that {how}")
 
 
 def _beyond(model: Model, path: Trajectory, times: Array) -> str:

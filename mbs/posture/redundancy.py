@@ -66,19 +66,19 @@ def _check(model: Model, criterion: str, seen: Mobility) -> None:
     path = model.scene.path
     if seen.followed == seen.freedom:
         raise InputError(
-            f"{path}: redundancy: expected a mechanism with more degrees of freedom than its trajectories prescribe,"
-            f" found {seen.freedom} degrees of freedom and as many components: leave the key out"
+            f"{path}: redundancy: expected a mechanism with more degrees of freedom than its trajectories prescribe",
+            f"{seen.freedom} degrees of freedom and as many components: leave the key out",
         )
     if criterion == "least-torque" and model.loop_rows.any():
         raise InputError(
-            f'{path}: redundancy: expected "least-motion" of a mechanism with kinematic loops, found "least-torque",'
-            " which supports open chains only"
+            f'{path}: redundancy: expected "least-motion" of a mechanism with kinematic loops',
+            '"least-torque", which supports open chains only',
         )
     for node in model.tree.nodes:
         if node.joint.q_count != node.joint.freedoms:
             raise InputError(
-                f"{path}: redundancy: expected joints with angles or displacements for coordinates, found"
-                f' "{node.joint.name}", a {node.joint.type} joint: prescribe joints by trajectories'
+                f"{path}: redundancy: expected joints with angles or displacements for coordinates",
+                f'"{node.joint.name}", a {node.joint.type} joint: prescribe joints by trajectories',
             )
 
 
@@ -159,8 +159,8 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
     )
     if not best.success:
         raise SolveError(
-            f'{model.scene.path}: redundancy = "least-torque": expected the least within {MOST_STEPS} steps, found'
-            ' none: "least-motion" needs none, or prescribe a joint by a trajectory'
+            f'{model.scene.path}: redundancy = "least-torque": expected the least within {MOST_STEPS} steps',
+            'none: "least-motion" needs none, or prescribe a joint by a trajectory',
         )
     return moved(best.x, 0)
 
@@ -183,7 +183,7 @@ def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[
         best = max(best, (share, nodes), key=lambda one: one[0])
     if best[0] < TELLS:
         raise SolveError(
-            f"{model.scene.path}: redundancy: expected joints that move in every motion which the path leaves free,"
-            " found none that do all along it: prescribe a joint by a trajectory, or change the path"
+            f"{model.scene.path}: redundancy: expected joints that move in every motion which the path leaves free",
+            "none that do all along it: prescribe a joint by a trajectory, or change the path",
         )
     return best[1]

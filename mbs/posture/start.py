@@ -54,8 +54,8 @@ def undeformed_posture(model: Model) -> State:
             advice.append(f"from [initial] {as_guess(turning_joints(model)[0], works)} it works")
         raise InputError(
             f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
-            f" {owners} at t = 0, found none by Newton's method"
-            f" ({'; '.join(advice) or 'out of reach, or on another branch?'})"
+            f" {owners} at t = 0",
+            f"none by Newton's method ({'; '.join(advice) or 'out of reach, or on another branch?'})",
         )
     v, named = _guessed_rates(model), _named(model, "joint_rates")
     start = with_rates(model, q, v)
@@ -91,14 +91,15 @@ def check_turning(model: Model) -> None:
     for node in model.tree.nodes:
         if (sizes[node.v] <= least).any():
             raise InputError(
-                f"{model.scene.path}: {node.joint.label}: expected inertia about each of its axes, found none: masses"
-                f" that it turns are on an axis, and {quoted(slim)} have a moment of inertia of 0 (rigid.inertia)"
+                f"{model.scene.path}: {node.joint.label}: expected inertia about each of its axes",
+                f"none: masses that it turns are on an axis, and {quoted(slim)} have a moment of inertia of 0"
+                " (rigid.inertia)",
             )
     values = np.linalg.eigvalsh(M / np.sqrt(np.outer(sizes, sizes)))
     if values[0] < LEAST:
         raise InputError(
-            f"{model.scene.path}: expected bodies that all joints together turn with some inertia, found none about an"
-            f" axis: {quoted(slim)} have a moment of inertia of 0 (rigid.inertia)"
+            f"{model.scene.path}: expected bodies that all joints together turn with some inertia",
+            f"none about an axis: {quoted(slim)} have a moment of inertia of 0 (rigid.inertia)",
         )
 
 
@@ -204,8 +205,8 @@ def _numbers(model: Model, table: Mapping[str, object], key: str) -> dict[str, A
         wanted, numbers = len(joint.guess_units or joint.units), np.atleast_1d(np.array(value, dtype=float))
         if len(numbers) != wanted:
             raise InputError(
-                f"{model.scene.path}: initial.{key}.{name}: expected {wanted} numbers of a {joint.type} joint, found"
-                f" {len(numbers)}"
+                f"{model.scene.path}: initial.{key}.{name}: expected {wanted} numbers of a {joint.type} joint",
+                len(numbers),
             )
         lists[name] = numbers
     return lists
@@ -221,7 +222,8 @@ def _guessed_rates(model: Model) -> Array:
         if node.backwards and len(node.joint.units) != 1:
             raise InputError(
                 f"{model.scene.path}: initial.joint_rates.{name}: expected the side nearer to the ground first in"
-                f" between of a {node.joint.type} joint with rates, found it second"
+                f" between of a {node.joint.type} joint with rates",
+                "it second",
             )
         v[node.v] = -rates if node.backwards else node.joint.velocity(rates)
     return v

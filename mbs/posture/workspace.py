@@ -157,8 +157,8 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
     joint = joints[axis.name]
     if len(joint.units) != 1:
         raise InputError(
-            f"{model.scene.path}: grid: expected a joint with one coordinate, found {joint.label} with"
-            f" {len(joint.units)} coordinates"
+            f"{model.scene.path}: grid: expected a joint with one coordinate",
+            f"{joint.label} with {len(joint.units)} coordinates",
         )
     return row_of_joint(model.tree, joint, axis.name, target)
 

@@ -95,8 +95,8 @@ def _refuse_loads(model: Model, elastic: Sequence[Node]) -> None:
     for load in model.scene.load:
         if any(load.joint == node.joint.name for node in elastic):
             raise InputError(
-                f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and"
-                f' equilibria, found one on "{load.joint}"'
+                f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and equilibria",
+                f'one on "{load.joint}"',
             )
 
 
@@ -154,8 +154,8 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
     if turning:
         raise InputError(
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
-            f" linearized and modes tilt the joint's axis ({quoted(sorted(turning))}),"
-            ' found "frame"'
+            f" linearized and modes tilt the joint's axis ({quoted(sorted(turning))})",
+            '"frame"',
         )
     forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run), run.twists or None)
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
@@ -196,8 +196,8 @@ def gear_motion(
     if len(time) > 1 and lasts > longest:
         raise InputError(
             f"{spring.where}: damping: expected a compliant gear that relaxes within {longest:.3g} s (damping /"
-            f" stiffness, {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not deform at"
-            " all"
+            f" stiffness, {SLOWEST:g} times the analysis)",
+            f"{lasts:.3g} s; without stiffness it does not deform at all",
         )
     transmitted, unresolved = tau - rotor, 0.0
     is_known = curve is not None
@@ -249,8 +249,8 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
         if np.array_equal(gear.spring.slope(twist), slope):
             return BSpline(knots, coefficients, DEGREE)
     raise SolveError(
-        f"{gear.where}: expected the twist of its gear within {MOST_STEPS} iterations, found none: smooth the path, or"
-        " refine output_step"
+        f"{gear.where}: expected the twist of its gear within {MOST_STEPS} iterations",
+        "none: smooth the path, or refine output_step",
     )
 
 

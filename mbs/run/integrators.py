@@ -142,8 +142,9 @@ def with_steps_of(analysis: IntegratedAnalysis, end: float, choose: Callable[[],
     if (steps := analysis.repeat_steps) is not None:
         if steps.ends[-1] != end:
             raise InputError(
-                f'{steps.path}: analysis "{analysis.name}": repeat_steps: expected steps up to {end:.9g} s, where'
-                f" the run ends, found them up to {steps.ends[-1]:.9g} s"
+                f'{steps.path}: analysis "{analysis.name}": repeat_steps: expected steps up to {end:.9g} s, where the'
+                " run ends",
+                f"them up to {steps.ends[-1]:.9g} s",
             )
         return Choice(steps.method, REPEATED)
     choice = choose()

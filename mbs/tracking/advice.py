@@ -230,8 +230,9 @@ def check_ends_for_gears(servo: Servo) -> float:
     """
     for text in rough_ends(servo.functions, servo.end):
         raise InputError(
-            f"{servo.where}: trajectory: expected jerk and acceleration without jumps for compliant gears, whose motors"
-            f" would need impulses, found that {text}"
+            f"{servo.where}: trajectory: expected jerk and acceleration without jumps for compliant gears, whose"
+            " motors would need impulses",
+            f"that {text}",
         )
     return min(path_orders(servo.functions, servo.end))
 

@@ -94,19 +94,19 @@ def with_gears(servo: Servo) -> Servo:
         assert known is not None
         if known[0].knots:
             raise InputError(
-                f'{servo.where}: expected one stiffness of each gear for kind = "tracking", found steps in joint'
-                f' "{node.joint.name}": a torque that is smooth would need a motor that is not. Use a mean stiffness'
+                f'{servo.where}: expected one stiffness of each gear for kind = "tracking"',
+                f'steps in joint "{node.joint.name}": a torque that is smooth would need a motor that is not. Use a'
+                " mean stiffness",
             )
         springs[node.joint.name] = known
     if turning := set(turning_motors(model)).intersection(springs):
         raise InputError(
-            f'{model.scene.path}: motors: expected "section" for kind = "tracking" with compliant gears in joints whose'
-            f' axes modes tilt ({quoted(sorted(turning))}), found "frame"'
+            f'{model.scene.path}: motors: expected "section" for kind = "tracking" with compliant gears in joints'
+            f" whose axes modes tilt ({quoted(sorted(turning))})",
+            '"frame"',
         )
     if loaded := sorted({load.joint for load in model.scene.load if load.joint in springs}):
-        raise InputError(
-            f'{model.scene.path}: expected no [[load]] on joints with stiffness, found one on "{loaded[0]}"'
-        )
+        raise InputError(f"{model.scene.path}: expected no [[load]] on joints with stiffness", f'one on "{loaded[0]}"')
     places, count = {}, 0
     for joint, columns in model.motors.items():
         places[joint], count = count, count + len(columns)
@@ -145,7 +145,8 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
             remedy = "Exchange its sides in `between`" if is_backwards else "Put the motor on another joint of the loop"
             raise InputError(
                 f'{servo.where}: expected motors on bodies that they do not turn themselves for kind = "tracking" with'
-                f' compliant gears, found that of joint "{joint}" on its first body, which turns with it. {remedy}'
+                " compliant gears",
+                f'that of joint "{joint}" on its first body, which turns with it. {remedy}',
             )
 
 

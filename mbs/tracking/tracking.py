@@ -197,7 +197,7 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
     limits = Limits(joined(patches.values()), largest_moments(model, limits=True))
     if not np.any(Phi_V):
-        raise InputError(f'{place}: expected patches on flexible links for kind = "tracking", found none that bend one')
+        raise InputError(f'{place}: expected patches on flexible links for kind = "tracking"', "none that bend one")
     linear = linearise(servo, end)
     is_free = gears is not None and check_ends_for_gears(servo) < SNAP
     pre, post = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
@@ -221,15 +221,15 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
         return None
     if isinstance(servo, GearedServo):
         raise InputError(
-            f'{servo.where}: expected either rigid gears or no "path_tolerance", found compliant gears with one: their'
-            " motors would need torques that jump with its acceleration"
+            f'{servo.where}: expected either rigid gears or no "path_tolerance"',
+            "compliant gears with one: their motors would need torques that jump with its acceleration",
         )
     times = as_floats(np.linspace(0.0, servo.end, len(servo.near_times)))
     rows = [servo.model.rows[k] for k in rows_of_points(servo)]
     way = max((float(np.ptp(row.target.sample(times)[0])) for row in rows if row.target), default=0.0)
     if error >= way:
         found = f"{error:g} m for a path of {way:.3g} m" if rows else "trajectories of joints or angles only"
-        raise InputError(f"{servo.where}: path_tolerance: expected a point whose path is longer, found {found}")
+        raise InputError(f"{servo.where}: path_tolerance: expected a point whose path is longer", found)
     return Tolerance(error) if analysis.tolerance_time is None else Tolerance(error, analysis.tolerance_time)
 
 

@@ -170,17 +170,17 @@ def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple
     sizes = np.sqrt(np.abs(mean) / np.maximum(np.diag(M), 1e-300))
     if sizes.max(initial=0.0) > 1.0 + ROUNDED:
         raise InputError(
-            "modal masses: expected at least those that the mean motion of the shapes has, found mode"
-            f" {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its modal"
-            " mass allows. Shapes and modal masses of the file contradict each other"
+            "modal masses: expected at least those that the mean motion of the shapes has",
+            f"mode {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its"
+            " modal mass allows. Shapes and modal masses of the file contradict each other",
         )
     off = np.abs(M - translational).max() / largest
     if off <= EXACT or np.linalg.eigvalsh(integrals.about_center)[0] > EXACT * np.abs(integrals.inertia).max():
         return integrals, ()
     if off > ROUNDED:
         raise InputError(
-            f"modal masses: expected the sums over masses and shapes, as nothing has inertia about the axis, found them"
-            f" off by {off:.2g} of the largest"
+            "modal masses: expected the sums over masses and shapes, as nothing has inertia about the axis",
+            f"them off by {off:.2g} of the largest",
         )
     remark = f"modal masses are sums over masses and shapes: those in the file are off by {off:.1e} of the largest"
     return replace(integrals, modal_mass=translational), (remark,)
@@ -250,7 +250,7 @@ def noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
     for pair in match["numbers"].strip().split(", "):
         name, _, number = pair.rpartition("=")
         if not name or not number.isdecimal() or int(number) not in nodes:
-            raise InputError(f'interfaces: expected NAME=NUMBER of nodes in the file, found "{shown(pair)}"')
+            raise InputError("interfaces: expected NAME=NUMBER of nodes in the file", f'"{shown(pair)}"')
         numbers[name] = int(number)
     return match["condition"], numbers
 
@@ -328,7 +328,7 @@ def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
     squares = np.diag(K)
     if np.any(squares <= 0):
         raise InputError(
-            f"K_e: expected a positive stiffness of every mode, found {squares.min():g}: leave out rigid modes"
+            "K_e: expected a positive stiffness of every mode", f"{squares.min():g}: leave out rigid modes"
         )
     size = np.sqrt(np.outer(squares, squares))
     if np.abs(M - np.eye(n)).max() <= ORTHONORMAL and np.abs((K - np.diag(squares)) / size).max() <= ORTHONORMAL:
@@ -336,9 +336,9 @@ def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
     try:
         omega2, T = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
     except np.linalg.LinAlgError:
-        raise InputError("M_e: expected a positive definite matrix of modal masses, found one that is not") from None
+        raise InputError("M_e: expected a positive definite matrix of modal masses", "one that is not") from None
     if omega2[0] <= 0:
-        raise InputError(f"K_e: expected a positive definite stiffness, found an eigenvalue of {omega2[0]:g}")
+        raise InputError("K_e: expected a positive definite stiffness", f"an eigenvalue of {omega2[0]:g}")
     return np.asarray(T), np.asarray(omega2)
 
 
@@ -362,7 +362,7 @@ def _stations(nodes: Nodes, ends: list[Interface], length: float) -> Stations:
     stations = [points[0]]
     stations += [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
     if len(stations) < 2:
-        raise InputError("nodes: expected root and tip at different x, found them at the same: turn the body's frame")
+        raise InputError("nodes: expected root and tip at different x", "them at the same: turn the body's frame")
     return _stations_at(stations)
 
 

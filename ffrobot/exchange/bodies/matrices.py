@@ -82,8 +82,9 @@ def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     """
     if body.reference_condition != CONDITION:
         raise InputError(
-            f'modal body {body.name}: expected one with [reference] condition = "{CONDITION}" in its link file,'
-            f' with fixed-interface modes, found "{body.reference_condition}"'
+            f'modal body {body.name}: expected one with [reference] condition = "{CONDITION}" in its link file, with'
+            " fixed-interface modes",
+            f'"{body.reference_condition}"',
         )
     link = craig_bampton(body)
     names = [ROOT, *(name for name in body.interfaces if name != ROOT)]
@@ -91,8 +92,8 @@ def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     if link.coordinates[: len(wanted)] != wanted:
         missing = [name for name in wanted if name not in link.coordinates]
         raise InputError(
-            f"modal body {body.name}: expected six coordinates of each interface, found none for {', '.join(missing)}:"
-            ' use [modes] family = "all"'
+            f"modal body {body.name}: expected six coordinates of each interface",
+            f'none for {", ".join(missing)}: use [modes] family = "all"',
         )
     damping = np.diag(2 * body.damping_ratio * 2 * np.pi * body.frequency)
     content = io.BytesIO()

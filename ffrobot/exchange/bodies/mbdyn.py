@@ -99,7 +99,7 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     shapes = _numbers(records, 8)
     modes, rest = divmod(len(shapes), 6 * count)
     if rest or not modes:
-        raise InputError(f"record 8: expected six numbers for each of {count} nodes and each mode, found {len(shapes)}")
+        raise InputError(f"record 8: expected six numbers for each of {count} nodes and each mode", len(shapes))
     shapes = shapes.reshape(modes, count, 6)
     remarks = [NOT_IN_THE_FILE]
     matrices: dict[str, Any] = {"damping": np.zeros((modes, modes))}
@@ -116,8 +116,8 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         remarks.append("integrals are sums over the lumped masses of record 11")
     else:
         raise InputError(
-            "expected records 12 and 14 to 18, or record 11 (lumped masses), which couple modes with rigid motion,"
-            f" found records {', '.join(map(str, sorted(records)))}"
+            "expected records 12 and 14 to 18, or record 11 (lumped masses), which couple modes with rigid motion",
+            f"records {', '.join(map(str, sorted(records)))}",
         )
     nodes = {
         label: Interface(place, phi[:3], phi[3:])
@@ -138,14 +138,14 @@ def _records(text: str) -> dict[int, list[str]]:
             current += line.split()
     if not {1, 2, 5, 6, 7, 8, 9, 10} <= records.keys():
         numbers = f"records {', '.join(map(str, sorted(records)))}" if records else "no records"
-        raise InputError(f"expected a .fem file of MBDyn with records 1, 2 and 5 to 10, found {numbers}")
+        raise InputError("expected a .fem file of MBDyn with records 1, 2 and 5 to 10", numbers)
     return records
 
 
 def _numbers(records: dict[int, list[str]], number: int, count: int | None = None) -> Array:
     values = np.array([number_of(word, f"record {number}") for word in records[number]])
     if count is not None and len(values) != count:
-        raise InputError(f"record {number}: expected {count} numbers, found {len(values)}")
+        raise InputError(f"record {number}: expected {count} numbers", len(values))
     return values
 
 
@@ -172,10 +172,10 @@ def _of_invariants(records: dict[int, list[str]], n: int) -> dict[str, Any]:
 def _of_lumped_masses(masses: Array, x: Array, shapes: Array) -> dict[str, Any]:
     """Sums over nodes: masses (count, 6), places (count, 3), shapes (n, count, 6)."""
     if np.any(np.ptp(masses[:, :3], axis=1) > 1e-9 * np.abs(masses[:, :3]).max()):
-        raise InputError("record 11: expected the same mass along x, y and z at each node, found others")
+        raise InputError("record 11: expected the same mass along x, y and z at each node", "others")
     m, J = masses[:, 0], masses[:, 3:]
     if not m.sum() > 0:
-        raise InputError(f"record 11: expected a mass greater than 0, found {m.sum():g}")
+        raise InputError("record 11: expected a mass greater than 0", f"{m.sum():g}")
     Phi, turn = shapes[..., :3], shapes[..., 3:]
     second = np.einsum("i,ia,ib->ab", m, x, x)
     I_bar = np.einsum("i,ia,nib->abn", m, x, Phi)

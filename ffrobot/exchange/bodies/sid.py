@@ -97,7 +97,7 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     integrals = _integrals(modal)
     nodes = {int(node.number("number")): _interface(modal, node) for node in modal.nodes}
     if not nodes:
-        raise InputError("frame: expected at least one node, found none")
+        raise InputError("frame: expected at least one node", "none")
     condition, numbers = noted(head, nodes)
     agreed, texts = with_agreed_masses(integrals)
     remarks = (NOT_IN_THE_FILE, *texts, *_turned_nodes(modal), *_checks(modal, integrals))
@@ -127,8 +127,9 @@ def _integrals(modal: Modal) -> ShapeIntegrals:
     slope = Cr.m1.transpose(2, 0, 1)
     if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope):
         raise InputError(
-            "Cr: expected m1 without a symmetric part, found one: the file has geometric stiffness among its integrals,"
-            " which cannot be distinguished from them in Oe; write it without"
+            "Cr: expected m1 without a symmetric part",
+            "one: the file has geometric stiffness among its integrals, which cannot be distinguished from them in Oe;"
+            " write it without",
         )
     return ShapeIntegrals(
         mass=modal.root["refmod"].number("mass"),
@@ -223,12 +224,12 @@ class SidObject:
         for one in self.inside:
             if one.name.lower() == name.lower():
                 return one
-        raise InputError(f"expected the object {name} in {self.name}, found none")
+        raise InputError(f"expected the object {name} in {self.name}", "none")
 
     def number(self, key: str) -> float:
         """The value of a key."""
         if key not in self.keys:
-            raise InputError(f"{self.name}: expected the key {key}, found none")
+            raise InputError(f"{self.name}: expected the key {key}", "none")
         return number_of(self.keys[key], f"{self.name}: {key}")
 
 
@@ -241,7 +242,7 @@ def parse(text: str) -> tuple[str, SidObject]:
         words, _, value = (part.strip() for part in line.partition("="))
         if words == "end" or words.startswith("end "):
             if len(stack) == 1:
-                raise InputError(f'line {number}: expected an object to end, found "{shown(words)}" outside of all')
+                raise InputError(f"line {number}: expected an object to end", f'"{shown(words)}" outside of all')
             stack.pop()
         elif not words:
             continue
@@ -252,7 +253,7 @@ def parse(text: str) -> tuple[str, SidObject]:
             stack[-1].inside.append(inner)
             stack.append(inner)
     if len(stack) > 1:
-        raise InputError(f"expected `end {stack[-1].name}`, found the end of the file")
+        raise InputError(f"expected `end {stack[-1].name}`", "the end of the file")
     return head, top
 
 
@@ -270,7 +271,7 @@ class Modal:
     def __init__(self, root: SidObject) -> None:
         self.root, self.modes = root, int(root["refmod"].number("nelastq"))
         if self.modes < 1:
-            raise InputError(f"refmod: nelastq: expected at least one mode, found {self.modes}")
+            raise InputError("refmod: nelastq: expected at least one mode", self.modes)
         thirds = (index[2] for order, index, _ in _entries(root["mdCM"]) if order and len(index) == 3)
         self.nodes = [node for node in root["frame"].inside if node.name == "node"]
         self.mode_is_last = any(third > 0 for third in thirds)
@@ -285,11 +286,11 @@ class Modal:
         is_possible = nrow > 0 and ncol > 0 and nrow * ncol * (self.modes + 1) <= MOST
         if not is_possible or (sizes and (nrow, ncol) not in sizes):
             wanted = " or ".join(f"{rows} × {columns}" for rows, columns in sizes) or "rows × columns"
-            raise InputError(f"{matrix.name}: expected a matrix of {wanted}, found nrow = {nrow}, ncol = {ncol}")
+            raise InputError(f"{matrix.name}: expected a matrix of {wanted}", f"nrow = {nrow}, ncol = {ncol}")
         terms = Taylor(np.zeros((nrow, ncol)), np.zeros((nrow, self.modes, ncol)))
         structure = int(matrix.number("structure"))
         if structure == SYMMETRIC and nrow != ncol:
-            raise InputError(f"{matrix.name}: expected a square matrix of structure {SYMMETRIC}, found {nrow} × {ncol}")
+            raise InputError(f"{matrix.name}: expected a square matrix of structure {SYMMETRIC}", f"{nrow} × {ncol}")
         if structure == IDENTITY:
             terms.m0[:] = np.eye(nrow, ncol)
         for order, index, value in _entries(matrix):
@@ -298,7 +299,7 @@ class Modal:
             target = terms[order]
             if len(index) != target.ndim or any(not 0 <= k < size for k, size in zip(index, target.shape, strict=True)):
                 at = ", ".join(str(k + 1) for k in index)
-                raise InputError(f"{matrix.name}: expected m{order} within {target.shape}, found m{order}({at})")
+                raise InputError(f"{matrix.name}: expected m{order} within {target.shape}", f"m{order}({at})")
             target[index] = value
             if structure == SYMMETRIC:
                 target[index[::-1]] = value
@@ -312,7 +313,7 @@ def _entries(matrix: SidObject) -> Iterator[tuple[int, tuple[int, ...], float]]:
             try:
                 index = tuple(int(part) - 1 for part in match[2].split(","))
             except ValueError:
-                raise InputError(f'{matrix.name}: expected whole numbers in indices, found "{shown(key)}"') from None
+                raise InputError(f"{matrix.name}: expected whole numbers in indices", f'"{shown(key)}"') from None
             yield int(match[1]), index, number_of(value, f"{matrix.name}: {key}")
 
 

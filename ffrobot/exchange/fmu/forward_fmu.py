@@ -80,27 +80,25 @@ def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
         return chosen
     wanted = 'an analysis of kind "forward" without actuation, whose motors are the inputs of the FMU'
     if name is None:
-        raise InputError(f"{path}: --analysis: expected {wanted}, found none")
+        raise InputError(f"{path}: --analysis: expected {wanted}", "none")
     kind = getattr(analyses[name], "kind", "?")
     what = f'kind "{kind}"' + (" with actuation" if isinstance(analyses[name], Forward) else "")
-    raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')
+    raise InputError(f"{path}: --analysis: expected {wanted}", f'"{name}" of {what}')
 
 
 def _check(path: Path, scene: Scene) -> None:
     if scene.load:
-        raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
+        raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs", "some")
     for body in scene.body:
         if body.pieces is not None:
-            raise InputError(
-                f'{path}: body "{body.name}": pieces: expected none of a scene for an FMU, found {body.pieces}'
-            )
+            raise InputError(f'{path}: body "{body.name}": pieces: expected none of a scene for an FMU', body.pieces)
     if scene.geometric_stiffening == "auto":
         raise InputError(
-            f'{path}: geometric_stiffening: expected true or false of a scene for an FMU, found "auto", by which the'
-            " motion of an analysis decides"
+            f"{path}: geometric_stiffening: expected true or false of a scene for an FMU",
+            '"auto", by which the motion of an analysis decides',
         )
     if scene.motors == "frame":
-        raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
+        raise InputError(f'{path}: motors: expected "section" of a scene for an FMU', '"frame"')
 
 
 def _remarks(scene: Scene, model: Model, unit: ForwardUnit, folder: str) -> list[str]:

@@ -61,13 +61,13 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, list[StateSpace], lis
         name = results.linear_analysis(analysis)
         if name in results.analyses and results.attributes(name)["kind"] == "forward":
             raise InputError(
-                f'{path}: --analysis: expected a linear analysis of results, found "{name}" of kind "forward": export'
-                " the scene, SCENE.toml, for an FMU of that motion"
+                f"{path}: --analysis: expected a linear analysis of results",
+                f'"{name}" of kind "forward": export the scene, SCENE.toml, for an FMU of that motion',
             )
         models, scene = results.state_spaces(name), results.scene
     if len(models) != 1 and not models[0].step:
         raise InputError(
-            f"{path}: {name}: expected a linear model of one instant, found {len(models)}; solve with one in `times`"
+            f"{path}: {name}: expected a linear model of one instant", f"{len(models)}; solve with one in `times`"
         )
     _check(path, name, models[0])
     model = models[0]
@@ -103,11 +103,12 @@ def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, 
 def _check(path: Path, analysis: str, model: StateSpace) -> None:
     if not (model.input_names and model.output_names):
         raise InputError(
-            f"{path}: {analysis}: expected a model with inputs and outputs for an FMU, found {len(model.input_names)}"
-            f" inputs and {len(model.output_names)} outputs; motors, patches and loads at points are inputs"
+            f"{path}: {analysis}: expected a model with inputs and outputs for an FMU",
+            f"{len(model.input_names)} inputs and {len(model.output_names)} outputs; motors, patches and loads at"
+            " points are inputs",
         )
     if not all(np.all(np.isfinite(getattr(model, key))) for key in "ABCD"):
-        raise InputError(f"{path}: {analysis}: expected finite matrices A, B, C, D, found others")
+        raise InputError(f"{path}: {analysis}: expected finite matrices A, B, C, D", "others")
 
 
 HEADER = "model.h"

@@ -64,14 +64,14 @@ def _from_text(path: Path) -> Recorded:
     message = _from_json(text) if path.suffix.lower() == ".json" else _from_yaml(text)
     segments = list(_segments(message))
     if not segments:
-        raise InputError('expected a JointTrajectory with "joint_names" and "points", found none')
+        raise InputError('expected a JointTrajectory with "joint_names" and "points"', "none")
     joints, rows, rates, begin = _names(segments[0]["joint_names"]), list[Row](), list[Any](), 0.0
     for k, segment in enumerate(segments):
         if _names(segment["joint_names"]) != joints:
-            raise InputError(f"segment {k}: expected the joints of the first one, {quoted(joints)}, found others")
+            raise InputError(f"segment {k}: expected the joints of the first one, {quoted(joints)}", "others")
         points = segment["points"]
         if not isinstance(points, Sequence) or isinstance(points, str):
-            raise InputError(f"expected points in a list, found {type(points).__name__}")
+            raise InputError("expected points in a list", type(points).__name__)
         rows += [_row(joints, point, k, begin) for k, point in enumerate(points)]
         rates += [point.get("velocities") for point in points]
         begin = rows[-1][0] if rows else 0.0
@@ -83,7 +83,7 @@ def _from_json(text: str) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"expected JSON, found {error}") from None
+        raise InputError("expected JSON", error) from None
 
 
 def _from_yaml(text: str) -> Any:
@@ -95,7 +95,7 @@ def _from_yaml(text: str) -> Any:
         return list(YAML(typ="safe", pure=True).load_all(text))
     except (YAMLError, ValueError, RecursionError) as error:
         reason = shown(" ".join(str(error).split()))
-        raise InputError(f"expected YAML, found {reason}") from None
+        raise InputError("expected YAML", reason) from None
 
 
 def _segments(message: Any) -> Iterator[Mapping[str, Any]]:
@@ -112,7 +112,7 @@ def _segments(message: Any) -> Iterator[Mapping[str, Any]]:
 
 def _names(names: Any) -> list[str]:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError("expected joint_names, a list of texts, found others")
+        raise InputError("expected joint_names, a list of texts", "others")
     return names
 
 
@@ -122,14 +122,14 @@ Row = tuple[float, list[float]]
 
 def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:
     if not isinstance(point, Mapping):
-        raise InputError(f"point {k}: expected positions and time_from_start, found {type(point).__name__}")
+        raise InputError(f"point {k}: expected positions and time_from_start", type(point).__name__)
     positions = point.get("positions")
     if not positions:
         others = quoted(key for key in ("velocities", "accelerations", "effort") if point.get(key))
-        raise InputError(f"point {k}: expected positions, found {others}: the path goes through positions")
+        raise InputError(f"point {k}: expected positions", f"{others}: the path goes through positions")
     if not isinstance(positions, list) or len(positions) != len(joints):
         other = len(positions) if isinstance(positions, list) else type(positions).__name__
-        raise InputError(f"point {k}: expected {len(joints)} positions, one for each joint, found {other}")
+        raise InputError(f"point {k}: expected {len(joints)} positions, one for each joint", other)
     return begin + _seconds(point.get("time_from_start"), k), [_number(value, f"point {k}") for value in positions]
 
 
@@ -139,7 +139,7 @@ def _number(value: Any, where: str) -> float:
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not abs(number) <= LARGEST:  # False of NaN
-        raise InputError(f"{where}: expected finite numbers up to {LARGEST:g}, found {shown(str(value))}")
+        raise InputError(f"{where}: expected finite numbers up to {LARGEST:g}", shown(str(value)))
     return number
 
 
@@ -147,7 +147,7 @@ def _seconds(duration: Any, k: int) -> float:
     """Of a Duration of ROS 2 (sec, nanosec), ROS 1 (secs, nsecs) or protobuf (seconds, nanos; "0.5s"), or a number."""
     where = f"point {k}: time_from_start"
     if duration is None:
-        raise InputError(f"{where}: expected a time, found none")
+        raise InputError(f"{where}: expected a time", "none")
     if isinstance(duration, Mapping):
         whole, parts = (
             next((duration[key] for key in keys if key in duration), 0)
@@ -172,7 +172,7 @@ def _moving_at_ends(joints: Sequence[str], velocities: Array) -> Iterator[str]:
 def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any], *remarks: str) -> Recorded:
     """`velocities`: of all points, or of none."""
     if not joints or len(set(joints)) < len(joints):
-        raise InputError(f"expected joints of different names, found {len(joints)}: {shown(', '.join(joints))}")
+        raise InputError("expected joints of different names", f"{len(joints)}: {shown(', '.join(joints))}")
     times = np.array([time for time, _ in rows])
     values = np.array([positions for _, positions in rows], dtype=float).reshape(len(rows), len(joints))
     try:
@@ -207,7 +207,7 @@ def _of_bag(bag: Any) -> Recorded:
         for kind in (TRAJECTORY, STATES)
     }
     if not any(topics.values()):
-        raise InputError(f"expected messages {TRAJECTORY} or {STATES}, found none of them")
+        raise InputError(f"expected messages {TRAJECTORY} or {STATES}", "none of them")
 
     def messages(topic: Any) -> Iterator[tuple[int, Any]]:
         return ((at, bag.deserialize(raw, topic.msgtype)) for _, at, raw in bag.messages(connections=[topic]))
@@ -276,7 +276,7 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record
     begin, end = max(at[0] for at, _ in series.values()), min(at[-1] for at, _ in series.values())
     times = stamps[(stamps >= begin) & (stamps <= end)]
     if len(times) < 2:
-        raise InputError(f"expected joints that are recorded at the same time, found none for {quoted(series)}")
+        raise InputError("expected joints that are recorded at the same time", f"none for {quoted(series)}")
     if apart:
         from scipy.interpolate import CubicSpline
 

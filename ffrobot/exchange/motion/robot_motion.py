@@ -75,7 +75,7 @@ def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> Join
         if analysis is not None:
             check_known(analysis, names := results.analyses, f"{path}: --analysis: expected one of {quoted(names)}")
         if not known or analysis not in (None, *known):
-            raise InputError(f"{path}: expected an analysis with joints that move, found none in {analysis or 'it'}")
+            raise InputError(f"{path}: expected an analysis with joints that move", f"none in {analysis or 'it'}")
         name = analysis or known[0]
         joints = tuple(part for joint in _moving(results, name) for part in _parts(results, name, joint))
         time, status = results.time(name), results.attributes(name)["status"]

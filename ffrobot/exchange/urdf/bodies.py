@@ -93,11 +93,11 @@ def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool 
     kept, carried, remarks = _with_mass(bodies, joints, body_of)
     if not kept:
         if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
-            raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}", found none')
+            raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}"', "none")
         raise InputError(
-            "expected links with mass, found no <inertial> with one in the whole file: it was made for viewers. Add"
-            " <inertial> to its links, from CAD or a data sheet, take a description of the robot for dynamics, or"
-            " estimate masses by --density"
+            "expected links with mass",
+            "no <inertial> with one in the whole file: it was made for viewers. Add <inertial> to its links, from CAD"
+            " or a data sheet, take a description of the robot for dynamics, or estimate masses by --density",
         )
     remarks += _fixed(kept) if fix_inertia else []
     _check_inertias(kept)

@@ -139,8 +139,8 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
     scene = load_robot(path)
     if scene.is_planar:
         raise InputError(
-            f'{path}: --format urdf: expected a scene with space = "spatial", found a planar one, which has no'
-            " moments of inertia about x and y"
+            f'{path}: --format urdf: expected a scene with space = "spatial"',
+            "a planar one, which has no moments of inertia about x and y",
         )
     bodies = load_bodies(scene, lambda stage: logger.info("%s", stage))
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}

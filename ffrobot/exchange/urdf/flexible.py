@@ -58,11 +58,11 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     """
     if name not in robot.links:
         known = did_you_mean(name, robot.links)
-        raise InputError(f"--flexible {shown(name)}: expected a link of the URDF, found none of this name{known}")
+        raise InputError(f"--flexible {shown(name)}: expected a link of the URDF", f"none of this name{known}")
     keys = load_toml(source, "link file")
     geometry = keys.get("geometry")
     if not isinstance(geometry, dict):
-        raise InputError(f"{source}: expected a link file, found no [geometry]")
+        raise InputError(f"{source}: expected a link file", "no [geometry]")
     beyond = robot.joints_of(name)
     tip = max(beyond, key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
     axes, remarks = _axes(robot, name, tip), list[str]()
@@ -110,8 +110,9 @@ def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, sour
         remarks.append(f'length {wanted:.9g} m, the distance to joint "{shown(tip.name)}"')
     elif not isinstance(given, int | float) or abs(given - wanted) > SAME_LENGTH * wanted:
         raise InputError(
-            f'{source}: geometry.length: expected {wanted:.9g} m, the distance to joint "{shown(tip.name)}", or no such'
-            f" key, found {given!r}"
+            f'{source}: geometry.length: expected {wanted:.9g} m, the distance to joint "{shown(tip.name)}", or no'
+            " such key",
+            f"{given!r}",
         )
     return wanted
 
@@ -189,8 +190,8 @@ def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> f
     off = float(np.linalg.norm(x[1:]))
     if off > ON_AXIS * length or not 0 < x[0] < length:
         raise InputError(
-            f"{label}: expected a joint on the line between the ends of the beam, found it {off:.4g} m off, at"
-            f" {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in the URDF"
+            f"{label}: expected a joint on the line between the ends of the beam",
+            f"it {off:.4g} m off, at {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in the URDF",
         )
     return float(x[0])
 

@@ -52,8 +52,8 @@ def _in_place_of(
     mass = before.mass - after.mass
     if keep_rest and mass < -SAME * after.mass:
         raise InputError(
-            f"--keep-rest: {label}: expected a link file with less mass than the URDF, found {after.mass:.6g} kg of"
-            f" {before.mass:.6g} kg"
+            f"--keep-rest: {label}: expected a link file with less mass than the URDF",
+            f"{after.mass:.6g} kg of {before.mass:.6g} kg",
         )
     if not keep_rest or mass <= SAME * after.mass:
         return None, remarks
@@ -260,12 +260,12 @@ def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path
     check_folder(folder)
     if folder.suffix.lower() == Path(SCENE).suffix and not folder.exists():
         instead = f"-o {folder.with_suffix('')}"
-        raise InputError(f"{folder}: output: expected a folder for {SCENE}, found the name of a file: {instead}")
+        raise InputError(f"{folder}: output: expected a folder for {SCENE}", f"the name of a file: {instead}")
     paths = {folder / name: text.encode() for name, text in files.items()}
     if there := [path for path, text in paths.items() if path.exists() and not (force or holds(path, text))]:
         raise InputError(
-            f"{there[0]}: output: expected a new name, found a file, which may have been edited since: take another"
-            " folder, or --force"
+            f"{there[0]}: output: expected a new name",
+            "a file, which may have been edited since: take another folder, or --force",
         )
     for path, text in paths.items():
         write_atomically(path, text, "file", make_folder=True)

@@ -84,16 +84,17 @@ def _root_element(content: bytes) -> Element:
     except (expat.ExpatError, LookupError, ValueError) as error:
         is_xml = content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"<", b"\xff\xfe", b"\xfe\xff"))
         what = f"XML that is not well-formed: {error}" if is_xml else "a file that is no XML"
-        raise InputError(f"expected a URDF file, found {what}") from None
+        raise InputError("expected a URDF file", what) from None
     prefixes = {key.partition(":")[2] for key, value in root.items() if "ros.org/wiki/xacro" in value} | {"xacro"}
     if xacro := next((each.tag for each in root.iter() if each.tag.partition(":")[0] in prefixes), None):
         raise InputError(
-            f"expected a URDF file, found <{shown(xacro)}>: run `xacro FILE.xacro > ROBOT.urdf` first,"
-            " in an environment with ROS or with PyPI's xacro"
+            "expected a URDF file",
+            f"<{shown(xacro)}>: run `xacro FILE.xacro > ROBOT.urdf` first, in an environment with ROS or with PyPI's"
+            " xacro",
         )
     if root.tag != "robot":
         of = " of another program: convert it to URDF first" if root.tag in ("mujoco", "sdf") else ""
-        raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>{of}")
+        raise InputError("expected a URDF file, whose root is <robot>", f"<{shown(root.tag)}>{of}")
     return root
 
 
@@ -114,7 +115,7 @@ def _robot_of(root: Element) -> Robot:
     joints = [_joint(each) for each in root.findall("joint")]
     for kind, records in (("link", links), ("joint", joints)):
         if again := next((name for name, count in Counter(one.name for one in records).items() if count > 1), None):
-            raise InputError(f'expected one <{kind}> of each name, found several of the name "{shown(again)}"')
+            raise InputError(f"expected one <{kind}> of each name", f'several of the name "{shown(again)}"')
     by_name = {joint.name: joint for joint in joints}
     check_mimics(by_name)
     base = root_of([link.name for link in links], joints)
@@ -204,7 +205,7 @@ SIZES: Mapping[Shape, Mapping[str, int]] = {
 
 def _name(element: Element) -> str:
     if not (name := element.get("name", "")):
-        raise InputError(f"<{element.tag}>: expected the attribute name, found none")
+        raise InputError(f"<{element.tag}>: expected the attribute name", "none")
     return name
 
 
@@ -223,14 +224,14 @@ def _link(element: Element) -> UrdfLink:
 def _inertial(element: Element, label: str) -> Inertial:
     of_mass, inertia = element.find("mass"), element.find("inertia")
     if of_mass is None:
-        raise InputError(f'{label}: expected <mass value="…"/>, found none')
+        raise InputError(f'{label}: expected <mass value="…"/>', "none")
     mass = _number(of_mass, "value", f"{label}: <mass>")
     if inertia is None:
-        raise InputError(f"{label}: expected <inertia>, found none")
+        raise InputError(f"{label}: expected <inertia>", "none")
     values = dict(zip(ENTRIES, (_number(inertia, key, f"{label}: <inertia>") for key in ENTRIES), strict=True))
     J = np.array([[values["i" + "".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
     if mass < 0:
-        raise InputError(f"{label}: <mass>: expected a mass not below 0, found {mass:g}")
+        raise InputError(f"{label}: <mass>: expected a mass not below 0", f"{mass:g}")
     origin = _origin(element, label)
     C = of_rpy(*origin.rpy)
     return Inertial(mass, np.array(origin.xyz), C @ J @ C.T if any(origin.rpy) else J)
@@ -266,7 +267,7 @@ def _joint(element: Element) -> UrdfJoint:
     axis = element.find("axis")
     along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>"))
     if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
-        raise InputError(f"{label}: <axis>: expected a direction, found 0 0 0")
+        raise InputError(f"{label}: <axis>: expected a direction", "0 0 0")
     return UrdfJoint(
         name=name,
         type=kind,
@@ -283,7 +284,7 @@ def _joint(element: Element) -> UrdfJoint:
 def _end(joint: Element, kind: str, label: str) -> str:
     end = joint.find(kind)
     if end is None or not (name := end.get("link", "")):
-        raise InputError(f'{label}: expected <{kind} link="…"/>, found none')
+        raise InputError(f'{label}: expected <{kind} link="…"/>', "none")
     return name
 
 
@@ -292,7 +293,7 @@ def _mimic(joint: Element, label: str) -> Mimic | None:
     if element is None:
         return None
     if not (name := element.get("joint", "")):
-        raise InputError(f"{label}: <mimic>: expected the attribute joint, found none")
+        raise InputError(f"{label}: <mimic>: expected the attribute joint", "none")
     where = f"{label}: <mimic>"
     return Mimic(name, _number(element, "multiplier", where, 1.0), _number(element, "offset", where, 0.0))
 
@@ -317,12 +318,12 @@ def _rpy(origin: Element, where: str) -> Numbers3:
     if origin.get("quat_xyzw") is None:
         return three(_numbers(origin, "rpy", (0.0, 0.0, 0.0), where))
     if origin.get("rpy") is not None:
-        raise InputError(f"{where}: expected rpy or quat_xyzw, found both")
+        raise InputError(f"{where}: expected rpy or quat_xyzw", "both")
     *vector, scalar = _numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0), where)
     e = np.array([scalar, *vector])
     size = float(np.linalg.norm(e))
     if abs(size - 1.0) > UNIT:
-        raise InputError(f"{where}: quat_xyzw: expected a quaternion of length 1, found length {size:g}")
+        raise InputError(f"{where}: quat_xyzw: expected a quaternion of length 1", f"length {size:g}")
     return three(rpy_of(of_quaternion(e / size)))
 
 
@@ -330,7 +331,7 @@ def _number(element: Element, key: str, label: str, default: float | None = None
     text = element.get(key)
     if text is None:
         if default is None:
-            raise InputError(f"{label}: expected the attribute {key}, found none")
+            raise InputError(f"{label}: expected the attribute {key}", "none")
         return default
     return _finite(text, f"{label}: {key}")
 
@@ -342,7 +343,7 @@ def _numbers(element: Element, key: str, default: tuple[float, ...], label: str)
         return default
     parts = text.split()
     if len(parts) != len(default):
-        raise InputError(f'{label}: {key}: expected {len(default)} numbers, found "{shown(text)}"')
+        raise InputError(f"{label}: {key}: expected {len(default)} numbers", f'"{shown(text)}"')
     return tuple(_finite(part, f"{label}: {key}") for part in parts)
 
 
@@ -352,9 +353,9 @@ def _finite(text: str, label: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f'{label}: expected a finite number, found "{shown(text)}"')
+        raise InputError(f"{label}: expected a finite number", f'"{shown(text)}"')
     if abs(value) > LARGEST:
-        raise InputError(f"{label}: expected a number between -{LARGEST:g} and {LARGEST:g}, found {value:g}")
+        raise InputError(f"{label}: expected a number between -{LARGEST:g} and {LARGEST:g}", f"{value:g}")
     return value
 
 
@@ -365,7 +366,7 @@ def root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
         InputError: a joint names a link that does not exist, a link has two parents, there is more than one tree.
     """
     if not links:
-        raise InputError("expected at least one <link>, found none")
+        raise InputError("expected at least one <link>", "none")
     carried = dict[str, str]()
     for joint in joints:
         label = f'joint "{shown(joint.name)}"'
@@ -373,22 +374,23 @@ def root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
             check_known(name, links, f"{label}: <{kind}>: expected a link of the file")
         if joint.child in carried:
             raise InputError(
-                f'{label}: expected one joint that carries link "{shown(joint.child)}", found a second one, "'
-                f'{shown(carried[joint.child])}" being the first: URDF has trees only; close the loop in the scene'
+                f'{label}: expected one joint that carries link "{shown(joint.child)}"',
+                f'a second one, "{shown(carried[joint.child])}" being the first: URDF has trees only; close the loop'
+                " in the scene",
             )
         carried[joint.child] = joint.name
     roots = [name for name in links if name not in carried]
     if not roots:
-        raise InputError("expected one link that no joint carries, found none: the joints form a circle")
+        raise InputError("expected one link that no joint carries", "none: the joints form a circle")
     if len(roots) > 1:
         raise InputError(
-            f"expected one link that no joint carries, found {len(roots)}: {quoted(roots)}; join them by fixed joints"
+            "expected one link that no joint carries", f"{len(roots)}: {quoted(roots)}; join them by fixed joints"
         )
     reached = roots.copy()
     for link in reached:  # which grows
         reached += [joint.child for joint in joints if joint.parent == link]
     if left := [name for name in links if name not in reached]:  # with a parent each
-        raise InputError(f'expected all links to be carried by "{shown(roots[0])}", found a circle of {quoted(left)}')
+        raise InputError(f'expected all links to be carried by "{shown(roots[0])}"', f"a circle of {quoted(left)}")
     return roots[0]
 
 
@@ -400,7 +402,7 @@ def check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
             check_known(follows.joint, joints, f"{label}: expected a joint of the file")
             if follows.joint in chain:
                 raise InputError(
-                    f"{label}: expected a joint that moves freely at the end of the chain, found a circle:"
-                    f" {' → '.join([*chain, follows.joint])}"
+                    f"{label}: expected a joint that moves freely at the end of the chain",
+                    f"a circle: {' → '.join([*chain, follows.joint])}",
                 )
             chain.append(follows.joint)

@@ -217,7 +217,7 @@ def _of_shape(shape: MeshFile | Primitive, urdf: Path, density: float, label: st
     else:
         name, (inertial, is_hull) = shown(shape.filename), _of_mesh(shape, urdf, density, label)
     if not (np.isfinite(inertial.mass) and inertial.mass > 0):
-        raise InputError(f"{label}: expected a shape with a volume, found {name} without one")
+        raise InputError(f"{label}: expected a shape with a volume", f"{name} without one")
     return inertial, is_hull
 
 
@@ -248,8 +248,8 @@ def _of_primitive(shape: Primitive, density: float) -> Inertial:
 def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
     if mesh_path(shape.filename, urdf) is None:
         raise InputError(
-            f"{label}: expected its mesh next to the URDF, found no file {shown(shape.filename)}; --radius takes"
-            " cylinders where there are no meshes"
+            f"{label}: expected its mesh next to the URDF",
+            f"no file {shown(shape.filename)}; --radius takes cylinders where there are no meshes",
         )
     try:
         mesh = _loaded(shape, urdf)

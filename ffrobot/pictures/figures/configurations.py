@@ -120,7 +120,8 @@ def _path(results: Results, figure: FigureRecord, curve: Curve) -> Array:
     if values.shape[1] != len(names):
         raise InputError(
             f'{results.path}: figure "{figure.name}": expected {"two" if len(names) == 2 else "three"} columns'
-            f' ({", ".join(names)}) in "{curve.data}", found {values.shape[1]}'
+            f' ({", ".join(names)}) in "{curve.data}"',
+            values.shape[1],
         )
     return in_3d(values)
 
@@ -204,8 +205,6 @@ def _way(results: Results, group: str, shape: Shape, k: int, mode: int) -> Array
 def _nearest(results: Results, figure: FigureRecord) -> int:
     """The output nearest to the figure's time. Raises `InputError` where the analysis has no linear model."""
     if not results.has(f"{figure.analysis}/linear"):
-        raise InputError(
-            f'{results.path}: figure "{figure.name}": expected a linear analysis, found "{figure.analysis}"'
-        )
+        raise InputError(f'{results.path}: figure "{figure.name}": expected a linear analysis', f'"{figure.analysis}"')
     outputs = results.time(f"{figure.analysis}/time")
     return int(np.abs(outputs - (figure.times[0] if figure.times else outputs[0])).argmin())

@@ -272,8 +272,8 @@ def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     group = f"{figure.analysis}/placement"
     if not results.has(group):
         raise InputError(
-            f'{results.path}: figure "{figure.name}": expected an analysis of kind = "placement", found'
-            f' "{figure.analysis}"'
+            f'{results.path}: figure "{figure.name}": expected an analysis of kind = "placement"',
+            f'"{figure.analysis}"',
         )
     body = results.attributes(group)["body"]
     length = next(layout["length"] for layout in results.scene["pzt"] if layout["body"] == body)
@@ -370,8 +370,8 @@ def chosen(figures: Mapping[str, T], only: Sequence[str]) -> dict[str, T]:
     for pattern in only:
         if not any(fnmatch.fnmatchcase(name, pattern) for name in figures):
             raise InputError(
-                f"--only: expected the name of a figure, or a pattern that fits one ({quoted(figures)}), found"
-                f' "{pattern}"{did_you_mean(pattern, figures)}'
+                f"--only: expected the name of a figure, or a pattern that fits one ({quoted(figures)})",
+                f'"{pattern}"{did_you_mean(pattern, figures)}',
             )
     return {
         name: figure
@@ -405,7 +405,7 @@ def draw(record: FigureRecord, results: Results) -> Figure:
 
 def _check_formats(formats: Sequence[str]) -> None:
     if not formats or not set(formats) <= set(METADATA):
-        raise InputError(f'format: expected one or several of {", ".join(METADATA)}, found "{",".join(formats)}"')
+        raise InputError(f"format: expected one or several of {', '.join(METADATA)}", f'"{",".join(formats)}"')
 
 
 def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:

@@ -180,8 +180,7 @@ def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, A
     x = results.time(curve.data) if curve.x is None else results.data(curve.x)[:, 0]
     if len(x) != len(values):
         raise InputError(
-            f'{results.path}: expected as many values in "{curve.x}" as in "{curve.data}" ({len(values)}), found'
-            f" {len(x)}"
+            f'{results.path}: expected as many values in "{curve.x}" as in "{curve.data}" ({len(values)})', len(x)
         )
     return x, scale * values
 
@@ -193,7 +192,7 @@ def read_points(path: Path, column: str) -> tuple[Array, Array]:
     except csv.Error as error:
         raise InputError(f"{path}: cannot read the points: {error}") from None
     if column not in header:
-        raise InputError(f'{path}: expected the column "{column}", found {quoted(map(shown, header))}')
+        raise InputError(f'{path}: expected the column "{column}"', quoted(map(shown, header)))
     k = header.index(column)
     try:
         return np.array([float(row[0]) for _, row in rows]), np.array([float(row[k]) for _, row in rows])

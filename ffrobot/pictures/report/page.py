@@ -266,8 +266,8 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     planes = {results.space.is_plane: results.path for results in files}
     if len(planes) == 2:
         raise InputError(
-            f"report: expected results all of planar or all of 3D scenes, found {planes[False]} of a 3D and"
-            f" {planes[True]} of a planar one: write a report of each"
+            "report: expected results all of planar or all of 3D scenes",
+            f"{planes[False]} of a 3D and {planes[True]} of a planar one: write a report of each",
         )
     moving, notes = mechanism(all_runs)
     modes, histories = link_modes(all_runs), history_charts(files)

@@ -224,8 +224,8 @@ def study_files(path: Path) -> list[Path]:
     files = [file for name in names if (file := path / name).is_file()]
     if not files:
         raise InputError(
-            f"{path}: expected a folder of ffrobot sensitivity, optimise or uncertainty, with one of {quoted(names)},"
-            " found none: has the command come to its end?"
+            f"{path}: expected a folder of ffrobot sensitivity, optimise or uncertainty, with one of {quoted(names)}",
+            "none: has the command come to its end?",
         )
     return files
 
@@ -239,7 +239,7 @@ def read_study(path: Path) -> Study:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: expected a study of ffrobot as JSON, found: {error}") from None
     if not isinstance(data, dict) or data.get("format") != "ffrobot-study":
-        raise InputError(f'{path}: expected a study of ffrobot (format "ffrobot-study"), found another file')
+        raise InputError(f'{path}: expected a study of ffrobot (format "ffrobot-study")', "another file")
     if (version := data.get("format_version")) != 1:
-        raise InputError(f"{path}: expected format_version 1, found {version}: run the command again")
+        raise InputError(f"{path}: expected format_version 1", f"{version}: run the command again")
     return validate(Study, data, path)

@@ -211,8 +211,8 @@ def draw_pictures(pictures: Sequence[Picture]) -> None:
         raise SolveError(f"PyVista did not finish its pictures within {seconds:g} s") from None
     if done.returncode < 0:
         raise SolveError(
-            "PyVista cannot draw on this machine: expected OpenGL through EGL, OSMesa or an X server, found none that"
-            " works (Debian: apt install libegl1 libgl1-mesa-dri)"
+            "PyVista cannot draw on this machine: expected OpenGL through EGL, OSMesa or an X server",
+            "none that works (Debian: apt install libegl1 libgl1-mesa-dri)",
         )
     if done.returncode:
         reason = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
@@ -299,7 +299,7 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
         times = np.concatenate([results.time(name) for name in analyses])
         if options.time is not None and not times.min() <= options.time <= times.max():
             span = f"{times.min():g} to {times.max():g} s"
-            raise InputError(f"{path}: time: expected one of the run, {span}, found {options.time:g} s")
+            raise InputError(f"{path}: time: expected one of the run, {span}", f"{options.time:g} s")
         for analysis in analyses:
             frames = chosen_frames(results, analysis, options.frames)
             grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
@@ -384,7 +384,7 @@ def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
 def view_movie(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
     """Write a movie rendered by PyVista; arguments and notes as in `make_movie`."""
     if is_modal_body_file(results_path):
-        raise InputError(f"{results_path}: movie: expected a results file, found a modal body: it does not move")
+        raise InputError(f"{results_path}: movie: expected a results file", "a modal body: it does not move")
     return make_movie(results_path, path, options, _rendered)
 
 
