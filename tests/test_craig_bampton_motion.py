@@ -54,7 +54,7 @@ def chain(folder, conditions, payload=1.5):
         initial={"state": "static"},
         trajectory=[{"name": f"t{k}", "joint": f"j{k}", "value": law(0.4 / k, 0.8 - 0.3 * k)} for k in range(1, n + 1)],
         analysis=[
-            {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005, "tolerance": 1e-6},
+            {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005, "tolerance": 1e-6},
             {"name": "models", "kind": "linear", "about": "inverse", "times": [0.0]},
         ],
     )
@@ -121,7 +121,7 @@ def slider_crank(folder, condition):
         joint=joints,
         initial={"state": "static", "angles": {"l1": 0.5, "l2": -0.18}},
         trajectory=[{"name": "turn", "joint": "main", "value": law(0.5, 2.0)}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.005, "tolerance": 1e-6}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.04, "output_step": 0.002, "tolerance": 1e-6}],
     )
 
 

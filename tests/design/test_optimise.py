@@ -9,6 +9,7 @@ import pytest
 from small_robots import BEAM, CANTILEVER, FORCE, FREE, RHO, RIGID, SWING, E, L
 
 import ffrobot
+import ffrobot as package
 
 J = 0.05 + 2.0 * 0.3**2  # of the arm about its joint
 SHOULDER = {"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}
@@ -109,7 +110,6 @@ def test_limits_below_zero(write, method):
         ["body.arm.rigid.mass=1:4" if method == "slsqp" else "body.arm.rigid.mass in {1.5, 2.5, 2.8, 3.5}"],
         minimise="mass",
         subject_to=["at 0.1 joints.shoulder.moment <= -8", "at 0.1 joints.shoulder.moment >= -12"],
-        processes=2,
     )
     least = 8.0 / (9.81 * 0.3)
     assert found.feasible
@@ -137,31 +137,6 @@ def test_limits_that_no_design_keeps_together(write):
     assert found.violation == pytest.approx(excess, rel=1e-3)
     assert found.runs <= 60
     assert "note       no smaller excess was found near this one" in str(found)
-
-
-def test_lightest_cantilever(write):
-    """w h³ ≥ a = 4 F L³/(E δ): h as high as it may be, and w = a/h³: m = ρ L a/h², ∂m/∂δ = −m/δ, ∂m/∂h = −2 m/h."""
-    found = ffrobot.optimise(
-        write(CANTILEVER),
-        [f"{HEIGHT}=0.01:0.04", f"{WIDTH}=0.002:0.05"],
-        minimise="mass",
-        subject_to=[STIFF, "frequency 1 beam >= 10"],
-    )
-    a, h = 4.0 * FORCE * L**3 / (E * DEFLECTION), 0.04
-    mass = RHO * L * a / h**2
-    np.testing.assert_allclose(found.values, [h, a / h**3], rtol=1e-6)
-    assert found.value == pytest.approx(mass, rel=1e-6)
-    assert found.limits[0] <= DEFLECTION * (1.0 + 1e-6)
-    assert found.feasible
-    assert found.converged
-    assert found.prices[0] == pytest.approx(-mass / DEFLECTION, rel=1e-4)
-    assert np.isnan(found.prices[1])
-    assert found.bound_prices[0] == pytest.approx(-2.0 * mass / h, rel=1e-4)
-    text = str(found)
-    assert f"peak points.beam.tip.deflection: 0.00101 m instead of 0.001 saves {0.01 * mass:.4g} kg (1 %)" in text
-    assert f"{HEIGHT}: 0.0404 instead of 0.04 saves {0.02 * mass:.4g} kg (2 %)" in text
-    assert "inverse" not in text
-    assert "still: completed" in text
 
 
 def test_designs_that_fail_are_passed_over(write):
@@ -214,7 +189,10 @@ def test_catalogue_beside_a_number(write):
 
 
 def test_places_of_patches(write, tmp_path):
-    """Two patches where the largest voltage over a path is least: the same as `kind = "placement"` says of all sets."""
+    """Two patches where the largest voltage over a path is least: as `kind = "placement"` says of all pairs.
+
+    Pairs with one patch in the right place are compared.
+    """
     section = {"shape": "rectangle", "height": 0.004, "width": 0.03}
     link = BEAM | {"modes": FREE, "mesh": {"elements": 10}, "geometry": BEAM["geometry"] | {"section": section}}
     patches = {
@@ -233,7 +211,7 @@ def test_places_of_patches(write, tmp_path):
     with ffrobot.solve(path) as results:
         best, places = results["placed/placement/best/centers"], results["placed/placement/candidates"]
         voltage = results["placed/placement/best/value"]
-    rows = ", ".join(f"{a}:{b}" for a in places for b in places if b - a > 0.0999)
+    rows = ", ".join(f"{a}:{b}" for a in places for b in places if b - a > 0.0999 and {a, b} & set(best))
     found = ffrobot.optimise(
         path, [f"pzt.beam.centers.0,pzt.beam.centers.1 in {{{rows}}}"],
         minimise="peak pzt.beam.required_voltage",
@@ -281,19 +259,37 @@ def test_starts(write):
     assert len(found.searches) == 2
 
 
-def test_going_on(ffrobot, write):
-    """What was stopped is taken up: no run is made twice. The best design is a scene of its own."""
+def test_the_lightest_cantilever_is_found_at_the_second_go(ffrobot, write):
+    """w h³ ≥ a = 4 F L³/(E δ): h as high as it may be, and w = a/h³: m = ρ L a/h², ∂m/∂δ = −m/δ, ∂m/∂h = −2 m/h.
+
+    What was stopped is taken up: no run is made twice. The best design is a scene of its own.
+    """
     scene = write(CANTILEVER)
-    vary = ("--vary", f"{HEIGHT}=0.01:0.04", "--vary", f"{WIDTH}=0.002:0.05")
-    command = ("optimise", scene, "--minimise", "mass", "--subject-to", STIFF, *vary, "-j", 2)
+    vary, limits = [f"{HEIGHT}=0.01:0.04", f"{WIDTH}=0.002:0.05"], [STIFF, "frequency 1 beam >= 10"]
+    options = [word for one in vary for word in ("--vary", one)]
+    options += [word for one in limits for word in ("--subject-to", one)]
     folder = scene.with_suffix(".optimum")
-    stopped = ffrobot(*command, "--runs", 8)
+    stopped = ffrobot("optimise", scene, "--minimise", "mass", *options, "--runs", 8)
     assert "ended after" in stopped.stdout
     rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
     assert len(rows) <= 8
-    done = ffrobot.ok(*command)
-    assert "price      peak points.beam.tip.deflection: 0.00101 m instead of 0.001 saves" in done.stdout
+    found = package.optimise(scene, vary, folder, minimise="mass", subject_to=limits)
     assert {path: path.stat().st_mtime_ns for path in rows} == rows
+    a, h = 4.0 * FORCE * L**3 / (E * DEFLECTION), 0.04
+    mass = RHO * L * a / h**2
+    np.testing.assert_allclose(found.values, [h, a / h**3], rtol=1e-6)
+    assert found.value == pytest.approx(mass, rel=1e-6)
+    assert found.limits[0] <= DEFLECTION * (1.0 + 1e-6)
+    assert found.feasible
+    assert found.converged
+    assert found.prices[0] == pytest.approx(-mass / DEFLECTION, rel=1e-4)
+    assert np.isnan(found.prices[1])
+    assert found.bound_prices[0] == pytest.approx(-2.0 * mass / h, rel=1e-4)
+    text = str(found)
+    assert f"peak points.beam.tip.deflection: 0.00101 m instead of 0.001 saves {0.01 * mass:.4g} kg (1 %)" in text
+    assert f"{HEIGHT}: 0.0404 instead of 0.04 saves {0.02 * mass:.4g} kg (2 %)" in text
+    assert "inverse" not in text
+    assert "still: completed" in text
     with (folder / "designs.csv").open(encoding="utf-8") as file:
         designs = list(csv.DictReader(file))
     assert {row["status"] for row in designs} == {"completed"}
@@ -307,14 +303,13 @@ def test_no_design_keeps_the_limits(ffrobot, write):
     scene = write(CANTILEVER)
     done = ffrobot(
         "optimise", scene, "--minimise", "mass", "--subject-to", "peak points.beam.tip.deflection <= 1e-5",
-        "--vary", f"{WIDTH}=0.01:0.03",
+        "--vary", f"{WIDTH} in {{0.01, 0.03}}",
     )  # fmt: skip
     assert done.returncode == 1
     assert "no design found that keeps all limits" in done.stderr
     height, width = 0.02, 0.03
     deflection = 4.0 * FORCE * L**3 / (E * width * height**3)
     assert f"exceeded by {100 * (deflection / 1e-5 - 1):.3g} %" in done.stdout
-    assert "note       no smaller excess was found near this one" in done.stdout
 
 
 def test_evolution_keeps_limits_and_tells_the_best_of_all_designs_when_runs_end(write):
@@ -335,7 +330,7 @@ OMEGA = np.pi / 6e-4  # rad/s
 JOLT = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({OMEGA}*(t - 0.1001))**4, 0))"
 JOLTED = ARM | {
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": JOLT}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 1e-3}],
+    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.12, "output_step": 1e-3}],
 }
 MOST = 4e-6 * OMEGA**2  # of |α| = A ω² |12 sin² φ − 16 sin⁴ φ|, between the outputs at 0.1 and 0.101 s
 
@@ -369,7 +364,7 @@ def test_spreads_of_peaks_between_outputs(write, how):
 
 
 def test_short_blows_count(write):
-    """A blow of 2 ms in 4 s, whose peak lies between outputs every 0.1 s, has that of outputs every 0.1 ms."""
+    """A blow of 2 ms in 0.6 s, whose peak lies between outputs every 0.1 s, has that of outputs every 0.1 ms."""
     blow = {"point": "arm.tip", "y": "where(t < 0.0051, 0, where(t < 0.0071, -100, 0))"}
     scene = SWING | {"load": [blow]}
     scene["trajectory"] = [{"name": "rest", "joint": "shoulder", "value": "0"}]
@@ -377,6 +372,6 @@ def test_short_blows_count(write):
     scene["analysis"] = [of | {"end": 0.05, "output_step": 1e-4}]
     results = ffrobot.solve(ffrobot.make_scene(**scene))
     peak = np.abs(results["inverse/joints/shoulder/moment"]).max()
-    scene["analysis"] = [of | {"end": 4.0, "output_step": 0.1}]
+    scene["analysis"] = [of | {"end": 0.6, "output_step": 0.1}]
     found = ffrobot.optimise(write(scene), ["payload.0.mass in {0.5}"], minimise="peak joints.shoulder.moment")
     assert found.value == pytest.approx(peak, rel=1e-4)

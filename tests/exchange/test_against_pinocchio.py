@@ -26,7 +26,10 @@ class Motion(NamedTuple):
     tau: np.ndarray
 
 
-@pytest.fixture(scope="module", params=["ur5", "panda", *range(20)])
+@pytest.fixture(
+    scope="module",
+    params=["ur5", "panda", *(pytest.param(k, marks=[pytest.mark.nightly] * (k % 4 > 0)) for k in range(20))],
+)
 def robot(request, tmp_path_factory, ffrobot):
     """The file of a robot or of a random tree, its scene, and random motions."""
     folder, urdf = tmp_path_factory.mktemp("robot"), ROBOTS / f"{request.param}.urdf"

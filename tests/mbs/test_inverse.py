@@ -51,9 +51,16 @@ def anything_moving(rng, joint, turned, gear):
     return state_of(model, times, q, *rng.standard_normal((2, 2, tree.n_v)), np.zeros((2, 0)))
 
 
-@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+EVERY = [*((joint, {}) for joint in TYPES), ("revolute", GEAR)]
+
+
 @pytest.mark.parametrize(
-    ("joint", "gear"), [*((joint, {}) for joint in TYPES), ("revolute", GEAR)], ids=[*TYPES, "compliant gear"]
+    ("joint", "gear", "turned"),
+    [
+        pytest.param(*of, turned, marks=[pytest.mark.nightly] * (turned == k % 2))
+        for k, of in enumerate(EVERY)
+        for turned in (0, 1)
+    ],
 )
 def test_trees_of_every_joint(joint, gear, turned):
     motion = anything_moving(np.random.default_rng(50 + TYPES.index(joint)), joint, turned, gear)

@@ -99,9 +99,9 @@ def test_a_gear_in_steps_of_stiffness_winds_under_the_weight(values):
         assert results["rest/joints/j/coordinate"][0] == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_chain_of_two_hundred_links_hangs_in_seconds():
+def test_a_chain_of_a_hundred_links_hangs_in_seconds():
     """Under its weight and a pull H at its end each link points along the forces on it: tan θ = −(weight below)/H."""
-    count, mass, length, pull = 200, 0.1, 0.1, 30.0
+    count, mass, length, pull = 100, 0.1, 0.1, 30.0
     names = [f"b{k}" for k in range(count)]
     below = 9.81 * mass * (count - 0.5 - np.arange(count))
     angles = -np.arctan(below / pull)
@@ -114,5 +114,5 @@ def test_a_chain_of_two_hundred_links_hangs_in_seconds():
     began = time.process_time()
     with solve(scene) as results:
         found = np.cumsum([results[f"rest/joints/j{k}/coordinate"][0] for k in range(count)])
-    assert time.process_time() - began < 60.0  # 5 s on a quiet machine
+    assert time.process_time() - began < 15.0  # 1 s on a quiet machine
     np.testing.assert_allclose(found, angles, atol=1e-10)

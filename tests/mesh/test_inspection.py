@@ -28,7 +28,7 @@ def plate(path, bores=BORES, *, mesh=False):
             cad.cut([(3, bar)], tools)
         cad.synchronize()
         if mesh:
-            gmsh.option.setNumber("Mesh.MeshSizeMax", 12.0)
+            gmsh.option.setNumber("Mesh.MeshSizeMax", 20.0)
             gmsh.model.mesh.generate(3)
         gmsh.write(str(path))
 

@@ -11,10 +11,14 @@ from tables_3d import DOWN, ORIGIN, Y, revolute, rigid, scene
 
 from ffrobot import InputError, smooth_motion
 from ffrobot.mbs.fields.paths import averaged_step, law_in
+from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_robot
 from ffrobot.smooth.axes import axis_of
-from ffrobot.smooth.recording import read_recording
+from ffrobot.smooth.diagnosis import diagnose
+from ffrobot.smooth.recording import limits_of, read_recording
+from ffrobot.smooth.robot import Robot
 from ffrobot.smooth.servo import Servo
+from ffrobot.smooth.smoothing import Smoothed
 
 J, OMEGA, WAY, T, SERVO, RATIO = 5.0, 2 * np.pi * 7.3, 0.6, 0.5, 20.0, 0.8
 
@@ -38,6 +42,14 @@ def axis(tmp_path, stiffer=0.0, **more):
     return written(tmp_path, scene([body], [revolute("hub", "ground", "b.root", **gear)], gravity=ORIGIN))
 
 
+def diagnosed(robot_file, path, bandwidth=SERVO):
+    """What `smooth_motion` finds without looking for better motions."""
+    loaded = load_robot(robot_file)
+    servo = Servo((axis_of(bandwidth, RATIO),) * len(loaded.motor_joints))
+    robot, limits = Robot(loaded, servo, None, 1e-4, Watcher()), limits_of(loaded, np.inf, np.inf)
+    return Smoothed(robot, diagnose(robot, read_recording(path, loaded), limits), limits, (), "")
+
+
 LAWS = {
     "trapezoid": averaged_step(np.array([0.75, 0.25]) * T),
     "s-curve": averaged_step(np.array([0.7, 0.2, 0.1]) * T),
@@ -55,7 +67,7 @@ def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected, ba
     """|∫ θ̈ e^(−iωt) dt|/ω, mrad, by an ideal controller, times |G(iω)|; by simulation and by the linear model."""
     times = np.arange(501) * 0.001
     path = table(tmp_path / "path.csv", times, hub=WAY * LAWS[law].sample(times)[:, 0])
-    found = smooth_motion(axis(tmp_path, stiffer), path, servo=bandwidth, damping_ratio=RATIO)
+    found = diagnosed(axis(tmp_path, stiffer), path, bandwidth)
     s, servo = 1j * OMEGA * np.sqrt(1 + stiffer), 2 * np.pi * bandwidth
     angle = 1e-3 * expected * abs(servo**2 / (s**2 + 2 * RATIO * servo * s + servo**2))
     assert found.before.residual == pytest.approx(2 * np.sin(angle), rel=5e-4)
@@ -74,7 +86,7 @@ def test_vibration_by_a_rail_depends_on_the_posture_of_rest(tmp_path):
     bodies = [rigid("base", 1.0, [0.01] * 3, ORIGIN), arm]
     path, law = written(tmp_path, scene(bodies, [rail, revolute("hub", "base.root", "arm.root", **gear)])), TIMES / 0.25
     rows = np.outer(np.where(law < 1.0, law**2 * (3.0 - 2.0 * law), 1.0), ends)
-    found = smooth_motion(path, table(tmp_path / "path.csv", TIMES, rail=rows[:, 0], hub=rows[:, 1]))
+    found = diagnosed(path, table(tmp_path / "path.csv", TIMES, rail=rows[:, 0], hub=rows[:, 1]))
     before = found.before
     lever = m * c * np.cos(ends[1]) / about
     assert before.residual > 0.1 * ends[1]
@@ -125,7 +137,7 @@ def test_jumps_have_their_size_wherever_they_lie(tmp_path):
     times = np.arange(151) * 0.008
     for at in (0.24, 0.243):
         law = averaged_step(np.array([1.2 - at, at]))
-        found = smooth_motion(arm(tmp_path), table(tmp_path / "path.csv", times, **motion(law, times)))
+        found = diagnosed(arm(tmp_path), table(tmp_path / "path.csv", times, **motion(law, times)))
         (jump,) = (fault for fault in found.before.faults if fault.text.startswith("hip"))
         assert float(re.search(r"jumps by (\S+) rad/s²", jump.text)[1]) == pytest.approx(
             0.6 / (at * (1.2 - at)), rel=0.01
@@ -190,7 +202,7 @@ FAULTS = {
 def test_each_fault_has_its_diagnosis(tmp_path, name):
     make, expected = FAULTS[name]
     times, rows = make()
-    found = smooth_motion(arm(tmp_path), table(tmp_path / "path.csv", times, **rows))
+    found = diagnosed(arm(tmp_path), table(tmp_path / "path.csv", times, **rows))
     assert {fault.kind for fault in found.before.faults} == expected
     if name == "none":
         assert found.verdict.startswith("not vibration of the robot")
@@ -203,7 +215,7 @@ def test_jitter_is_told_apart_from_the_motion(tmp_path):
     late = TIMES.copy()
     _jitter(late)
     as_planned, found = (
-        smooth_motion(arm(tmp_path), table(tmp_path / "path.csv", times, **rows)) for times in (TIMES, late)
+        diagnosed(arm(tmp_path), table(tmp_path / "path.csv", times, **rows)) for times in (TIMES, late)
     )
     left = found.before.even.settling.residual
     assert left == pytest.approx(as_planned.before.residual, rel=0.05)
