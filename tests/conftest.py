@@ -86,7 +86,7 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of many seeds of a test every third, and none marked nightly, unless all are asked for (scripts/nightly.sh)."""
+    """Of many seeds of a test every fifth, and none marked nightly, unless all are asked for (scripts/nightly.sh)."""
     if config.getoption("--nightly"):
         return
     seeds = defaultdict(set)
@@ -94,7 +94,7 @@ def pytest_collection_modifyitems(config, items):
         seeds[_function(item)].add(_seed(item))
     many = {name for name, of_name in seeds.items() if len(of_name) >= MANY_SEEDS}
     left_out = [item for item in items if item.get_closest_marker("nightly")
-                or (_function(item) in many and (_seed(item) or 0) % 3)]  # fmt: skip
+                or (_function(item) in many and (_seed(item) or 0) % 5)]  # fmt: skip
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         left_out = set(left_out)

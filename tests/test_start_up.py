@@ -101,6 +101,7 @@ def test_a_link_loads_nothing_of_scenes(tmp_path):
     assert not [name for name in found if name.startswith(("ffrobot.mbs", "ffrobot.scene", "ffrobot.actuation"))]
 
 
+@pytest.mark.nightly
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
     """Processor time, which other processes do not change; bytecode is kept, as pip does when it installs.
 

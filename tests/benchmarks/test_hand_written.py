@@ -63,6 +63,7 @@ def test_without_the_source_tree_it_says_what_is_missing(two_link, tmp_path):
         HandWritten(tmp_path, two_link, tmp_path)
 
 
+@pytest.mark.nightly
 def test_right_hand_side_ratio(benchmark, two_link, program):
     state = general_state(two_link)
     count = 20_000 if benchmark.enabled else 4_000
@@ -75,6 +76,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
     report(benchmark, "evaluation", *times)
 
 
+@pytest.mark.nightly
 def test_pcid_ratio(benchmark, two_link, program):
     analysis = Pcid(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
     context = Context(model=two_link, outcomes={}, progress=lambda t: True)

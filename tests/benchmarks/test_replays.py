@@ -6,7 +6,7 @@ from bench.replays import TOLERANCE, measure_replays
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_scene
 
-pytestmark = pytest.mark.alone
+pytestmark = [pytest.mark.alone, pytest.mark.nightly]
 
 
 def test_with_all_forces_the_steps_are_those_of_pcid(case_copy):

@@ -112,6 +112,7 @@ def test_allocation_of_20_patches_at_1000_times(benchmark):
     assert seconds(lambda: solver.solve(F)) < general / 300
 
 
+@pytest.mark.nightly
 def test_stage_1_of_a_link(benchmark, scene, ffrobot):
     link = scene.with_name("link1.toml")
     benchmark.pedantic(lambda: ffrobot("link", link, "--force"), rounds=3, warmup_rounds=1)

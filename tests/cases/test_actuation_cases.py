@@ -150,9 +150,9 @@ def test_motors_and_joints_as_places_of_encoders(solved):
 
 
 def test_closed_loops_are_told_of(solved, ffrobot):
-    loops = solved("two_link_closed_loop")
-    assert "lqr_blow" in loops.stdout
+    loops = solved("compliant_arm")
+    assert "firm_motor" in loops.stdout
     assert "closed loop" in loops.stdout
     told = ffrobot("info", loops.folder / "scene.results.h5").stdout
     assert "closed loop" in told
-    assert "/lqr_blow/control/commands" in told
+    assert "/firm_motor/control/commands" in told

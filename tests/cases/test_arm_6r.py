@@ -19,6 +19,8 @@ from scipy.spatial.distance import pdist
 from ffrobot.common.rotations import exponential, of_quaternion
 from ffrobot.fe_models.modal_body_file import read_modal_body
 
+pytestmark = pytest.mark.nightly  # a minute of solids from STEP: tests/mesh/test_step_files.py has small ones
+
 CASE = CASES / "arm_6r"
 JOINTS = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_roll")
 DURATION = 0.9  # s, of the motion
@@ -139,7 +141,6 @@ def after_path(group):
     return group["time"][late], 1e3 * group["points/flange.tool/position"][late]
 
 
-@pytest.mark.nightly
 def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
     """At the start, in equilibrium: τ = k (θ_m − γ); motors are where the path has them."""
     for joint, (stiffness, *_) in runpy.run_path(str(CASE / "behind_gears.py"))["GEARS"].items():
@@ -148,7 +149,6 @@ def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
         assert stiffness * twist == pytest.approx(entry["moment"][0], rel=1e-6, abs=1e-4)
 
 
-@pytest.mark.nightly
 def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears):
     """Zero crossings of the fastest direction of swing, about those along the path."""
     t, place = after_path(behind_gears["slower"])
@@ -161,7 +161,6 @@ def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears
     assert 0.93 * lowest < frequency < 1.07 * second  # means along the path, over which they change by 7 %
 
 
-@pytest.mark.nightly
 def test_numbers_behind_gears(behind_gears):
     check_table("arm_6r", "gears", 0.01, lambda row: deviations(behind_gears["gears"]))
 
@@ -173,7 +172,6 @@ def test_numbers_behind_gears(behind_gears):
     check_table("arm_6r", "behind gears", 0.02, of_scene, smallest=2e-3)
 
 
-@pytest.mark.nightly
 def test_joints_where_those_of_the_rigid_arm_are(arm, ffrobot):
     """hold_joints.py makes deviation.csv, which the figure shows, and a line of the README."""
     subprocess.run([sys.executable, CASE / "hold_joints.py", arm.folder], check=True)

@@ -53,6 +53,7 @@ def test_sag_under_a_weight_beside_the_axis(key):
         assert results.attributes("/")["geometric_stiffening"]
 
 
+@pytest.mark.nightly
 def test_sag_of_a_solid():
     """As of a geometrically exact solid of as many cells; a rod, whose ends warp, is 1.9 % off that."""
     shape = {"kind": "solid", "length": 0.25, "section": {"shape": "rectangle", "height": 0.004, "width": 0.02}}
@@ -108,6 +109,7 @@ def test_lateral_buckling_of_a_solid():
             assert (np.linalg.eigvals(results["run/linear/A"][0]).real.max() > 1.0) == buckles
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(("newtons", "third_order"), [pytest.param(4.9, 1e-3, marks=pytest.mark.nightly), (15.0, 3e-3)])
 def test_a_strip_let_go(tmp_path, newtons, third_order):

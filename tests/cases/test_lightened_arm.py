@@ -11,8 +11,7 @@ from checkpoints import CASES
 from ffrobot.fe_models.modal_body_file import read_modal_body
 from ffrobot.mesh.gmsh_session import gmsh_session
 
-pytestmark = pytest.mark.nightly  # twelve seconds of solids from STEP, which are in arm_6r, too
-
+pytestmark = pytest.mark.nightly  # half a minute of solids from STEP: tests/mesh/test_step_files.py has small ones
 DENSITY, WIDTHS = 2700.0, {"upper_arm": 0.012, "forearm": 0.008}
 # make_parts.py: lengths, heights at root and tip in m, numbers of holes.
 MEASURES = {"upper_arm": (0.5, 0.060, 0.044, 7), "forearm": (0.4, 0.044, 0.030, 6)}

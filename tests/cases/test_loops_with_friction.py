@@ -110,7 +110,7 @@ BUILT = ROUGH | {"rotor_inertia": 0.05, "gear_ratio": 3.0}
 
 @pytest.mark.parametrize(
     ("followed", "bare"),
-    [*(pytest.param(*of, marks=pytest.mark.nightly) for of in (("A", ""), ("C", ""))), ("C", "C"), ("D", "D")],
+    [*(pytest.param(*of, marks=pytest.mark.nightly) for of in (("A", ""), ("C", ""), ("D", "D"))), ("C", "C")],
 )
 def test_rotors_and_trajectories_in_all_joints(followed, bare):
     """The numbers of the plane, wherever the loop is cut: at a joint with a rotor, a trajectory or both."""

@@ -66,8 +66,12 @@ def test_stresses_are_those_of_the_bent_link(pieces):
     np.testing.assert_allclose([found["root"][0], found["middle"][0]], [root, middle], rtol=2e-3)
 
 
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-@pytest.mark.parametrize(("stiffened", "order", "least"), [(False, 2, 1e-2), (None, 4, 5e-4)])
+@pytest.mark.parametrize(
+    ("condition", "stiffened", "order", "least"),
+    [("cantilever", False, 2, 1e-2), ("simply-supported", None, 4, 5e-4),
+     pytest.param("simply-supported", False, 2, 1e-2, marks=pytest.mark.nightly),
+     pytest.param("cantilever", None, 4, 5e-4, marks=pytest.mark.nightly)],
+)  # fmt: skip
 def test_elastica_in_an_oblique_plane(condition, stiffened, order, least):
     """A tip force across that bends the link by two thirds of its length, at any angle.
 
@@ -226,7 +230,7 @@ def test_pieces_follow_a_path_at_a_tight_tolerance():
 @pytest.mark.parametrize("condition", ["cantilever", pytest.param("simply-supported", marks=pytest.mark.nightly)])
 def test_rates_of_the_one_link_are_derivatives(condition):
     """R, e and p of the link as found from the pieces, and the velocities that are told beside them."""
-    fine = INVERSE | {"end": 0.4, "output_step": 0.0005}
+    fine = INVERSE | {"end": 0.2, "output_step": 0.0005}
     with arm(2, condition=condition, analysis=[fine]) as results:
         body = {key: results[f"inverse/bodies/fore/{key}"] for key in results.names("inverse/bodies/fore")}
         time = results["inverse/time"]

@@ -11,7 +11,15 @@ import ffrobot
 from ffrobot.common.rotations import exponential
 from ffrobot.mbs.model import system
 
-NIGHTLY = ("actuation points", "pieces under control")
+NIGHTLY = (
+    "actuation points", "pieces under control",
+    "controllers",  # as behind gears, and of a loop
+    "patches",  # as those that stiffen, and of few modes
+    "limits of paths",  # as shapers
+    "compliant gears",  # as between frames
+    "geometric stiffening",  # as in a loop
+)  # fmt: skip
+
 ATTRIBUTES = ("status", "check_point", "check_modes", "check_error", "check_status")
 
 

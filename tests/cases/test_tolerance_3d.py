@@ -15,7 +15,13 @@ OUTSIDE = {"stanford, radau": ("stanford", 1e-6, "radau"),  # 3.4
            "slider-crank, dopri5": ("slider_crank_3d", 1e-3, "dopri5")}  # 6  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "tolerance", "integrator"), OUTSIDE.values(), ids=OUTSIDE)
+@pytest.mark.parametrize(
+    ("name", "tolerance", "integrator"),
+    [
+        pytest.param(*of, id=name, marks=[pytest.mark.nightly] * (name == "stanford, radau"))
+        for name, of in OUTSIDE.items()
+    ],
+)
 def test_reactions_of_joints_of_the_tree(name, tolerance, integrator, tmp_path, ffrobot):
     scene = write_scene(name, tmp_path)
     head, tail = scene.read_text().split("[[analysis]]")

@@ -167,13 +167,15 @@ ROBOTS = {
     "solid": lambda: in_plane(solid=True),
     "loop": five_bar,
     "3D, stiffening": lambda: in_3d(patch={"structural": ["stiffness"]}, geometric_stiffening=True),
-    "3D, solid with patches as parts": lambda: in_3d(solid=True, patch=PART),
     "3D, loop": slider_crank,
     "gear": lambda: geared(in_plane(), 20, hub=0.05),
     "3D, gears": lambda: geared(in_3d(), 30, waist=0.05, shoulder=0.05),
     "3D, loop, gear": lambda: geared(slider_crank(), 40, crank=0.01),
 }
-SLOW = {"loop, gears": lambda: geared(five_bar(), 40, A=0.02, D=0.02)}
+SLOW = {
+    "3D, solid with patches as parts": lambda: in_3d(solid=True, patch=PART),
+    "loop, gears": lambda: geared(five_bar(), 40, A=0.02, D=0.02),
+}
 
 
 @pytest.mark.parametrize("robot", [*ROBOTS, *(pytest.param(name, marks=pytest.mark.nightly) for name in SLOW)])

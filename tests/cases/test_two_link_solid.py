@@ -54,6 +54,7 @@ def test_bending_frequencies_are_those_of_the_timoshenko_beam(link, name):
     np.testing.assert_allclose(solid.frequency[:5], beam.frequency[:5], rtol=2e-3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("force", ["trajectories/tip/force", "joints/O/moment", "joints/A/moment"])
 def test_forces_are_within_one_percent_of_the_timoshenko_run(solid, beams, force):
     one, other = (case.file[f"inverse/{force}"][()] for case in (beams, solid))
@@ -62,6 +63,7 @@ def test_forces_are_within_one_percent_of_the_timoshenko_run(solid, beams, force
     assert np.all(difference > 1e-6)  # it is another model
 
 
+@pytest.mark.nightly
 def test_voltages_are_those_of_the_beams(solid, beams):
     """Section-average rotations of a solid take the patches to the same modal forces.
 

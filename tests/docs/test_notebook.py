@@ -5,12 +5,15 @@ import copy
 import sys
 from pathlib import Path
 
+import pytest
+
 sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
 
 from notebook import NOTEBOOK, PNG, read_notebook, run_notebook
 from palette import SAME, difference
 
 
+@pytest.mark.nightly
 def test_notebook_shows_what_its_cells_do(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shown = read_notebook()

@@ -17,8 +17,11 @@ sys.path.insert(0, str(DOCS))
 
 from palette import SAME, WIDEST, difference, pictures, reduced  # noqa: E402
 
-# What their commands do has tests of its own: studies, solids, resumed runs, paths.
-LONG = {"design", "drive", "long_runs", "machine_paths", "motor_sizing", "solid"}
+# What their commands do has tests of its own: studies, solids, resumed runs, paths, tracking, controllers, pictures.
+LONG = {
+    "compare", "control", "design", "drive", "long_runs", "machine_paths", "measured", "modes", "motor_sizing", "solid",
+    "space", "stiffness", "sweep", "tracking", "view",
+}  # fmt: skip
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)

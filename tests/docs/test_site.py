@@ -37,14 +37,20 @@ def words(page):
     return html.unescape(re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8")))
 
 
-def test_every_command_and_option_is_documented(site):
-    text = words(site / "reference" / "commands.html")
+def reference(page):
+    """A page of the reference, as the repository has it."""
+    return (DOCS / "reference" / f"{page}.md").read_text(encoding="utf-8")
+
+
+def test_every_command_and_option_is_documented():
+    text = reference("commands")
     for name, command in cli.commands.items():
         assert f"ffrobot {name}" in text
         for parameter in command.params:
             assert parameter.opts[-1] in text or parameter.param_type_name == "argument"
 
 
+@pytest.mark.nightly
 def test_first_page_greets_with_a_picture_the_commands_and_all_cases(site):
     """Cards link to the READMEs of the cases as pages of the site; their pictures are there."""
     page = (site / "index.html").read_text(encoding="utf-8")
@@ -65,6 +71,7 @@ def test_first_page_greets_with_a_picture_the_commands_and_all_cases(site):
     assert all((site / picture).is_file() for picture in pictures)
 
 
+@pytest.mark.nightly
 def test_search_knows_keys_and_messages(site):
     """The index that the site's search looks in: words of it, and which pages have them."""
     index = (site / "searchindex.js").read_text(encoding="utf-8")
@@ -128,8 +135,8 @@ def test_no_link_leads_nowhere(page):
 
 
 @pytest.mark.parametrize("kind", ["link", "scene", "figures"])
-def test_every_key_is_documented(site, kind):
-    text = words(site / "reference" / f"{kind}_keys.html")
+def test_every_key_is_documented(kind):
+    text = reference(f"{kind}_keys")
     described = schema(kind)
     elsewhere = schema("link")["$defs"] if kind == "scene" else {}
     records = [described, *(record for name, record in described["$defs"].items() if name not in elsewhere)]
@@ -139,8 +146,8 @@ def test_every_key_is_documented(site, kind):
     assert not missing
 
 
-def test_every_public_name_is_documented(site):
-    text = words(site / "reference" / "python.html")
+def test_every_public_name_is_documented():
+    text = reference("python")
     missing = [name for name in package.__all__ if name not in text and name not in ("FfrobotError", "Scene")]
     assert not missing
 
@@ -182,12 +189,14 @@ def test_pages_are_whole(page):
         assert not first.is_file() or first.stat().st_mode & 0o100, f"{line} is no command: has its line been wrapped?"
 
 
+@pytest.mark.nightly
 def test_pages_are_reached_from_the_first(site):
     pages = {path.relative_to(site).as_posix() for path in site.rglob("*.html")} - {"genindex.html", "search.html"}
     start = (site / "index.html").read_text(encoding="utf-8")
     assert pages - {"index.html"} <= set(re.findall(r'href="([^"#]+\.html)"', start))
 
 
+@pytest.mark.nightly
 def test_pages_need_no_network(site):
     """Scripts (MathJax, too), styles and pictures are part of the site."""
     for page in site.rglob("*.html"):

@@ -86,7 +86,9 @@ SQUARE = {"height": 0.1, "width": 0.1, "condition": "cantilever", "coupling": "r
     "part",
     [
         pytest.param({"cell": "hexahedron", "order": 2, "divisions": (12, 2, 2)}, id="hexahedra"),
-        pytest.param({"cell": "tetrahedron", "order": 2, "divisions": (12, 2, 2)}, id="tetrahedra"),
+        pytest.param(
+            {"cell": "tetrahedron", "order": 2, "divisions": (12, 2, 2)}, id="tetrahedra", marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_modes_are_those_of_lapack_and_none_is_missed(tmp_path, part):

@@ -197,6 +197,12 @@ SOLIDS = {
 }
 
 
-@pytest.mark.parametrize("keys", SOLIDS.values(), ids=SOLIDS)
+@pytest.mark.parametrize(
+    "keys",
+    [
+        pytest.param(keys, id=name, marks=[pytest.mark.nightly] * name.startswith("hole"))
+        for name, keys in SOLIDS.items()
+    ],
+)
 def test_solids(keys):
     check(keys, {"µm, mg, ms": SYSTEMS["µm, mg, ms"]}, rounding=1e-7)

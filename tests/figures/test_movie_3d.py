@@ -37,7 +37,7 @@ def orange(frame):
     return 0.5 * np.array([columns.min() + columns.max(), rows.min() + rows.max()])
 
 
-@pytest.mark.parametrize("write", [write_motion, view_movie])
+@pytest.mark.parametrize("write", [write_motion, pytest.param(view_movie, marks=pytest.mark.nightly)])
 def test_movie_shows_the_tool_where_it_is(arm_3r, tmp_path, write, request):
     """Pixels follow a + s (r + c x) of its place r and axis x, with one a, s, c for all frames and both directions."""
     if write is view_movie:

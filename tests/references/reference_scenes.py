@@ -250,7 +250,7 @@ CASES = {
 }
 """Scene files of the cases."""
 NIGHTLY = {
-    "lightened_arm", "lightest_arm_solid", "soft_arm_tracking", "two_link_points", "two_link_rest_to_rest",
-    "two_link_solid", "two_link_split", "two_link_tracking",
+    "arm_6r", "lightened_arm", "lightest_arm_solid", "soft_arm_tracking", "two_link_closed_loop", "two_link_points",
+    "two_link_rest_to_rest", "two_link_solid", "two_link_split", "two_link_tracking",
 }  # fmt: skip
 """Cases that take long, beside which there is a shorter one of the same kind."""
