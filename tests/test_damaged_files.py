@@ -184,7 +184,15 @@ def spoil(path, member, chance):
     return f"{member}, {how}"
 
 
-@pytest.mark.parametrize("command", ["info", "feasibility", "linear", "plot", "report", "view"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "info",
+        "linear",
+        "report",
+        *(pytest.param(x, marks=pytest.mark.nightly) for x in ("feasibility", "plot", "view")),
+    ],
+)
 def test_results_that_lack_something(results, members, tmp_path, command):
     """Changed on purpose, sealed again: a message, or all is well."""
     from ffrobot.common.hdf5 import reading

@@ -23,7 +23,7 @@ def arm(case_copy):
     return copy
 
 
-@pytest.mark.parametrize("stopped", ["inverse", "forward"])
+@pytest.mark.parametrize("stopped", [pytest.param("inverse", marks=pytest.mark.nightly), "forward"])
 def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
     """To the last bit: the explicit methods go on with the same step.
 
@@ -48,7 +48,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
     assert not results.has(f"{stopped}/resume")
 
 
-@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
+@pytest.mark.parametrize("integrator", ["radau", pytest.param("generalized-alpha", marks=pytest.mark.nightly)])
 def test_implicit_methods_go_on_within_the_tolerance(arm, integrator):
     tolerance = 1e-3
     keys = f'tolerance = {tolerance}\nintegrator = "{integrator}"\nmax_steps = 50'

@@ -457,7 +457,7 @@ def decay(solution, name):
     return -np.polyfit(outcome.time[ring], np.log(envelope[ring]), 1)[0] / omega
 
 
-@pytest.mark.parametrize("sensor", ["ideal", "pzt"])
+@pytest.mark.parametrize("sensor", [pytest.param("ideal", marks=pytest.mark.nightly), "pzt"])
 def test_patches_add_the_damping_that_is_asked_for(sensor):
     control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": sensor}
     loops = loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4)

@@ -45,7 +45,7 @@ def solved(case_copy_of_module, ffrobot):
         ("feasibility",),
         ("report",),
         ("plot", "--format", "svg", "--only", "angle_*"),
-        ("view", "--frames", "2"),
+        pytest.param(("view", "--frames", "2"), marks=pytest.mark.nightly),
     ],
 )
 def test_names_of_all_kinds(solved, ffrobot, command):

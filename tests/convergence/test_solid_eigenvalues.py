@@ -46,6 +46,7 @@ def test_nafems_fv5(tmp_path, cell, order, meshes):
     assert np.all(bodies[0].frequency >= fine.frequency * (1 - 1e-9))
 
 
+@pytest.mark.nightly
 def test_nafems_fv32(tmp_path):
     """Tapered membrane, clamped at its deep end: 5 m at the root, 1 m at the tip, 0.05 m thick."""
     expected = {"in-plane-bending": [44.623, 130.03, 246.05, 379.90], "axial": [162.70, 391.44]}

@@ -49,7 +49,8 @@ def choices_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("what", "column"), [pytest.param("mass", 3, marks=pytest.mark.nightly), ("cost", 4), ("share", 0)]
+    ("what", "column"),
+    [*(pytest.param(*of, marks=pytest.mark.nightly) for of in (("mass", 3), ("cost", 4))), ("share", 0)],
 )
 def test_a_motor_from_a_catalog(write, tmp_path, what, column):
     """The lightest, cheapest or least used motor of those that are strong and fast enough."""

@@ -127,6 +127,7 @@ def test_linear_responses(write, tmp_path):
     np.testing.assert_allclose(sampled.samples[:, 1], masses @ SLOPES + 2.0 * 0.05, rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_sobol_indices_of_a_scene(write):
     """The moment is a sum: what a key does alone is all it does."""
     spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]

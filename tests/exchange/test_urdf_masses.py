@@ -37,7 +37,9 @@ MESHES = {
 }
 
 
-@pytest.mark.parametrize("shape", MESHES)
+@pytest.mark.parametrize(
+    "shape", [pytest.param(one, marks=[pytest.mark.nightly] * one.startswith("<capsule")) for one in MESHES]
+)
 def test_shapes_against_their_meshes(shape, tmp_path):
     """The same shape as a fine mesh, whose volume integrals trimesh finds from its triangles."""
     parts = link("base"), joint("j", "base", "arm")

@@ -38,6 +38,9 @@ def body_of(*args, **keys):
     return ffrobot.make_link(bar(*args, **keys)).body
 
 
+SOLID = pytest.param("solid", marks=pytest.mark.nightly)  # test_modes_of_no_family has one
+
+
 def test_interface_stiffness_of_a_beam():
     """The beam element of the textbook between its two interfaces: condensed statically, nothing is lost."""
     found = craig_bampton(body_of())
@@ -62,7 +65,7 @@ def test_fixed_interface_modes_are_those_of_a_clamped_beam():
     np.testing.assert_allclose(found.mass[np.ix_(modes, modes)], np.eye(4), atol=1e-8)
 
 
-@pytest.mark.parametrize("kind", ["beam", "solid"])
+@pytest.mark.parametrize("kind", ["beam", SOLID])
 def test_free_in_3d(kind):
     """Rigid motions strain nothing and weigh what the link weighs; eigenfrequencies are those of the free link."""
     body = body_of(kind, count=12, interface=[GRIP])
@@ -121,7 +124,7 @@ def free_frequencies(body):
     return np.sqrt(eigh(body.stiffness, M, eigvals_only=True))
 
 
-@pytest.mark.parametrize("kind", ["beam", "solid"])
+@pytest.mark.parametrize("kind", ["beam", SOLID])
 def test_flexibility_at_interfaces_is_that_of_the_finite_element_model(kind):
     """The same as with attachment modes under a cantilever's condition, with one mode and interfaces in between."""
     one = body_of(kind, count=1, interface=[GRIP])
@@ -147,7 +150,7 @@ def test_modes_of_no_family():
     np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size), atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["beam", "solid"])
+@pytest.mark.parametrize("kind", ["beam", SOLID])
 def test_stresses_of_its_modes(kind):
     """K⁻¹b = Φ K_ff⁻¹ Φᵀb holds of stresses of interface loads; beams have both from equilibrium alone."""
     keys = bar(kind, interface=[GRIP], stress=POINT)

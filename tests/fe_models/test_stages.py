@@ -157,6 +157,7 @@ def test_solids_keep_their_mesh_and_their_modes(solid, cache):
     assert "meshing" in lines
 
 
+@pytest.mark.nightly
 def test_a_kept_mesh_gives_the_same_modal_body_and_a_damaged_one_is_made_again(solid, cache):
     path, change = solid
     make_link(path)

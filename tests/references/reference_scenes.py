@@ -243,6 +243,8 @@ SPATIAL = {
 }  # fmt: skip
 MADE = PLANAR | SPATIAL
 """By name, functions without arguments that make a scene."""
+MORE = {name for name in MADE if name.startswith("random") and name[-1] not in "01"}
+"""Random scenes beside which others are enough by day."""
 CASES = {
     path.parent.name if path.stem == "scene" else f"{path.parent.name}_{path.stem}": path
     for path in sorted(FOLDER.glob("*/*.toml"))

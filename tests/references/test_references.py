@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import reference_numbers
-from reference_scenes import CASES, MADE, NIGHTLY
+from reference_scenes import CASES, MADE, MORE, NIGHTLY
 
 import ffrobot
 
@@ -31,7 +31,7 @@ def test_cases(name, solved):
     meets_its_reference(name, found)
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.nightly] * (name in MORE)) for name in MADE])
 def test_made_scenes(name):
     with ffrobot.solve(MADE[name]()) as results:
         meets_its_reference(name, reference_numbers.of_results(results))

@@ -121,9 +121,7 @@ def all_numbers(scene):
     return found
 
 
-@pytest.mark.parametrize(
-    "seed", [0, pytest.param(1, marks=pytest.mark.nightly), pytest.param(2, marks=pytest.mark.nightly)]
-)
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=pytest.mark.nightly) for seed in range(3)])
 def test_flexible_arms_in_3d(seed, tmp_path):
     """Links, modes and all results, from the link files on."""
     expected = all_numbers(flexible_arm(seed, SI, tmp_path / "SI"))
