@@ -99,6 +99,21 @@ void check_postures(const Model<Space> &model, const Scene &scene, const std::ve
   check_size("times", times.size(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
 }
 
+template <class Space>
+std::vector<Mobility> mobilities_of(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                                    const RowMajor &q, const std::vector<bool> &is_path, double length,
+                                    Index loop_rank) {
+  check_postures(model, scene, times, q);
+  check_size("is_path", is_path.size(), model.rows());
+  const PostureWatch watch{{is_path.begin(), is_path.end()}, length};
+  std::vector<Mobility> mobilities;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    turn_markers(scene, times[i], model.w);
+    mobilities.push_back(mobility(model.mechanism, watch, q.row(i).data(), model.w, loop_rank));
+  }
+  return mobilities;
+}
+
 template <class Space> void bind_body(nb::module_ &m, const char *name) {
   using Body = BodyModel<typename Space::Data>;
   nb::class_<Body>(m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/mechanism/model.h.")
@@ -116,9 +131,9 @@ template <class Space> void bind_body(nb::module_ &m, const char *name) {
       .def_rw("data", &Body::data);
 }
 
-template <class Space> nb::class_<Model<Space>> bind_model(nb::module_ &m, const char *name, const char *text) {
+template <class Space> void bind_model(nb::class_<Model<Space>> model) {
   using Body = BodyModel<typename Space::Data>;
-  return nb::class_<Model<Space>>(m, name, text)
+  model
       .def(nb::init<const std::vector<Body> &, const std::vector<typename Space::Marker> &,
                     const std::vector<ConstraintModel> &, const std::vector<MarkerAt> &, const VectorXd &>(),
            "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a)
@@ -145,7 +160,11 @@ template <class Space> nb::class_<Model<Space>> bind_model(nb::module_ &m, const
       .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of rows.")
       .def("derivatives", &derivatives_at<Space>, "scene"_a, "t"_a, "q"_a, "v"_a, "supplied"_a,
            "At a state at time t, under a scene and forces supplied beside (n_v), exact; springs of joints and gears "
-           "are\nleft as they are, and rows that depend on others are left out.")
+           "are\nleft as they are, and rows that depend on others are left out.");
+}
+
+template <class Space> void bind_rest(nb::class_<Model<Space>> model) {
+  model
       .def(
           "forces_at_rest",
           [](Model<Space> &model, const Scene &scene, double t, const VectorXd &q) {
@@ -170,8 +189,7 @@ template <class Space> nb::class_<Model<Space>> bind_model(nb::module_ &m, const
           "among the `independent` ones are 0.");
 }
 
-// At states that are known
-template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
+template <class Space> void bind_kinematics(nb::class_<Model<Space>> model) {
   model
       .def(
           "frames",
@@ -199,7 +217,11 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
               space.integrate(q.row(i).data(), 1, step.row(i).data(), q.row(i).data());
             return q;
           },
-          "q"_a, "step"_a, "q (T, n_q) moved by steps along v (T, n_v), orientations along rotation vectors.")
+          "q"_a, "step"_a, "q (T, n_q) moved by steps along v (T, n_v), orientations along rotation vectors.");
+}
+
+template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
+  model
       .def(
           "constraints",
           [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q) {
@@ -230,22 +252,13 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
           "scene"_a, "times"_a, "q"_a, "beside"_a, "scales"_a, "sizes"_a, "largest_step"_a,
           "q (T, n_q) moved onto the rows at times (T), and what is left (T) in natural sizes: see "
           "mbs/core/recursion/inverse/postures.h.")
-      .def(
-          "mobilities",
-          [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
-             const std::vector<bool> &is_path, double length, Index loop_rank) {
-            check_postures(model, scene, times, q);
-            check_size("is_path", is_path.size(), model.rows());
-            const PostureWatch watch{{is_path.begin(), is_path.end()}, length};
-            std::vector<Mobility> found;
-            for (std::size_t i = 0; i < times.size(); ++i) {
-              turn_markers(scene, times[i], model.w);
-              found.push_back(mobility(model.mechanism, watch, q.row(i).data(), model.w, loop_rank));
-            }
-            return found;
-          },
-          "scene"_a, "times"_a, "q"_a, "is_path"_a, "length"_a, "loop_rank"_a,
-          "How joints can move with rigid links at times (T) and q (T, n_q); loop_rank -1: what loops have there.")
+      .def("mobilities", &mobilities_of<Space>, "scene"_a, "times"_a, "q"_a, "is_path"_a, "length"_a, "loop_rank"_a,
+           "How joints can move with rigid links at times (T) and q (T, n_q); loop_rank -1: what loops have there.");
+}
+
+// At states that are known
+template <class Space> void bind_forces(nb::class_<Model<Space>> model) {
+  model
       .def(
           "without_work",
           [](Model<Space> &model, const RowMajor &q, const RowMajor &forces) {
@@ -284,6 +297,11 @@ template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
            "Seconds of one evaluation.");
 }
 
+template <class Space> void bind_all(nb::class_<Model<Space>> model) {
+  bind_model<Space>(model), bind_rest<Space>(model), bind_kinematics<Space>(model);
+  bind_postures<Space>(model), bind_forces<Space>(model);
+}
+
 } // namespace
 
 void bind_recursion(nb::module_ &m) {
@@ -310,8 +328,8 @@ void bind_recursion(nb::module_ &m) {
       .def_prop_ro("left", &Mobility::left, "(joint coordinates, m)")
       .def_prop_ro("hardest", &Mobility::hardest, "(joint coordinates)");
   bind_body<Planar>(m, "PlanarBody"), bind_body<Spatial>(m, "SpatialBody");
-  bind_outputs(bind_model<Planar>(m, "PlanarModel", "A mechanism in the plane, in joint coordinates."));
-  bind_outputs(bind_model<Spatial>(m, "SpatialModel", "A mechanism in space, in joint coordinates."));
+  bind_all(nb::class_<Model<Planar>>(m, "PlanarModel", "A mechanism in the plane, in joint coordinates."));
+  bind_all(nb::class_<Model<Spatial>>(m, "SpatialModel", "A mechanism in space, in joint coordinates."));
   bind_replay(m);
   bind_tree_motion(m);
   bind_tree_sampled(m);

@@ -10,20 +10,13 @@
 
 namespace {
 
-void bind_data(nb::module_ &m) {
+void bind_planar_data(nb::module_ &m) {
   nb::class_<PlanarMarker>(m, "PlanarMarker")
       .def(nb::init<>())
       .def_rw("position", &PlanarMarker::position)
       .def_rw("angle", &PlanarMarker::angle)
       .def_rw("Phi", &PlanarMarker::Phi)
       .def_rw("K", &PlanarMarker::K);
-  nb::class_<SpatialMarker>(m, "SpatialMarker")
-      .def(nb::init<>())
-      .def_rw("position", &SpatialMarker::position)
-      .def_rw("triad", &SpatialMarker::triad)
-      .def_rw("Phi", &SpatialMarker::Phi)
-      .def_rw("K", &SpatialMarker::K)
-      .def_rw("turns", &SpatialMarker::turns);
   nb::class_<PlanarData>(m, "PlanarData")
       .def(nb::init<>())
       .def_rw("mass", &PlanarData::mass)
@@ -38,6 +31,16 @@ void bind_data(nb::module_ &m) {
       .def_rw("m_xy", &PlanarData::m_xy)
       .def_rw("K", &PlanarData::K)
       .def_rw("markers", &PlanarData::markers);
+}
+
+void bind_spatial_data(nb::module_ &m) {
+  nb::class_<SpatialMarker>(m, "SpatialMarker")
+      .def(nb::init<>())
+      .def_rw("position", &SpatialMarker::position)
+      .def_rw("triad", &SpatialMarker::triad)
+      .def_rw("Phi", &SpatialMarker::Phi)
+      .def_rw("K", &SpatialMarker::K)
+      .def_rw("turns", &SpatialMarker::turns);
   nb::class_<SpatialData>(m, "SpatialData")
       .def(nb::init<>())
       .def_rw("mass", &SpatialData::mass)
@@ -57,7 +60,7 @@ void bind_data(nb::module_ &m) {
       .def_rw("markers", &SpatialData::markers);
 }
 
-void bind_constraints(nb::module_ &m) {
+void bind_kinds(nb::module_ &m) {
   nb::enum_<JointKind>(m, "JointKind")
       .value("revolute", JointKind::revolute)
       .value("prismatic", JointKind::prismatic)
@@ -75,6 +78,9 @@ void bind_constraints(nb::module_ &m) {
       .value("rotation", ConstraintKind::rotation)
       .value("turn", ConstraintKind::turn)
       .value("coordinate", ConstraintKind::coordinate);
+}
+
+void bind_constraints(nb::module_ &m) {
   nb::class_<MarkerAt>(m, "MarkerAt", "A marker of a body, or of the ground: body -1.")
       .def(nb::init<int, int>(), "body"_a, "marker"_a)
       .def_ro("body", &MarkerAt::body)
@@ -90,6 +96,9 @@ void bind_constraints(nb::module_ &m) {
       .def_rw("f", &ConstraintModel::f)
       .def_rw("g", &ConstraintModel::g)
       .def_rw("coordinate", &ConstraintModel::coordinate);
+}
+
+void bind_motions_and_forces(nb::module_ &m) {
   nb::class_<FrameMotion>(m, "FrameMotion", "Motion of a body's frame, global axes.")
       .def_ro("r", &FrameMotion::r)
       .def_ro("a", &FrameMotion::a)
@@ -112,6 +121,6 @@ void bind_constraints(nb::module_ &m) {
 } // namespace
 
 void bind_tree_data(nb::module_ &m) {
-  bind_data(m);
-  bind_constraints(m);
+  bind_planar_data(m), bind_spatial_data(m);
+  bind_kinds(m), bind_constraints(m), bind_motions_and_forces(m);
 }

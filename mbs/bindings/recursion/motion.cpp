@@ -103,9 +103,8 @@ void bind_checkpoint(nb::module_ &m) {
   bind_bytes(checkpoint);
 }
 
-void bind_run(nb::module_ &m) {
-  nb::class_<TreeRun>(m, "TreeRun", "A motion in joint coordinates at outputs, as far as it got.")
-      .def_prop_ro("status", [](const TreeRun &r) { return r.report.status; })
+void bind_report(nb::class_<TreeRun> run) {
+  run.def_prop_ro("status", [](const TreeRun &r) { return r.report.status; })
       .def_prop_ro("steps", [](const TreeRun &r) { return r.report.steps; })
       .def_prop_ro("rejected", [](const TreeRun &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const TreeRun &r) { return r.report.evaluations; })
@@ -126,10 +125,15 @@ void bind_run(nb::module_ &m) {
           "Of integrators: (time, from, to, mean step before) of each.")
       .def_prop_ro(
           "step_ends", [](const TreeRun &r) { return r.report.step_ends; },
-          "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.")
-      .def_prop_ro(
-          "least_ratio", [](const TreeRun &r) { return r.postures.least_ratio; },
-          "Of the scene's watch: 1 without; see mbs/core/recursion/motion/singular_posture.h.")
+          "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.");
+}
+
+void bind_run(nb::module_ &m) {
+  auto run = nb::class_<TreeRun>(m, "TreeRun", "A motion in joint coordinates at outputs, as far as it got.");
+  bind_report(run);
+  run.def_prop_ro(
+         "least_ratio", [](const TreeRun &r) { return r.postures.least_ratio; },
+         "Of the scene's watch: 1 without; see mbs/core/recursion/motion/singular_posture.h.")
       .def_prop_ro(
           "singular_at", [](const TreeRun &r) { return r.postures.singular_at; }, "When that was, s.")
       .def_prop_ro(
@@ -179,12 +183,8 @@ void bind_orientation_laws(nb::module_ &m) {
           "times"_a, "(A (T, 9), row after row, omega (T, 3), alpha (T, 3)) at times (T,), global axes.");
 }
 
-void bind_scene(nb::module_ &m) {
-  nb::class_<Scene>(m, "TreeScene", "What a mechanism in joint coordinates follows and what acts on it.")
-      .def(nb::init<>())
-      .def(
-          "add_target", [](Scene &s, const TimeFunction &law, double sign) { s.targets.push_back({law, sign}); },
-          "target"_a, "sign"_a = 1.0, "Of the next row: sign target(t).")
+void bind_loads(nb::class_<Scene> scene) {
+  scene
       .def(
           "add_load",
           [](Scene &s, const VectorXd &direction, const TimeFunction &magnitude) {
@@ -202,6 +202,17 @@ void bind_scene(nb::module_ &m) {
           "add_point_force",
           [](Scene &s, int wrench, const StateFunction &function) { s.point_forces.push_back({wrench, function}); },
           "wrench"_a, "function"_a, "Of the motion of the section on which a wrench of the model acts.")
+      .def(
+          "add_cut_load",
+          [](Scene &s, int joint, const TimeFunction &magnitude, double share) {
+            s.cut_loads.push_back({joint, magnitude, share});
+          },
+          "joint"_a, "magnitude"_a, "share"_a = 1.0,
+          "share magnitude(t) along the coordinate of a joint of add_cut_joint, by its number.");
+}
+
+void bind_joint_forces(nb::class_<Scene> scene) {
+  scene
       .def(
           "add_joint_force",
           [](Scene &s, int q, int v, double stiffness, double rest, double viscous, double coulomb, double speed) {
@@ -227,14 +238,16 @@ void bind_scene(nb::module_ &m) {
           "a"_a, "b"_a, "turns"_a, "axis"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Friction in a joint at which a loop is cut, between two wrenches of the model: of the turn of b about an "
           "axis "
-          "of a, or of its way along it.")
+          "of a, or of its way along it.");
+}
+
+void bind_scene(nb::module_ &m) {
+  auto scene = nb::class_<Scene>(m, "TreeScene", "What a mechanism in joint coordinates follows and what acts on it.");
+  bind_loads(scene), bind_joint_forces(scene);
+  scene.def(nb::init<>())
       .def(
-          "add_cut_load",
-          [](Scene &s, int joint, const TimeFunction &magnitude, double share) {
-            s.cut_loads.push_back({joint, magnitude, share});
-          },
-          "joint"_a, "magnitude"_a, "share"_a = 1.0,
-          "share magnitude(t) along the coordinate of a joint of add_cut_joint, by its number.")
+          "add_target", [](Scene &s, const TimeFunction &law, double sign) { s.targets.push_back({law, sign}); },
+          "target"_a, "sign"_a = 1.0, "Of the next row: sign target(t).")
       .def(
           "watch_posture",
           [](Scene &s, const std::vector<bool> &is_path, double length) {

@@ -203,8 +203,7 @@ void make_driven(DrivenMechanism<Space> *made, const Model<Space> &model, const 
   made->check();
 }
 
-template <class Space> void bind(nb::module_ &m, const std::string &space) {
-  using Motion = PrescribedMotion<Space>;
+template <class Space> void bind_driven(nb::module_ &m, const std::string &space) {
   using Driven = DrivenMechanism<Space>;
   nb::class_<Driven>(m, (space + "Driven").c_str(), "A mechanism under its scene with motors, and what its path is.")
       .def("__init__", &make_driven<Space>, "model"_a, "scene"_a, "is_path"_a, nb::keep_alive<1, 2>(),
@@ -224,6 +223,11 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
       .def("split", &split<Space>, "q"_a, "wanted"_a,
            "(tau (T, motors), left (T, n_v), loops (T, constraint equations of loops)): what motors do of generalized "
            "forces\n(T, n_v), what they and loops leave, and multipliers of the loops.");
+}
+
+template <class Space> void bind_motion(nb::module_ &m, const std::string &space) {
+  using Motion = PrescribedMotion<Space>;
+  using Driven = DrivenMechanism<Space>;
   nb::class_<Motion>(m, (space + "PrescribedMotion").c_str(),
                      "Modes by functions of time, joints by constraint equations.")
       .def(nb::init<Driven, VectorXd>(), "driven"_a, "q"_a, nb::keep_alive<1, 2>(), "q (n_q): a posture to start from.")
@@ -251,8 +255,8 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
 } // namespace
 
 void bind_prescribed(nb::module_ &m) {
-  bind<Planar>(m, "Planar");
-  bind<Spatial>(m, "Spatial");
+  bind_driven<Planar>(m, "Planar"), bind_driven<Spatial>(m, "Spatial");
+  bind_motion<Planar>(m, "Planar"), bind_motion<Spatial>(m, "Spatial");
   nb::class_<Prescribed>(m, "Prescribed", "A prescribed motion and its forces at times (T,).")
       .def_ro("q", &Prescribed::q, "(T, n_q)")
       .def_ro("v", &Prescribed::v, "(T, n_v)")

@@ -63,6 +63,43 @@ inline void turn_motion(const T *f, const T *g, const Pose<T> &a, const Pose<T> 
   to.value = angle_of(dot(across, s), dot(e, s)), to.rate = dot(w, h), to.bias = dot(w, h_dot) + dot(w, turned);
 }
 
+// Along n: in space less full turns
+template <int dim, class T>
+FFROBOT_INLINE void rotation_motion(const T *n, const Pose<T> &a, const Pose<T> &b, ConstraintMotion<T> &to) {
+  T omega[3];
+  for (int i = 0; i < 3; ++i)
+    omega[i] = b.omega[i] - a.omega[i];
+  to.rate = dot(n, omega);
+  if constexpr (dim == 3)
+    to.value = (b.angle - a.angle) * n[2];
+  else
+    to.value = turn_about(n, a.R, b.R);
+}
+
+// Way d = r_b - r_a along g = A n, which turns with a
+template <class T>
+FFROBOT_INLINE void slide_motion(const T *n, const Pose<T> &a, const T *d, const T *d_dot, ConstraintMotion<T> &to) {
+  T g[3], gd[3], wg[3], wwg[3];
+  turn(a.R, n, g), cross(g, d, gd), cross(a.omega, g, wg), cross(a.omega, wg, wwg);
+  to.value = dot(g, d), to.rate = dot(g, d_dot) + dot(a.omega, gd);
+  to.bias = 2. * dot(wg, d_dot) + dot(wwg, d);
+  for (int i = 0; i < 3; ++i)
+    to.force[i] = g[i], to.moment_a[i] = -gd[i];
+}
+
+// A n . B g of directions that turn with a and b
+template <class T>
+FFROBOT_INLINE void dot_motion(const T *n, const T *g_local, const Pose<T> &a, const Pose<T> &b,
+                               ConstraintMotion<T> &to) {
+  T f[3], g[3], k[3], wf[3], wwf[3], wg[3], wwg[3], relative[3];
+  turn(a.R, n, f), turn(b.R, g_local, g), cross(f, g, k);
+  cross(a.omega, f, wf), cross(a.omega, wf, wwf), cross(b.omega, g, wg), cross(b.omega, wg, wwg);
+  for (int i = 0; i < 3; ++i)
+    relative[i] = a.omega[i] - b.omega[i], to.moment_a[i] = to.moment_b[i] = -k[i];
+  to.value = dot(f, g), to.rate = dot(relative, k);
+  to.bias = dot(wwf, g) + dot(f, wwg) + 2. * dot(wf, wg);
+}
+
 // With positions; `n` alone matters where directions do not move and neither value nor rate is asked for.
 template <class Space, class T>
 FFROBOT_NOINLINE void constraint_motion(const Mechanism<Space> &m, const Constraint &constraint,
@@ -70,7 +107,8 @@ FFROBOT_NOINLINE void constraint_motion(const Mechanism<Space> &m, const Constra
   to.value = to.rate = to.bias = T(0.);
   for (int i = 0; i < 3; ++i)
     to.force[i] = to.moment_a[i] = to.moment_b[i] = T(0.);
-  T n[3] = {T(constraint.model.f[0]), T(constraint.model.f[1]), T(constraint.model.f[2])};
+  const T n[3] = {T(constraint.model.f[0]), T(constraint.model.f[1]), T(constraint.model.f[2])};
+  const T second[3] = {T(constraint.model.g[0]), T(constraint.model.g[1]), T(constraint.model.g[2])};
   if (constraint.model.kind == ConstraintKind::point)
     for (int i = 0; i < 3; ++i)
       to.force[i] = n[i];
@@ -92,42 +130,18 @@ FFROBOT_NOINLINE void constraint_motion(const Mechanism<Space> &m, const Constra
   case ConstraintKind::point:
     to.value = dot(n, d), to.rate = dot(n, d_dot);
     break;
-  case ConstraintKind::rotation: {
-    T omega[3];
-    for (int i = 0; i < 3; ++i)
-      omega[i] = b.omega[i] - a.omega[i];
-    to.rate = dot(n, omega);
-    if constexpr (Space::dim == 3)
-      to.value = (b.angle - a.angle) * n[2];
-    else
-      to.value = turn_about(n, a.R, b.R);
+  case ConstraintKind::rotation:
+    rotation_motion<Space::dim>(n, a, b, to);
     break;
-  }
-  case ConstraintKind::slide: {
-    T g[3], gd[3], wg[3], wwg[3];
-    turn(a.R, n, g), cross(g, d, gd), cross(a.omega, g, wg), cross(a.omega, wg, wwg);
-    to.value = dot(g, d), to.rate = dot(g, d_dot) + dot(a.omega, gd);
-    to.bias = 2. * dot(wg, d_dot) + dot(wwg, d);
-    for (int i = 0; i < 3; ++i)
-      to.force[i] = g[i], to.moment_a[i] = -gd[i];
+  case ConstraintKind::slide:
+    slide_motion(n, a, d, d_dot, to);
     break;
-  }
-  case ConstraintKind::dot: {
-    const T g_local[3] = {T(constraint.model.g[0]), T(constraint.model.g[1]), T(constraint.model.g[2])};
-    T f[3], g[3], k[3], wf[3], wwf[3], wg[3], wwg[3], relative[3];
-    turn(a.R, n, f), turn(b.R, g_local, g), cross(f, g, k);
-    cross(a.omega, f, wf), cross(a.omega, wf, wwf), cross(b.omega, g, wg), cross(b.omega, wg, wwg);
-    for (int i = 0; i < 3; ++i)
-      relative[i] = a.omega[i] - b.omega[i], to.moment_a[i] = to.moment_b[i] = -k[i];
-    to.value = dot(f, g), to.rate = dot(relative, k);
-    to.bias = dot(wwf, g) + dot(f, wwg) + 2. * dot(wf, wg);
+  case ConstraintKind::dot:
+    dot_motion(n, second, a, b, to);
     break;
-  }
-  case ConstraintKind::turn: {
-    const T g[3] = {T(constraint.model.g[0]), T(constraint.model.g[1]), T(constraint.model.g[2])};
-    turn_motion(n, g, a, b, to);
+  case ConstraintKind::turn:
+    turn_motion(n, second, a, b, to);
     break;
-  }
   case ConstraintKind::coordinate:
     break;
   }
@@ -161,14 +175,40 @@ FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spat
   turn_back(s.absolute, moment, local), turn_back(body.ports[port].R, local, to + 3);
 }
 
-// What acts on ports before outboard subtrees: constraint equations in their columns, wrenches in column 0. Of
-// equations that move, S gets what they measure by velocities and, at the ground, by its acceleration -g; of others
-// that is in w.lift.
+// Forces at points, columns along global axes, as columns P of a port
+template <class Space, class T, int W, class Body, class State>
+FFROBOT_INLINE void write_point_forces(const Body &body, int port, const State &state, const T *from, T *P) {
+  constexpr int stride = stride_of(W);
+  Pack<T, W> point[Space::linear], turned[Space::linear];
+  for (int i = 0; i < Space::linear; ++i)
+    point[i] = Pack<T, W>::read(from + i * stride);
+  forces_in_port_axes(body, port, state, point, turned);
+  for (int i = 0; i < Space::linear; ++i)
+    turned[i].write(P + i * stride);
+}
+
+// What equations that move measure by velocities and, at the ground, by its acceleration -g; of others that is in
+// w.lift
+template <class Space, class T, int W>
+FFROBOT_INLINE void measure_velocities(const Mechanism<Space> &m, const Workspace<Space, T> &w, Delassus<T, W> &S) {
+  ConstraintMotion<T> motion;
+  for (std::size_t k = 0; k < w.active.size(); ++k) {
+    const Constraint &constraint = m.constraints[w.active[k]];
+    if (!constraint.moves && !constraint.follows)
+      continue;
+    constraint_motion(m, constraint, w, constraint.moves, motion);
+    T along(0.);
+    for (int i = 0; i < Space::linear; ++i)
+      along += m.gravity[i] * motion.force[i];
+    S[k + 1].add(0, -(motion.bias + double((constraint.a.node < 0) - (constraint.b.node < 0)) * along));
+  }
+}
+
+// What acts on ports before outboard subtrees: constraint equations in their columns, wrenches in column 0.
 template <class Space, class T, int W>
 FFROBOT_INLINE void act_on_ports(const Mechanism<Space> &m, const Forces<T> &forces, Workspace<Space, T> &w,
                                  Delassus<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
-  using Cols = Pack<T, W>;
   ConstraintMotion<T> motion;
   T x[d];
   const T *point_force = w.point_force.data();
@@ -178,15 +218,9 @@ FFROBOT_INLINE void act_on_ports(const Mechanism<Space> &m, const Forces<T> &for
     const auto &state = w.bodies[actions.node];
     const bool has_points = W > 1 && actions.has_points;
     for (int i = has_points ? Space::linear : 0; i < d; ++i)
-      Cols::zero().write(P + i * stride);
-    if (has_points) {
-      Cols point[Space::linear], turned[Space::linear];
-      for (int i = 0; i < Space::linear; ++i)
-        point[i] = Cols::read(point_force + i * stride);
-      forces_in_port_axes(body, actions.port, state, point, turned);
-      for (int i = 0; i < Space::linear; ++i)
-        turned[i].write(P + i * stride);
-    }
+      Pack<T, W>::zero().write(P + i * stride);
+    if (has_points)
+      write_point_forces<Space, T, W>(body, actions.port, state, point_force, P);
     point_force += Space::linear * stride;
     if (!actions.has_others)
       continue;
@@ -208,18 +242,8 @@ FFROBOT_INLINE void act_on_ports(const Mechanism<Space> &m, const Forces<T> &for
         P[i * stride + column] += action.sign * x[i];
     }
   }
-  if (W == 1 || !m.has_moving_constraints)
-    return;
-  for (std::size_t k = 0; k < w.active.size(); ++k) {
-    const Constraint &constraint = m.constraints[w.active[k]];
-    if (!constraint.moves && !constraint.follows)
-      continue;
-    constraint_motion(m, constraint, w, constraint.moves, motion);
-    T along(0.);
-    for (int i = 0; i < Space::linear; ++i)
-      along += m.gravity[i] * motion.force[i];
-    S[k + 1].add(0, -(motion.bias + double((constraint.a.node < 0) - (constraint.b.node < 0)) * along));
-  }
+  if (W > 1 && m.has_moving_constraints)
+    measure_velocities(m, w, S);
 }
 
 } // namespace ffrobot::recursion

@@ -216,16 +216,6 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   std::vector<int> all(rows);
   std::iota(all.begin(), all.end(), 0);
   keep(all);
-  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
-    auto &hinge = hinges[i];
-    for (int k = 0; k < d; ++k) {
-      hinge.c[k] = hinge.A[k] = T(0.);
-      hinge.Lambda[k] = hinge.U[k] = Pack<T, d>::zero();
-      std::fill(std::begin(hinge.column[k]), std::end(hinge.column[k]), T(0.));
-    }
-    for (int k = 0; k < Space::linear; ++k)
-      hinge.r[k] = hinge.r_dot[k] = T(0.);
-  }
 }
 
 template <class Space, class T> void Workspace<Space, T>::put_in_columns() {

@@ -38,13 +38,13 @@ template <class T> struct Block {
 // A joint, in axes of the outer section
 template <class Space, class T> struct Hinge {
   static constexpr int d = Space::dim;
-  typename Space::template Turn<T> turn;    // to axes of the inboard port
-  T cross_cosine, cross_sine;               // of a universal joint's second angle
-  T r[Space::linear], r_dot[Space::linear]; // origin of the section from the port's, and its rate
-  T c[d];                                   // acceleration by velocities
-  Pack<T, d> Lambda[d];                     // what the port feels: f = Lambda A + bias
-  T column[d][packed<T, d>];                // force of 1 along each axis of the section, in axes of the port
-  Pack<T, d> U[d];                          // by freedoms, the last eliminated first
+  typename Space::template Turn<T> turn;              // to axes of the inboard port
+  T cross_cosine, cross_sine;                         // of a universal joint's second angle
+  T r[Space::linear] = {}, r_dot[Space::linear] = {}; // origin of the section from the port's, and its rate
+  T c[d] = {};                                        // acceleration by velocities
+  Pack<T, d> Lambda[d] = {};                          // what the port feels: f = Lambda A + bias
+  T column[d][packed<T, d>] = {};                     // force of 1 along each axis of the section, in axes of the port
+  Pack<T, d> U[d] = {};                               // by freedoms, the last eliminated first
   T D_inverse[d];
   T A[packed<T, d>] = {}; // of the section
   T pin[2];               // U/D of a pin, in place of all that

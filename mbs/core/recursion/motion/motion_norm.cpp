@@ -58,9 +58,16 @@ double larger(double x, double y) { return x >= y || std::isnan(x) ? x : y; }
 template <class Space>
 MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism)
     : mechanism_(mechanism), sizes_(mechanism), pace_{0, 0} {
-  const std::size_t n = mechanism.n_v;
+  group_states();
+  group_forces();
+  find_pace();
+  add_motors({});
+}
+
+template <class Space> void MotionNorm<Space>::group_states() {
+  const std::size_t n = mechanism_.n_v;
   group_.assign(2 * n, 0), radian_.assign(n, 0);
-  for (const Node<Space> &node : mechanism.nodes) {
+  for (const Node<Space> &node : mechanism_.nodes) {
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       group_[node.v + k] = node.shape.freedoms.component[k] < Space::linear ? 0 : 1;
     double lowest = std::numeric_limits<double>::infinity();
@@ -84,9 +91,12 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism)
       runs_.push_back({static_cast<Index>(i), 0, group});
     ++runs_.back().count;
   }
+}
+
+template <class Space> void MotionNorm<Space>::group_forces() {
   std::map<std::pair<std::string, bool>, int> known;
-  for (const Constraint &row : mechanism.constraints) {
-    const auto key = std::pair(row.model.name, is_moment(mechanism, row));
+  for (const Constraint &row : mechanism_.constraints) {
+    const auto key = std::pair(row.model.name, is_moment(mechanism_, row));
     const auto [at, is_new] = known.emplace(key, static_cast<int>(known.size()));
     if (is_new)
       is_moment_.push_back(key.second);
@@ -100,14 +110,12 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism)
     for (int i = 0; i < Space::dim; ++i)
       force_group_.push_back(i < Space::linear ? force : force + 1);
   };
-  for (std::size_t port = 0; port < mechanism.children.size(); ++port)
-    if (mechanism.children[port] >= 0)
+  for (std::size_t port = 0; port < mechanism_.children.size(); ++port)
+    if (mechanism_.children[port] >= 0)
       add_joint(carriers_, port); // forces between bodies stand for those on the ground, too
-  for (std::size_t i = 0; i < mechanism.nodes.size(); ++i)
-    if (mechanism.nodes[i].is_single_grounded)
+  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i)
+    if (mechanism_.nodes[i].is_single_grounded)
       add_joint(alone_, i);
-  find_pace();
-  add_motors({});
 }
 
 template <class Space> void MotionNorm<Space>::add_motors(const std::vector<bool> &are_moments) {

@@ -52,6 +52,8 @@ public:
   void set_peaks(const NormPeaks &peaks); // throws std::invalid_argument where they are those of another mechanism
 
 private:
+  void group_states();
+  void group_forces();
   void find_pace();
   void add_squares(const double *z) const;
   void forces(const Workspace<Space, double> &w, const Eigen::VectorXd *motors, Eigen::VectorXd &values) const;

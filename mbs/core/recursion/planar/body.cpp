@@ -96,6 +96,12 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
   is_tilted = n && tilted >= 0;
   if (is_tilted)
     W.row(TILT) = data.markers[tilted].Phi.row(2);
+  fill_layouts(W);
+  fill_products(W);
+}
+
+// W as passes read it: by modes, by rows, and by blocks of lanes
+void Body::fill_layouts(const MatrixXd &W) {
   columns.assign(std::max(n, 1) * width(), 0.0);
   rows.assign(padded * width(), 0.0);
   for (int r = 0; r < width(); ++r)
@@ -105,7 +111,6 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     for (int r = 0; r < width(); ++r)
       for (int k = i; k < i + native_lanes; ++k)
         tiles.push_back(rows[r * padded + k]);
-  fill_products(W);
 }
 
 void Body::fill_products(const MatrixXd &W) {

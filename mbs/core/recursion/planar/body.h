@@ -55,6 +55,7 @@ struct Body {
 
 private:
   void fill_rows(const PlanarData &data, const std::vector<int> &used, int tilted);
+  void fill_layouts(const Eigen::MatrixXd &W);
   void fill_products(const Eigen::MatrixXd &W);
 };
 

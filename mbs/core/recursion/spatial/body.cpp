@@ -247,7 +247,30 @@ int Body::add_to_W(const Eigen::VectorXd &g) {
   return row;
 }
 
-// T_s, g_s, G_s and z_c, A_c, from data along the axes z, which are the columns of `axes`
+// T_s, g_s and G_s; returned is s, -1 where these modes do not stretch
+int Body::add_stretch(const Matrix3d &T, const MatrixXd &G, const Eigen::VectorXd &g) {
+  Stretch of;
+  const bool has_g = !g.isZero(0);
+  of.G = ModeMatrix(G);
+  if (!has_g && of.G.kind == ModeMatrix::Kind::zero)
+    return -1;
+  of.g.assign(padded(n), 0.0);
+  if (has_g) {
+    of.g_row = add_to_W(g);
+    std::copy_n(g.data(), n, of.g.data());
+  }
+  const Matrix3d J = T.trace() * Matrix3d::Identity() - T;
+  const auto s = stretches.size();
+  for (int i = 0; i < 3; ++i) {
+    tension[i][s] = J(i, i), tension[3 + i][s] = 2 * J(i, (i + 1) % 3);
+    for (int j = 0; j <= i; ++j)
+      of.inertia[symmetric_index(i, j)] = J(i, j);
+  }
+  stretches.push_back(std::move(of));
+  return static_cast<int>(s);
+}
+
+// All T_s, g_s, G_s and z_c, A_c, from data along the axes z, which are the columns of `axes`
 void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const MatrixXd &g) {
   const auto without_spin = [&](int slot) { // transposed: column i multiplies p_i
     const auto &given = data.S_bar_kl[slot];
@@ -262,30 +285,11 @@ void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const Mat
   Index ab = 0;
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b, ++ab) {
-      const Eigen::VectorXd g_ab = g.row(ab);
-      Stretch of;
-      const bool has_g = !g_ab.isZero(0);
       G[a][b] = cleaned(0.5 * (without_spin(3 * a + b) + without_spin(3 * b + a)));
-      of.G = ModeMatrix(G[a][b]);
-      if (!has_g && of.G.kind == ModeMatrix::Kind::zero)
-        continue;
-      of.g.assign(padded(n), 0.0);
-      if (has_g) {
-        of.g_row = add_to_W(g_ab);
-        std::copy_n(g_ab.data(), n, of.g.data());
-      }
       Matrix3d T = axes.col(a) * axes.col(b).transpose();
       if (a != b)
         T += T.transpose().eval();
-      const Matrix3d J = T.trace() * Matrix3d::Identity() - T;
-      const auto s = stretches.size();
-      for (int i = 0; i < 3; ++i) {
-        tension[i][s] = J(i, i), tension[3 + i][s] = 2 * J(i, (i + 1) % 3);
-        for (int j = 0; j <= i; ++j)
-          of.inertia[symmetric_index(i, j)] = J(i, j);
-      }
-      stretch_of[a][b] = static_cast<int>(s);
-      stretches.push_back(std::move(of));
+      stretch_of[a][b] = add_stretch(T, G[a][b], g.row(ab));
     }
   for (int c = 0; c < 3; ++c) {
     Twist of;

@@ -81,6 +81,7 @@ private:
   void fill_residuals(const SpatialData &data, const std::vector<int> &used);
   void fill_tensors(const SpatialData &data, const Eigen::Matrix3d &axes, const Eigen::MatrixXd &g);
   int add_to_W(const Eigen::VectorXd &g);
+  int add_stretch(const Eigen::Matrix3d &T, const Eigen::MatrixXd &G, const Eigen::VectorXd &g);
 };
 
 // The same body with its frame at `position`, its axes the columns of `triad`.
