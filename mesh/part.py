@@ -113,7 +113,8 @@ def source_of_file(file: Path, record: SolidMeshRecord, metres: float, where: st
     if is_step(file):
         from .step import mesh_step
 
-        return read_apart(mesh_step, file.stat().st_size, where, file.absolute(), record, metres, where)
+        arguments = file.absolute(), record, metres, where
+        return read_apart(mesh_step, file.stat().st_size, where, *arguments)
     return source_from(read_mesh(file.absolute(), where), where)
 
 

@@ -31,6 +31,7 @@ from .records import (
 from .source import Source, source_from
 
 _VOLUME, _FACE = 3, 2
+_ORIGIN = 0, 0, 0
 DimTags = list[tuple[int, int]]
 Lengths = TypeVar("Lengths")
 
@@ -88,9 +89,9 @@ def _body(geometry: SolidGeometry) -> DimTags:
         inner = _box(length, section.height - 2 * section.wall, section.width - 2 * section.wall)
         return _dim_tags(occ.cut(body, [inner])[0])
     if isinstance(section, CircleSection):
-        return [(_VOLUME, occ.addCylinder(0, 0, 0, length, 0, 0, section.diameter / 2))]
+        return [(_VOLUME, occ.addCylinder(*_ORIGIN, *(length, 0, 0), section.diameter / 2))]
     assert section is not None
-    outer, inner = (occ.addCylinder(0, 0, 0, length, 0, 0, d / 2) for d in (section.outer, section.inner))
+    outer, inner = (occ.addCylinder(*_ORIGIN, *(length, 0, 0), d / 2) for d in (section.outer, section.inner))
     return _dim_tags(occ.cut([(_VOLUME, outer)], [(_VOLUME, inner)])[0])
 
 
@@ -143,7 +144,7 @@ def _outline(body: DimTags, geometry: SolidGeometry, outlines: Outlines) -> None
         begin, end = max(begin, 0.0), min(end, geometry.length)
         for y in sides:
             face = gmsh.model.occ.addRectangle(begin, -outlines.width / 2, 0, end - begin, outlines.width)
-            gmsh.model.occ.rotate([(_FACE, face)], 0, 0, 0, 1, 0, 0, 1.5707963267948966)
+            gmsh.model.occ.rotate([(_FACE, face)], *_ORIGIN, *(1, 0, 0), 1.5707963267948966)
             gmsh.model.occ.translate([(_FACE, face)], 0, y, 0)
             rectangles.append((_FACE, face))
     gmsh.model.occ.fragment(body, rectangles)

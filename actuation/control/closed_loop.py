@@ -136,12 +136,28 @@ class ClosedLoop(SampledAnalysis):
         arriving: Loop | AmplifiedLoop = loop
         if amplifiers.acts:
             directions = strain_directions(plant, context.patches)
-            arriving = AmplifiedLoop(loop, at_sample, samples, self.sample_time, amplifiers, directions, splits)
+            arriving = AmplifiedLoop(
+                loop,
+                at_sample,
+                samples,
+                self.sample_time,
+                amplifiers=amplifiers,
+                directions=directions,
+                splits=splits,
+            )
             samples, at_sample = arriving.times, arriving
         instant, inputs = INSTANT * self.sample_time, actuator_commands(plant, context.patches)
         held = partial(held_commands, samples=samples, delay=self.delay, loop=arriving, after=instant)
         before = partial(held, after=-instant)
-        control = Control(inputs, arriving.first, samples, self.delay, at_sample, before, instant)
+        control = Control(
+            commands=inputs,
+            first=arriving.first,
+            times=samples,
+            delay=self.delay,
+            controller=at_sample,
+            held=before,
+            instant=instant,
+        )
         disturbing = ((place_of(whole, str(load.point)), load.components) for load in self.disturbance)
         drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
         run = drive_robot(
@@ -155,7 +171,8 @@ class ClosedLoop(SampledAnalysis):
         found, along = loops_about(setup, begun, readings[: loop.taken], models)
         filtering = filters(read, self.sample_time)
         loops = [(model, feedback.behind(*filtering)) for model, feedback in found]
-        record = loop_record(self, setup, loop, acting, runs, loops, lowest, gears=bool(plant.tree.gears))
+        gears = bool(plant.tree.gears)
+        record = loop_record(self, setup, loop, acting, runs, loops=loops, lowest=lowest, gears=gears)
         record = replace(record, feedback=along)
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T

@@ -98,6 +98,7 @@ class AmplifiedLoop:
         at_sample: Callable[[int, float, Array], Array],
         samples: Array,
         T: float,
+        *,
         amplifiers: Amplifiers,
         directions: Array,
         splits: tuple[int, int],
@@ -244,9 +245,9 @@ def loop_record(
     loop: Loop,
     acting: Sequence[Controller],
     runs: tuple[LoopMotion, LoopMotion],
+    *,
     loops: Loops,
     lowest: float,
-    *,
     gears: bool,
 ) -> LoopRecord:
     """Return the record of a run, given at its outputs and at these and between; linear `loops` about the reference.

@@ -141,7 +141,8 @@ def kalman(
     E[: len(estimated), :n] = model.C[model.outputs(estimated)]
     E[len(estimated) :, n : n + d] = np.eye(d)
     B = np.vstack([plant.B, np.zeros((len(A) - at, len(columns)))])
-    return Observer(A, B, C, L, np.zeros_like(L), E, covariance, (*estimated, *disturbed))
+    M = np.zeros_like(L)
+    return Observer(A=A, B=B, C=C, L=L, M=M, E=E, covariance=covariance, estimates=(*estimated, *disturbed))
 
 
 def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -> Array:
@@ -197,13 +198,19 @@ def given(record: GainsObserver, setup: Setup) -> Observer:
     C_all, M = np.zeros((len(setup.outputs), n)), np.zeros((n, len(setup.outputs)))
     B_all = np.zeros((n, len(setup.inputs)))
     C_all[rows], M[:, rows], B_all[:, columns] = C / scale[:, None], gain * scale, B
-    names = (*record.outputs, *(f"state/{k}" for k in range(1, n + 1)))
-    found = Observer(
-        A, B_all, C_all, np.zeros_like(M), M, np.vstack([C / scale[:, None], np.eye(n)]), np.full((n, n), np.nan), names
+    observer = Observer(
+        A=A,
+        B=B_all,
+        C=C_all,
+        L=np.zeros_like(M),
+        M=M,
+        E=np.vstack([C / scale[:, None], np.eye(n)]),
+        covariance=np.full((n, n), np.nan),
+        estimates=(*record.outputs, *(f"state/{k}" for k in range(1, n + 1))),
     )
-    if found.radius >= 1.0:
-        raise InputError("expected eigenvalues of A − gain C below 1 in size", f"{found.radius:.6g}")
-    return found
+    if observer.radius >= 1.0:
+        raise InputError("expected eigenvalues of A − gain C below 1 in size", f"{observer.radius:.6g}")
+    return observer
 
 
 @struct
@@ -255,6 +262,7 @@ class Observed:
         schedule: Schedule,
         setup: Setup,
         controllers: Sequence[Controller],
+        *,
         ranges: Array,
         origin: tuple[Array, Array],
         settle: int = 0,
@@ -412,4 +420,13 @@ def make_observed(
         P = np.zeros((len(inner.inputs), len(inner.outputs)))
         P[inner.places(*own), inner.columns(*(f"estimate/disturbance/{name}" for name in own))] = 1.0
         acting.append(LinearFeedback(inner, P))
-    return Observed(schedule, inner, acting, ranges, (origin, nominal), record.settle, tip, unseen)
+    return Observed(
+        schedule,
+        inner,
+        acting,
+        ranges=ranges,
+        origin=(origin, nominal),
+        settle=record.settle,
+        tip=tip,
+        warnings=unseen,
+    )

@@ -395,7 +395,16 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
         return found.arrays[label]
 
     own = reached.coordinates(to_file.T).T
-    return PatchableLink(name, body.length, bodies, layout, reached.stiffness, reached.served, own, patches)
+    return PatchableLink(
+        name=name,
+        length=body.length,
+        bodies=bodies,
+        layout=layout,
+        stiffness=reached.stiffness,
+        served=reached.served,
+        own=own,
+        patches=patches,
+    )
 
 
 def _patches(context: ActuatedContext, link: str) -> LinkPatches:

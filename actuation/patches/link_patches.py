@@ -303,7 +303,7 @@ def _array(
     W_sqrt = weights(_key(path, placed.layout.label), placed.layout, modes.served, modes.stiffness, points)
     to_modes = np.zeros((body.mode_count, len(modes.rows)))
     to_modes[modes.rows] = modes.T
-    return assembled(placed, body, of, to_modes, modes.stiffness, W_sqrt, modes.served)
+    return assembled(placed, body, of, to_modes, stiffness=modes.stiffness, W_sqrt=W_sqrt, served=modes.served)
 
 
 def _together(

@@ -278,15 +278,25 @@ def _span(values: Array) -> str:
 
 
 def assembled(
-    placed: PlacedLayout, body: ModalBody, of: Effects, T: Array, stiffness: Array, W_sqrt: Array, served: int
+    placed: PlacedLayout, body: ModalBody, of: Effects, T: Array, *, stiffness: Array, W_sqrt: Array, served: int
 ) -> PatchArray:
     """The patches in modal coordinates p, of which T (n_file, n) makes those of the modal body; `stiffness` (n,)."""
     layout, edges = placed
     return PatchArray(
-        layout, edges, of.extent, of.per_volt, (of.turn @ T).T, body, of.lever, layout.read_capacitance(of.yielding),
-        Phi_V=(of.Phi_V @ T).T, amplifiers=layout.amplifiers(),
-        W_sqrt=W_sqrt, frequency=np.sqrt(stiffness) / (2 * np.pi), served=served,
-    )  # fmt: skip
+        layout=layout,
+        edges=edges,
+        height=of.extent,
+        moment_per_volt=of.per_volt,
+        turn=(of.turn @ T).T,
+        link=body,
+        lever=of.lever,
+        read_capacitance=layout.read_capacitance(of.yielding),
+        Phi_V=(of.Phi_V @ T).T,
+        amplifiers=layout.amplifiers(),
+        W_sqrt=W_sqrt,
+        frequency=np.sqrt(stiffness) / (2 * np.pi),
+        served=served,
+    )
 
 
 def edges_on_piece(layout: PztLayout, edges: Array, start: float, length: float) -> tuple[Indices, Array]:

@@ -194,10 +194,15 @@ class PztLayout(Record):
         plays, hysteresis = np.zeros((2, MOST_PLAYS, k)), self.hysteresis
         given = ((1.0,), (0.0,)) if hysteresis is None else (hysteresis.weights, hysteresis.thresholds)
         plays[:, : len(given[0])] = np.array(given)[:, :, None]
-        capacitance = each(self.capacitance(clamped=True))
-        compensated = each(float(hysteresis is not None and hysteresis.compensate))
         return Amplifiers(
-            range, each(of.slew), each(of.current), capacitance, each(of.bandwidth), each(of.delay), plays, compensated
+            range=range,
+            slew=each(of.slew),
+            current=each(of.current),
+            capacitance=each(self.capacitance(clamped=True)),
+            bandwidth=each(of.bandwidth),
+            delay=each(of.delay),
+            plays=plays,
+            compensated=each(float(hysteresis is not None and hysteresis.compensate)),
         )
 
     def with_one_limit(self, **changes: object) -> Self:
@@ -277,10 +282,17 @@ class PztLayout(Record):
         if self.fibre_angle is None:
             held = self.strain == "biaxial" and self.coupling == "rotation"
             return plain_lamina(self.modulus, self.d31, self.thickness, self.poissons_ratio, held=held)
-        values = (self.modulus_across, self.shear_modulus, self.poissons_ratio, self.d33)
-        across, shear, ratio, d33 = (0.0 if value is None else value for value in values)
-        spacing = self.electrode_spacing or self.thickness
-        return fibre_lamina(Fibres(self.modulus, across, shear, ratio, d33, self.d31, self.fibre_angle, spacing))
+        fibres = Fibres(
+            E_1=self.modulus,
+            E_2=self.modulus_across or 0.0,
+            G_12=self.shear_modulus or 0.0,
+            nu_12=self.poissons_ratio or 0.0,
+            d33=self.d33 or 0.0,
+            d31=self.d31,
+            angle=self.fibre_angle,
+            spacing=self.electrode_spacing or self.thickness,
+        )
+        return fibre_lamina(fibres)
 
     @property
     def is_driven(self) -> bool:

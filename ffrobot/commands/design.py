@@ -77,7 +77,8 @@ def sensitivity(scene_file: Path, of: tuple[str, ...], to: tuple[str, ...], outp
 @click.command()
 @options_of(studies.optimise, "minimise", "maximise")
 @options_of(studies.trade_off, "against", "points")
-@options_of(studies.optimise, "subject_to", "vary", "method", "starts", "seed", "runs", "tolerance")
+@options_of(studies.optimise, "subject_to", "vary", "method")
+@options_of(studies.optimise, "starts", "seed", "runs", "tolerance")
 @study_options("SCENE.optimum", "Diagrams of the designs.")
 def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how: Any) -> None:
     """Optimization: parameters and discrete choices that minimize an objective within limits.
@@ -114,7 +115,8 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
 
 
 @click.command()
-@options_of(studies.uncertainty, "of", "spread", "samples", "seed", "by", "indices")
+@options_of(studies.uncertainty, "of", "spread", "samples")
+@options_of(studies.uncertainty, "seed", "by", "indices")
 @study_options("SCENE.uncertainty", "Diagrams of bands and rankings.")
 def uncertainty(
     scene_file: Path, of: tuple[str, ...], spread: tuple[str, ...], output: Path | None, **how: Any

@@ -209,13 +209,14 @@ def print_import(imported: Imported, console: Console) -> None:
         f" and {len(moving)} joints move; {mass:.6g} kg in rigid bodies",
         soft_wrap=True,
     )
-    table = plain_table("joint", "type", "range", "moment or force", "speed", "damping", "friction")
+    rows = []
     for joint in moving:
         low_high = joint.get("position_limit")
         span = f"{low_high[0]:.4g} … {low_high[1]:.4g} {UNITS[joint['type']]}" if low_high else "–"
         limits = (f"{joint[key]:.4g}" if key in joint else "–" for key in LIMITS)
-        table.add_row(joint["name"], joint["type"], span, *limits)
-    console.print(table)
+        rows.append((joint["name"], joint["type"], span, *limits))
+    headers = "joint", "type", "range", "moment or force", "speed", "damping", "friction"
+    console.print(plain_table(headers, rows))
     if imported.masses:
         _print_masses(imported, console)
     for remark in imported.remarks:
@@ -232,23 +233,15 @@ def print_export(exported: Exported, console: Console) -> None:
 
 
 def _print_masses(imported: Imported, console: Console) -> None:
-    table = plain_table(
-        "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
-    )
+    rows = []
     for each in imported.masses:
         inertial = imported.robot.links[each.link].inertial
         mass = inertial.mass if inertial is not None else 0.0
-        table.add_row(
-            each.link,
-            "closed" if each.is_closed else "open",
-            f"{mass:.4g}",
-            f"{each.volume:.3g}",
-            f"{each.density:.4g}",
-            f"{each.inertia_ratio:.3g}",
-            f"{each.center_distance:.2g}",
-        )
+        ratios = f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}"
+        rows.append((each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}", *ratios))
+    headers = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
     console.print()
-    console.print(table)
+    console.print(plain_table(headers, rows))
     console.print(
         "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
         " --flexible names a file",

@@ -60,9 +60,7 @@ def _tables(results: Results, name: str) -> Iterator[Table | str]:
 
 def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) -> Table:
     """At the joint, a line for each quantity; the RMS over the run is what heats a motor."""
-    table = plain_table(
-        "motor of", "at the joint", "peak", "limit", "peak / limit", "RMS", "share above", "first at (s)", "within?"
-    )
+    lines = []
     for name, motor in motors.items():
         unit = units[name]
         force, speed = ("torque", "rad/s") if unit == "N·m" else ("force", "m/s")
@@ -77,33 +75,28 @@ def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) ->
         for k, (what, peak, limit, rms) in enumerate(rows):
             ends = ("", "", "") if k else (share, since, can)
             times = "" if np.isinf(limit) else _number(peak / limit)
-            table.add_row("" if k else name, what, _number(peak), _number(limit), times, rms, *ends)
-    return table
+            lines.append(("" if k else name, what, _number(peak), _number(limit), times, rms, *ends))
+    headers = "motor of", "at the joint", "peak", "limit", "peak / limit", "RMS", "share above", "first at (s)"
+    return plain_table((*headers, "within?"), lines)
 
 
 def _at_motors(motors: Mapping[str, MotorFeasibility], scene: Mapping[str, Any]) -> Table:
     """In front of gears, without their losses; the load's inertia is the largest, with other joints locked."""
-    table = plain_table(
-        "motor of", "ratio", "peak (N·m)", "RMS (N·m)", "speed (rad/s)", "(1/min)", "power (W)", "load / rotor inertia",
-        names=1,
-    )  # fmt: skip
+    rows = []
     for joint in scene["joint"]:
         motor, N, J = motors.get(joint["name"]), joint.get("gear_ratio", 1.0), joint.get("rotor_inertia", 0.0)
         if motor is not None and N != 1.0:
             speed = N * motor.speed
+            values = map(_number, (motor.moment / N, motor.rms_moment / N, speed))
             ratio = _number(motor.load_inertia / (J * N**2)) if J and np.isfinite(motor.load_inertia) else ""
-            table.add_row(
-                joint["name"], f"{N:g}", _number(motor.moment / N), _number(motor.rms_moment / N), _number(speed),
-                f"{60 * speed / (2 * np.pi):.0f}", _number(motor.power), ratio,
-            )  # fmt: skip
-    return table
+            turns = f"{60 * speed / (2 * np.pi):.0f}"
+            rows.append((joint["name"], f"{N:g}", *values, turns, _number(motor.power), ratio))
+    headers = "motor of", "ratio", "peak (N·m)", "RMS (N·m)", "speed (rad/s)", "(1/min)", "power (W)"
+    return plain_table((*headers, "load / rotor inertia"), rows, names=1)
 
 
 def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
-    table = plain_table(
-        body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling",
-        "strain (µ)", "within?", names=1,
-    )  # fmt: skip
+    rows = []
     required, available = judged["required_moment"][()], judged["available_moment"][()]
     c, depoling = np.abs(pzt["moment_per_volt"][()]), judged.attrs["depoling_field"]
     for k in range(len(required)):
@@ -112,21 +105,17 @@ def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
         factor, since, can = _verdict(judged["factor"][k], judged["saturation_time"][k])
         beyond = ["depoled"] if judged["limited_field"][k] > depoling else []
         beyond += ["strained"] if strain > judged.attrs["strain_limit"] else []
-        table.add_row(
-            f"patch {k + 1}", f"{pzt['edges'][k].mean():.4g}", *map(_number, moments), factor, since,
-            _number(field / 1e6), "" if np.isinf(depoling) else _number(field / depoling), _number(1e6 * strain),
-            ", ".join([can, *beyond]),
-        )  # fmt: skip
-    return table
+        cells = (f"patch {k + 1}", f"{pzt['edges'][k].mean():.4g}", *map(_number, moments), factor, since)
+        of_depoling = "" if np.isinf(depoling) else _number(field / depoling)
+        rows.append((*cells, _number(field / 1e6), of_depoling, _number(1e6 * strain), ", ".join([can, *beyond])))
+    headers = body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling"
+    return plain_table((*headers, "strain (µ)", "within?"), rows, names=1)
 
 
 def _modes(body: str, judged: h5py.Group) -> Table:
-    table = plain_table(body, "needs (N/√kg)", "all patches have (N/√kg)", "factor", names=1)
-    for k, (needed, had, factor) in enumerate(
-        zip(judged["mode_required"][()], judged["mode_available"][()], judged["mode_factor"][()], strict=True), 1
-    ):
-        table.add_row(f"mode {k}", _number(needed), _number(had), _number(factor))
-    return table
+    modes = zip(*(judged[f"mode_{key}"][()] for key in ("required", "available", "factor")), strict=True)
+    rows = [(f"mode {k}", *map(_number, values)) for k, values in enumerate(modes, 1)]
+    return plain_table((body, "needs (N/√kg)", "all patches have (N/√kg)", "factor"), rows, names=1)
 
 
 def _remedy_line(judged: h5py.Group) -> str:

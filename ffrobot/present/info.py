@@ -102,15 +102,14 @@ def _results(file: h5py.File) -> str:
     lines = [f"results of scene {file.attrs['name']!r}, made by ffrobot {file.attrs['ffrobot_version']}"]
     for name, body in json.loads(file.attrs["modal_bodies"]).items():
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
-    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
+    headers = "analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)"
+    analyses = Table(*headers)
     datasets = Table("dataset", "shape", "unit", "what")
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
-        analyses.add_row(
-            name, attributes["kind"], status_in_words(attributes), f"{len(time)}", f"{time[-1]:g}",
-            f"{attributes['steps']}", f"{attributes['evaluations']}",
-            f"{attributes['wall_seconds']:.3f}",
-        )  # fmt: skip
+        effort = (str(attributes["steps"]), str(attributes["evaluations"]), f"{attributes['wall_seconds']:.3f}")
+        status = status_in_words(attributes)
+        analyses.add_row(name, attributes["kind"], status, f"{len(time)}", f"{time[-1]:g}", *effort)
         _add_datasets(datasets, group, RESULTS)
     tables = [analyses, datasets]
     closed = {name: group["control"].attrs for name, group in file.items() if "control/commands" in group}

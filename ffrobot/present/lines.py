@@ -56,7 +56,7 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
     return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
 
 
-def plain_table(*headers: str, names: int = 2) -> Table:
+def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> Table:
     """Return a table without lines: the first `names` columns are left-aligned and fold, the others are numbers."""
     from rich.table import Table
 
@@ -66,6 +66,8 @@ def plain_table(*headers: str, names: int = 2) -> Table:
             table.add_column(header, overflow="fold")
         else:
             table.add_column(header, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
     return table
 
 
@@ -73,18 +75,12 @@ def named_tables(first: str, rows: Iterable[tuple[str, Mapping[str, str]]]) -> I
     """Yield a table of named rows (see `results.tables`), the names in the column `first`; none without rows."""
     named = list(rows)
     if named:
-        table = plain_table(first, *named[0][1])
-        for name, cells in named:
-            table.add_row(name, *cells.values())
-        yield table
+        yield plain_table((first, *named[0][1]), ((name, *cells.values()) for name, cells in named))
 
 
 def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """Print `rows` below their headers, and an empty line."""
-    table = plain_table(*headers)
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
+    console.print(plain_table(headers, rows))
     console.print()
 
 

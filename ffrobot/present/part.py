@@ -27,12 +27,12 @@ def print_inspection(file: Path, part: Inspection, density: float | None, consol
         lines.append(f"groups {', '.join(part.groups)}")
     for line in (*lines, *(f"remark     {remark}" for remark in part.remarks)):
         console.print(line, soft_wrap=True)
-    table = plain_table("face", "kind", "center mm", "normal or axis", "radius mm", "area mm²")
+    rows = []
     for k, face in enumerate(part.faces[:LISTED], start=1):
         radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"
         direction = f"({', '.join(f'{value + 0.0:.4g}' for value in face.direction.round(4))})"
-        table.add_row(str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}")
-    console.print(table)
+        rows.append((str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}"))
+    console.print(plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "area mm²"), rows))
     if (more := len(part.faces) - LISTED) > 0:
         console.print(f"and {more} smaller faces")
 

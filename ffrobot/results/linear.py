@@ -170,10 +170,9 @@ def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController,
     states = tuple(f"state/{k}" for k in range(1, group["A"].shape[-1] + 1))
     times = group["time"][()] if "time" in group else time[:1]
     along = (np.reshape(group[key], (len(times), *group[key].shape[-2:])) for key in "ABCD")
-    return tuple(
-        SampledController(A, B, C, D, states, inputs, outputs, float(t), step)
-        for A, B, C, D, t in zip(*along, times, strict=True)
-    )
+    names: dict[str, Any] = {"state_names": states, "input_names": inputs, "output_names": outputs, "sample_time": step}
+    matrices = (dict(zip("ABCD", of, strict=True)) for of in zip(*along, strict=True))
+    return tuple(SampledController(**names | of, time=float(t)) for of, t in zip(matrices, times, strict=True))
 
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:

@@ -139,7 +139,16 @@ class _Search:
         off = float(distances(smooth, self.values).max())
         ride = self.robot.ride(times, values)
         torque = float((ride.torque / self.limits.sizes[3]).max())
-        return Candidate(name, times, values, moments, ride, off, self._excess(values), torque)
+        return Candidate(
+            name=name,
+            times=times,
+            command=values,
+            moments=moments,
+            ride=ride,
+            off_path=off,
+            excess=self._excess(values),
+            torque=torque,
+        )
 
     def _along(self, factor: float) -> Array:
         """Set points of the record, in `factor` times the time."""

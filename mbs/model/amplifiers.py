@@ -106,10 +106,7 @@ class Driven(Protocol):
 
 def joined(links: Iterable[Driven]) -> Amplifiers:
     """Return the amplifiers of all patches of links, one link after the other."""
-    none = np.zeros(0)
-    parts = [
-        Amplifiers(np.zeros((2, 0)), none, none, none, none, none, np.zeros((2, MOST_PLAYS, 0)), none),
-        *(of_link.amplifiers for of_link in links),
-    ]
-    keys = [field.name for field in fields(Amplifiers)]
-    return Amplifiers(*(as_floats(np.concatenate([getattr(of, key) for of in parts], axis=-1)) for key in keys))
+    none = {field.name: np.zeros(0) for field in fields(Amplifiers)}
+    none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0))}
+    parts = [none, *(vars(of_link.amplifiers) for of_link in links)]
+    return Amplifiers(**{key: as_floats(np.concatenate([of[key] for of in parts], axis=-1)) for key in none})

@@ -258,9 +258,7 @@ class Kinematics:
         By Newton's method with the least steps; what is left is in terms of the sizes, NaN where it is not finite.
         """
         more = np.zeros((0, 0)) if beside is None else self._signs * beside
-        return self.core.postures(
-            self._scene, as_list(times), q, more, search.scales, search.sizes, search.largest_step
-        )
+        return self.core.postures(self._scene, as_list(times), q, more, **search._asdict())
 
     def mobilities(
         self, q: Array, times: Array, is_path: Sequence[bool], length: float, loop_rank: int = -1

@@ -141,7 +141,7 @@ class _Newton:
         solution: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
         if not is_refined:
             return solution
-        left = right - dgbmv(size, size, b, b, 1.0, self.matrix, solution)
+        left = right - dgbmv(m=size, n=size, kl=b, ku=b, alpha=1.0, a=self.matrix, x=solution)
         return solution + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 

@@ -162,7 +162,7 @@ class Steps:
         volts, errors = np.split(lower, [self.m * self.asked.order], axis=1)
         V, e = np.hstack([controls[:, : self.m], volts]), np.hstack([controls[:, self.m :], errors])
         self.sigma = float(x[0, -1]) if self.has_share else 1.0
-        return Iterate(p, v, K, V, e, self.sigma, found)
+        return Iterate(p, v, K, V, e, share=self.sigma, found=found)
 
     def _z(self, x: Array) -> Array:
         """All z_k (N, width + controls) of x."""
