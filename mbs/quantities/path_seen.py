@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .._core import TimeFunction
-from ..run.samples import path_times
+from ..run.stops import path_times
 from ..scene.analysis import TimedAnalysis
 from ..scene.trajectories import Trajectory
 

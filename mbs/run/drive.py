@@ -35,19 +35,8 @@ from .diagnosis import find_cause
 from .integrator_choice import choose_integrator
 from .integrators import Choice, beyond_round_off, integration_controls, with_steps_of
 from .record import Continuation, Run, Statistics
-from .samples import (
-    ALL_LOOKED_AT,
-    LOOKED_AT,
-    MANY,
-    PARTS_OF_STEP,
-    about_highest,
-    in_order,
-    new_samples,
-    reached_samples,
-    some_of,
-    stops,
-    telling,
-)
+from .samples import LOOKS, about_highest, in_order, new_samples, reached_samples, some_of, telling
+from .stops import stops
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -276,11 +265,11 @@ class _Integration:
         # what rings between samples of a controller has peaks and means of its own there
         joints = self.system.model.tree.joint_columns
         rates = states[:, -len(joints) :][:, joints]
-        is_long = len(times) > ALL_LOOKED_AT and not self.analysis.is_repeated
+        is_long = len(times) > LOOKS.all_up_to and not self.analysis.is_repeated
         if control is not None and is_long:
             motion = self.telling(at, times, progress)
             return motion, np.zeros((len(motion.time), 0))
-        some = some_of(times, rates, ends, LOOKED_AT if control is None else PARTS_OF_STEP * ALL_LOOKED_AT)
+        some = some_of(times, rates, ends, LOOKS.evenly if control is None else LOOKS.parts_of_step * LOOKS.all_up_to)
         if is_long:
             some = np.union1d(some, telling(times, states, np.abs(states).max(axis=0)))
         run = at(some)
@@ -302,7 +291,7 @@ class _Integration:
             sizes = np.maximum(sizes, np.abs(values).max(axis=0))
             return motion.at(telling(motion.time, values, sizes))
 
-        blocks = (np.arange(first, min(first + MANY, len(times))) for first in range(0, len(times), MANY))
+        blocks = (np.arange(first, min(first + LOOKS.most, len(times))) for first in range(0, len(times), LOOKS.most))
         parts = []
         for rows in blocks:
             parts.append(thinned(self.motion(at(rows), times[rows])))
@@ -323,7 +312,7 @@ def _with_both_sides(times: Array, states: Array, changes: Array, instant: float
     before = times[near] - 2.0 * instant
     every = np.append(times, before)
     order = np.argsort(every, kind="stable")
-    both = np.append(before, times[near]) if len(near) < LOOKED_AT else before[:0]
+    both = np.append(before, times[near]) if len(near) < LOOKS.evenly else before[:0]
     return every[order], np.concatenate([states, states[near]])[order], both
 
 

@@ -20,7 +20,7 @@ from ..model.model import Model
 from ..scene.analysis import Analysis
 from ..scene.space import SPACES, Space
 from .integrators import NOT_INTEGRATED, Choice
-from .samples import path_times
+from .stops import path_times
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly

@@ -1,0 +1,180 @@
+"""Where steps of an integration must end, and at which times a prescribed motion is looked at.
+
+A prescribed motion is known at any time: it is looked at where its paths and loads change, often enough that cubics
+between the times miss values and rates by at most `resolved` of the largest. Steps see paths and loads at their stages
+alone, so they end where these change briefly: a pulse that lasts 1.5e-4 of the run is in the peaks to 1e-3
+(tests/mbs/test_peaks_between_outputs.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, Booleans, as_floats
+from .._core import TimeFunction
+from ..posture.posture import misfits
+from ..scene.trajectories import Trajectory
+
+
+class _Ends(NamedTuple):
+    """The search for places where a function of time changes."""
+
+    intervals: int = 2000  # of a run, even ones, from which the search begins
+    most: int = 20_000  # times of a prescribed motion: what halving may make of 2000
+    resolved: float = 1e-6  # of the largest value or rate of a path: what the trapezoidal rule may miss
+    seen: float = 1e-3  # likewise, of rigid robots, whose peaks alone count
+    bend: float = 4.0  # h ∫ |f''| of a step over the range of f: half a period of a sine (mbs/core: step_limit.h)
+    rounds: int = 30  # of halving: 2^-30 of 1/2000 of the run is less than `shortest`
+    shortest: float = 1e-9  # of a run, between two times: a spline through closer ones would swing
+    brief: float = 0.01  # of a run: pieces of a path or load that are shorter end steps in `parts` of them
+    far: float = 20.0  # times the longest way of a piece in the time of the run: what a brief piece has to move
+    parts: int = 16  # of such a piece
+    dense: int = 8  # times within an even interval: a hump of a quarter of it is met by two
+    hump: float = 0.02  # of the range of a function, by which it has to leave the straight line in an interval
+    few: float = 0.1  # of the intervals: a function with more humps oscillates, and steps find that
+
+
+ENDS = _Ends()
+
+
+def stops(
+    times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool, is_replay: bool
+) -> Array:
+    """Return times (n,), s, at which integration steps must end.
+
+    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
+    and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far or conditions change.
+    Steps of rigid robots may be as long as the run. `is_driven`: paths alone move the robot, and steps end where its
+    forces have to be looked at. `is_replay`: forces follow from paths that steps do not know, and end where these bend.
+    """
+    ends, paths, loads = times[[0, -1]], list(paths), list(loads)
+    targets = [target for path in paths for _, target in path.targets]
+    duration = ends[1] - ends[0]
+    at = [ends, *(_brief_parts(function, ends) for function in (*targets, *loads))]
+    at += [_humps(function, ends) for function in (*_formulas(paths), *loads)]
+    for path in paths:
+        if path.path is not None and duration > 0.0:
+            breaks = path.path.breaks
+            way = np.abs(np.diff(path.path.sample(breaks), axis=0)).max(axis=1, initial=0.0)
+            last = np.diff(breaks)
+            is_far = way * duration > ENDS.far * last * way.max(initial=0.0)
+            at.append(_parts(breaks, (last < ENDS.brief * duration) & is_far))
+    # just before loads jump, too: a mean over time is by the values on both sides
+    at += [np.array(load.switches()) - ENDS.shortest * duration for load in loads]
+    if is_driven and duration > 0.0:
+        grid = np.union1d(_even(ends), np.concatenate(at))
+        at += [np.setdiff1d(_resolved(function, grid, ENDS.seen), grid) for function in (*targets, *loads)]
+    if is_replay and duration > 0.0:
+        at += [_bends(target, _even(ends)) for target in targets]
+    return _inside(np.concatenate(at), ends)
+
+
+def _inside(times: Array, ends: Array) -> Array:
+    """(n,) s: the times between the ends, ascending."""
+    every = np.unique(times)
+    return every[(every > ends[0]) & (every < ends[1])]
+
+
+def _even(ends: Array) -> Array:
+    """(n,) s: the fewest times from ends[0] to ends[1]."""
+    return np.linspace(ends[0], ends[1], ENDS.intervals + 1)
+
+
+def _brief_parts(function: TimeFunction, ends: Array) -> Array:
+    """Times (n,) s from ends[0] to ends[1] at which conditions of the function change, and parts of brief pieces."""
+    pieces = np.union1d(np.clip(function.switches(), *ends), ends)
+    return np.union1d(pieces, _parts(pieces, np.diff(pieces) < ENDS.brief * np.ptp(ends)))
+
+
+def _humps(function: TimeFunction, ends: Array) -> Array:
+    """Times (n,) s about places where a function comes and goes between two `_even` times; none where it does all over.
+
+    Of times that are `ENDS.dense` times as close those in such intervals and in the ones next to them. Jumps are left
+    out: steps find them, and end at those that conditions tell.
+    """
+    times = np.linspace(ends[0], ends[1], ENDS.intervals * ENDS.dense + 1)
+    values = np.nan_to_num(function.sample(times)[0])
+    cells = values[np.arange(ENDS.intervals)[:, None] * ENDS.dense + np.arange(ENDS.dense + 1)]
+    change, range_ = cells[:, -1] - cells[:, 0], np.ptp(cells, axis=1)
+    off = np.abs(cells - cells[:, :1] - change[:, None] * np.linspace(0.0, 1.0, ENDS.dense + 1)).max(axis=1)
+    steps = np.abs(np.diff(cells, axis=1)).max(axis=1)
+    leaving = (off > ENDS.hump * np.ptp(values)) & (np.minimum(np.abs(change), steps) < 0.5 * range_)
+    if not 0 < np.count_nonzero(leaving) < ENDS.few * ENDS.intervals:
+        return times[:0]
+    about = np.convolve(leaving, np.ones(3), mode="same") > 0
+    about &= np.histogram(function.switches(), times[:: ENDS.dense])[0] == 0
+    return times[:-1][np.repeat(about, ENDS.dense)]
+
+
+def _bends(target: TimeFunction, grid: Array) -> Array:
+    """Times (n,) s of the grid and between them, so that no step from one to the next passes more than half a period.
+
+    That is h ∫ |f''| ≤ 4 of accelerations f over their range, as of the loads that steps know of (`step_limit.h`).
+    """
+    times = _resolved(target, grid, ENDS.seen)
+    f = np.nan_to_num(target.sample(times)[2])
+    bend = np.concatenate([[0.0], np.abs(np.diff(np.diff(f) / np.diff(times))), [0.0]]).cumsum()
+    most, at, last = ENDS.bend * float(np.ptp(f)), [], 0
+    for k in range(1, len(times)):
+        if (bend[k] - bend[last]) * (times[k] - times[last]) > most:
+            last = max(last + 1, k - 1)
+            at.append(times[last])
+    return np.array(at)
+
+
+def _parts(breaks: Array, chosen: Booleans) -> Array:
+    """Ends of the parts of `chosen` (n,) pieces between `breaks` (n + 1,), s."""
+    return np.linspace(breaks[:-1][chosen], breaks[1:][chosen], ENDS.parts + 1).ravel()
+
+
+def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: Iterable[TimeFunction] = ()) -> Array:
+    """Return times (T,), s: outputs `times`, and enough times between for `paths` from 0 to `end` (s).
+
+    `others`: loads, and whatever else is prescribed.
+    """
+    paths, others, ends = list(paths), list(others), times[[0, -1]]
+    functions = [*(target for path in paths for _, target in path.targets), *others]
+    times = _with_others(times, _even(ends))
+    of_paths = (path.path.breaks for path in paths if path.path is not None)
+    of_pieces = (_brief_parts(function, ends) for function in functions)
+    of_humps = (_humps(function, ends) for function in (*_formulas(paths), *others))
+    times = _with_others(times, _inside(np.concatenate([ends, *of_paths, *of_pieces, *of_humps]), ends))
+    moving = (times >= 0.0) & (times <= end)
+    inside = times[moving]
+    if len(inside) > 1:  # a run may end before the path begins
+        for function in functions:
+            inside = _resolved(function, inside)
+    return np.union1d(times[~moving], inside)
+
+
+def _with_others(times: Array, others: Array) -> Array:
+    """(T,) s: `times`, and `others` that are not next to one of them: a spline through both would swing."""
+    at = np.clip(np.searchsorted(times, others), 1, max(len(times) - 1, 1))
+    gap = np.minimum(np.abs(others - times[at - 1]), np.abs(others - times[np.minimum(at, len(times) - 1)]))
+    return np.union1d(times, others[gap > ENDS.shortest * np.ptp(times)])
+
+
+def _formulas(paths: Iterable[Trajectory]) -> Iterator[TimeFunction]:
+    """Targets of which no breaks are known."""
+    yield from (target for path in paths if path.path is None for _, target in path.targets)
+
+
+def _resolved(target: TimeFunction, times: Array, share: float = ENDS.resolved) -> Array:
+    """The times with others between them, where value or rate change more than their derivatives at both ends say.
+
+    By a `share` of their size.
+    """
+    for _ in range(ENDS.rounds):
+        value, rate, _ = target.sample(times)
+        sizes = float(np.ptp(value)), float(np.abs(rate).max())
+        rough = np.zeros(len(times) - 1, dtype=bool)
+        for order, size in enumerate(sizes):
+            rough |= misfits(target, times, order) > share * size
+        rough &= np.diff(times) > ENDS.shortest * (times[-1] - times[0])
+        if not rough.any() or len(times) + np.count_nonzero(rough) > ENDS.most:
+            break
+        times = np.sort(np.concatenate([times, as_floats(0.5 * (times[:-1] + times[1:])[rough])]))
+    return times
