@@ -180,7 +180,7 @@ class PieceInMotion(NamedTuple):
     tip: Motion
 
 
-class Ends(NamedTuple):
+class RodEnds(NamedTuple):
     """The section at the tip of a piece seen from that at its root: axes A (T, 3, 3), place r (T, 3) m."""
 
     A: Array
@@ -199,14 +199,14 @@ def missed_by_pieces(pieces: Sequence[PieceInMotion]) -> Array:
     return missed
 
 
-def ends_in_equations(body: Body, p: Array) -> Ends:
+def ends_in_equations(body: Body, p: Array) -> RodEnds:
     """Return the ends of a piece as its equations contain them, at p (T, n)."""
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)
-    return Ends(as_floats(back @ exponential(tip.phi)), as_floats(np.einsum("tij,tj->ti", back, tip.u - root.u)))
+    return RodEnds(as_floats(back @ exponential(tip.phi)), as_floats(np.einsum("tij,tj->ti", back, tip.u - root.u)))
 
 
-def rod_ends(modal: ModalBody, p: Array) -> Ends:
+def rod_ends(modal: ModalBody, p: Array) -> RodEnds:
     """Return the ends of the rod with the strains of p (T, n of the file)."""
     x = np.linspace(0.0, modal.length, 2 * INTERVALS + 1)  # with the middles of intervals
     places, h = [modal.interpolate(at) for at in x], x[2]
@@ -221,4 +221,4 @@ def rod_ends(modal: ModalBody, p: Array) -> Ends:
         uneven = np.cross(mean - phi[k] - turn / 2, h * X)  # of curvature
         step = np.einsum("tij,tj->ti", left_jacobian(turn), h * X + strain) + uneven
         r, A = r + np.einsum("tij,tj->ti", A, step), A @ exponential(turn)
-    return Ends(as_floats(A), as_floats(r))
+    return RodEnds(as_floats(A), as_floats(r))
