@@ -16,6 +16,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError, check_known, quoted
+from ..common.libraries import scipy
 from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
@@ -157,11 +158,9 @@ def with_points(spatial: Body, chosen: PointSet) -> Body:
 
 def _automatic(key: str, name: str, body: ModalBody | None, spatial: Body, axes: str) -> PointSet:
     """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
-    from scipy.linalg import qr
-
     points = [_point(key, place, body, spatial) for place in _candidate_places(key, body, spatial.points)]
     candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
-    _, R, order = qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
+    _, R, order = scipy.linalg.qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     kept = sorted(order[: int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))])
     return _named(name, tuple(candidates.axes[k] for k in kept), [candidates.points[k] for k in kept], spatial)

@@ -9,7 +9,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .common.errors import FfrobotWarning, InputError
+from .common.extras import extras
 from .common.files import AnyPath
+from .common.outputs import protected
 
 if TYPE_CHECKING:
     from .design.finding import Finding
@@ -49,7 +52,6 @@ def solve(
         results = ffrobot.solve("scene.toml", "scene.results.h5")
         torque = results["inverse/joints/shoulder/moment"]  # (T,) in N·m
     """
-    from .common.errors import FfrobotWarning, InputError
     from .results.file import Results
     from .results.solving import check_ended, solve_and_keep
     from .results.write import results_image
@@ -94,8 +96,6 @@ def write_study(study: Finding, folder: AnyPath, *, figures: bool = True) -> lis
         ffrobot.write_study(study, "study")
         ffrobot.write_report("study", "study.html")
     """
-    from .common.extras import extras
-
     with extras():
         return list(study.write_study(Path(folder), figures=figures))
 
@@ -120,7 +120,6 @@ def plot_results(
     Example:
         ffrobot.plot_results("scene.results.h5", "figures", ["svg"], only=["moment_*"])
     """
-    from .common.extras import extras
     from .common.validation import check_texts
 
     check_texts(formats, "plot_results: formats")
@@ -145,8 +144,6 @@ def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path:
     Example:
         ffrobot.write_report(["before.results.h5", "after.results.h5"], "compare.html")
     """
-    from .common.extras import extras
-    from .common.outputs import protected
     from .pictures.studies.study import study_files
     from .results.file import Results
 
@@ -220,8 +217,6 @@ def write_movie(
     Example:
         ffrobot.write_movie("scene.results.h5", "motion.gif", rendered=True, scale=100)
     """
-    from .common.extras import extras
-
     with extras(), _files(results) as (file,):
         from .pictures.figures.movie import write_motion
         from .pictures.movie_file import SECONDS, MovieOptions

@@ -20,6 +20,7 @@ from ..common.cache import cache_folder, is_own
 from ..common.errors import SolveError
 from ..common.files import write_atomically
 from ..common.version import digest_of_code
+from .cells import CELLS, CellName
 from .included import files_of
 from .records import PartTables, PlaceRecord, SolidGeometry
 
@@ -64,7 +65,6 @@ def kept_path(tables: PartTables) -> Path:
 
 def kept_part(path: Path) -> PartMesh | None:
     """The mesh kept at `path`; None where there is none, or it is damaged, or of another user."""
-    from .cells import CELLS, CellName
     from .part_mesh import PartMesh
 
     if not is_own(path):

@@ -28,6 +28,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.python_files import count_failed, count_imports, imported_files
+from .lqr import LqrControl
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
 from .records import Controller as Record
 from .robot import RigidArm, Setup, estimate
@@ -229,8 +230,6 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
     if isinstance(record, ComputedTorque):
         return ComputedTorqueControl(record, setup, setup.robot.rigid())
     if isinstance(record, Lqr):
-        from .lqr import LqrControl
-
         return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
     label = f"{setup.robot.path}: controller: {record.python}"
     folder = setup.robot.path.parent

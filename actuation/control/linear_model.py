@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError, check_known, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
+from ...common.libraries import scipy
 from ...common.structs import struct
 from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions
 from ...mbs.linear.joint_conditions import robot_modes as modes_of
@@ -221,17 +223,13 @@ def kept_modes(
 
 def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
     """Write arrays, names and numbers to a .npz or .mat file. Raises `InputError` for another suffix."""
-    from io import BytesIO
-
     content = BytesIO()
     if path.suffix == ".npz":
         converted: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
         np.savez_compressed(content, **converted)
     elif path.suffix == ".mat":
-        from scipy.io import savemat
-
         cells = {k: np.array(v, dtype=object) if isinstance(v, tuple) else v for k, v in arrays.items()}
-        savemat(content, cells, oned_as="column")
+        scipy.io.savemat(content, cells, oned_as="column")
     else:
         raise InputError(f"{path}: expected a file name that ends in .npz or .mat", f'"{path.name}"')
     write_atomically(path, content.getvalue(), "linear model")
@@ -241,9 +239,7 @@ def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
     """Matrices of a .npz or .mat file. Raises `InputError` where it cannot be read or lacks one."""
     try:
         if path.suffix == ".mat":
-            from scipy.io import loadmat
-
-            held: Mapping[str, Any] = loadmat(path)
+            held: Mapping[str, Any] = scipy.io.loadmat(path)
         else:
             held = np.load(path)
         return [as_floats(np.atleast_2d(np.asarray(held[name], dtype=float))) for name in names]

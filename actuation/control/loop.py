@@ -8,6 +8,7 @@ from dataclasses import field
 import numpy as np
 
 from ...common.arrays import Array, Booleans, ComplexArray
+from ...common.libraries import scipy
 from ...common.peaks import largest, root_mean_square
 from ...common.structs import struct
 from ...mbs.model.amplifiers import Amplifiers
@@ -216,9 +217,7 @@ def between(times: Array, known: Array, values: Array) -> Array:
     """Values (T, columns), known at some times, at others (K,)."""
     if not values.size:
         return np.zeros((len(times), values.shape[1]))
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(known, values)(times)
+    return scipy.interpolate.CubicSpline(known, values)(times)
 
 
 def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float) -> Array:

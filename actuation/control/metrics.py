@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.libraries import scipy
 from ...common.peaks import largest, shares
 from ...common.structs import struct
 
@@ -167,9 +168,7 @@ def place_of_tip(
     Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d). That may ring: from when
     all paths are over, s, its place is the `last` one (d,), the final position.
     """
-    from scipy.interpolate import CubicSpline
-
-    place: Array = CubicSpline(*known)(time)
+    place: Array = scipy.interpolate.CubicSpline(*known)(time)
     on_path = np.clip(time, 0.0, end)
     for components in paths:
         for component, target in components.items():
@@ -185,12 +184,10 @@ def _interpolated(times: Array, known: Array, values: Array) -> Array:
 
 def _slow(t: Array, values: Array, window: float) -> Array:
     """The part of (T, columns), evenly spaced, that is no vibration: cubics over a window (Savitzky and Golay 1964)."""
-    from scipy.signal import savgol_filter
-
     count = 2 * round(window / (2 * (t[1] - t[0]))) + 1 if len(t) > 1 else 1
     if not CUBIC < count <= len(t):
         return np.broadcast_to(values.mean(axis=0), values.shape)
-    return savgol_filter(values, count, CUBIC, axis=0)
+    return scipy.signal.savgol_filter(values, count, CUBIC, axis=0)
 
 
 def settling(t: Array, distance: Array) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError, SolveError, quoted
+from ...common.libraries import scipy
 from ...common.structs import struct
 from ...mbs.model.gears import with_compliance
 from ..context import ActuatedContext
@@ -165,10 +166,8 @@ def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
 
     States are scaled first, as their units are arbitrary.
     """
-    from scipy.linalg import matrix_balance
-
     found: dict[str, None] = {}
-    A, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    A, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
     C = C * scale
     size = np.linalg.norm(C, axis=1, keepdims=True)
     C = C / np.where(size > 0.0, size, 1.0)

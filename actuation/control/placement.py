@@ -18,6 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, quoted
+from ...common.libraries import scipy
 from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.fields.field_types import Reference
@@ -109,14 +110,12 @@ class ModalReach:
 
 def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalReach:
     """The lowest modes of the robot with its motors locked in which the link bends."""
-    from scipy.linalg import eigh
-
     f = model.freedom
     modal = [i for i, name in enumerate(model.state_names[:f]) if name.startswith("modal/")]
     own = [k for body in link.bodies for k, i in enumerate(modal) if model.state_names[i].startswith(f"modal/{body}/")]
     block = np.ix_(modal, modal)
     K = -(model.mass @ model.A[f:, :f])[block]
-    squares, shape = eigh((K + K.T) / 2, model.mass[block])
+    squares, shape = scipy.linalg.eigh((K + K.T) / 2, model.mass[block])
     of_link = link.own @ shape[own]
     energy = np.einsum("im,i,im->m", of_link, link.stiffness, of_link)
     share = energy / np.einsum("im,ij,jm->m", shape, (K + K.T) / 2, shape)
@@ -233,7 +232,6 @@ def _search(
     if comb(room + count - 1, count) <= most_sets:
         sets = np.array(list(combinations_with_replacement(range(room), count)), dtype=np.intp) + offset
         return sets[int(np.argmax(judge(sets)))], len(sets), "all sets"
-    from scipy.optimize import differential_evolution
 
     def decoded(y: Array) -> Indices:
         return np.asarray(np.sort(np.round(y), axis=0).astype(np.intp).T + offset)
@@ -247,7 +245,7 @@ def _search(
         lack = -np.nan_to_num(values, neginf=-1e300)
         return lack if y.ndim > 1 else float(lack[0])
 
-    result = differential_evolution(
+    result = scipy.optimize.differential_evolution(
         cost, [(0, room - 1)] * count, integrality=np.ones(count, dtype=bool), vectorized=True, updating="deferred",
         seed=SEED, popsize=30, maxiter=300, tol=1e-8, polish=False,
     )  # fmt: skip

@@ -7,6 +7,7 @@ from contextlib import suppress
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
+from ...common.libraries import scipy
 from ...common.structs import struct
 
 DOUBLINGS = 40  # of steps of the Riccati recursion: errors of filters that die out, however slowly, are gone by then
@@ -52,15 +53,13 @@ def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bo
 
 def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     """e^{A T} and ∫ e^{A s} ds B over T: units of states and commands do not decide on the powers that expm takes."""
-    from scipy.linalg import expm, matrix_balance
-
     n, m = B.shape
     size = np.ones((n, 1))
     if n:
-        size[:, 0] = matrix_balance(A, permute=False, separate=True)[1][0]  # powers of 2
+        size[:, 0] = scipy.linalg.matrix_balance(A, permute=False, separate=True)[1][0]  # powers of 2
     B = B / size
     scale = float(np.abs(B).max(initial=0.0)) or 1.0
-    block = expm(np.block([[A / size * size.T, B / scale], [np.zeros((m, n + m))]]) * T)
+    block = scipy.linalg.expm(np.block([[A / size * size.T, B / scale], [np.zeros((m, n + m))]]) * T)
     return size * block[:n, :n] / size.T, size * block[:n, n:] * scale
 
 
@@ -69,13 +68,11 @@ def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Arra
 
     Raises `ValueError` where there is none with eigenvalues of A − B K `within` that radius.
     """
-    from scipy.linalg import LinAlgError, solve_discrete_are
-
     root = np.linalg.cholesky(R)
     B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
     try:
-        X = solve_discrete_are(A, B, Q, np.eye(len(R)))
-    except (LinAlgError, ValueError) as error:  # often only its reordering of eigenvalues
+        X = scipy.linalg.solve_discrete_are(A, B, Q, np.eye(len(R)))
+    except (scipy.linalg.LinAlgError, ValueError) as error:  # often only its reordering of eigenvalues
         if (found := by_doubling(A, B, Q)) is None:
             raise ValueError(str(error)) from None
         X = found

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray, NDArray, as_floats
 from ...common.errors import InputError
+from ...common.libraries import scipy
 from ...common.structs import struct
 from ...mbs.linear.joint_conditions import RIGID, free_directions
 from .linear_model import STILL, LinearModel, Names
@@ -118,9 +119,7 @@ def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
 
     Those below 1 are far from infinity, though errors of double ones (a free body's, at 0) are estimated without bound.
     """
-    from scipy.linalg import eig
-
-    (alpha, beta), left, right = eig(A, E, left=True, homogeneous_eigvals=True)
+    (alpha, beta), left, right = scipy.linalg.eig(A, E, left=True, homogeneous_eigvals=True)
     finite = np.abs(alpha) < largest * np.abs(beta)
     values, left, right = alpha[finite] / beta[finite], left[:, finite].conj(), right[:, finite]
     of_A, of_E = (np.abs((left * (X @ right)).sum(axis=0)) for X in (A, E))

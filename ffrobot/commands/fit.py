@@ -7,6 +7,7 @@ from typing import Literal
 
 import click
 
+from ..common.errors import InputError
 from ..present.logs import FILE, logging_options, python_option
 from .options import output_option, protect
 
@@ -45,7 +46,6 @@ def fit(
     Prints uncertainties of the values, and rejects keys that the measurement cannot distinguish. FRFs of a robot are
     compared in the poses of their tests; a picture shows measured and fitted curves.
     """  # noqa: D301 (click wants the backspace itself)
-    from ..common.errors import InputError
     from ..present.console import summary_console
     from ..run.inputs import files_of
 

@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from ..common.errors import InputError
+from ..common.outputs import protected
 from ..design.studies import FiniteRange
 from ..present.logs import FILE, together
 from .options import output_option
@@ -105,7 +106,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     diagrams: tornado diagrams, designs of a search, bands, rankings. The page needs no network and no other file.
     """
     from ..common.hdf5 import reading
-    from ..common.outputs import protected
     from ..pictures.report import write_report
     from ..pictures.studies.study import study_files
 

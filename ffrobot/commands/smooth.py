@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..common.errors import InputError
+from ..common.files import write_atomically
 from ..present.logs import FILE, logging_options
 from .options import POSITIVE, output_option, protect, scene_argument
 
@@ -68,7 +69,6 @@ def smooth(
     New motions are averaged, slower, shaped for natural frequencies, or inverted: motors lead by the strain of their
     gears. Each is simulated; OUT is the one that settles first, or that of --write.
     """
-    from ..common.files import write_atomically
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
     from ..smooth.drawn import picture

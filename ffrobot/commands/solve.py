@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..common.errors import SolveError
 from ..present.logs import VERBOSE, logging_options, python_option
 from .options import output_option, scene_argument
 
@@ -85,8 +86,6 @@ def _tell(solution: Solution, path: Path, remarked: int) -> None:
 
 
 def _check_warnings(solution: Solution, scene_file: Path) -> None:
-    from ..common.errors import SolveError
-
     for name, result in solution.analyses.items():
         for text in result.warnings:
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')

@@ -20,6 +20,7 @@ from scipy.special import ndtri
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
+from ..common.libraries import scipy
 from ..common.tables import shown
 from ..sweep.files import number_at
 from ..sweep.sweep import Key, check_once
@@ -247,9 +248,7 @@ class LinearSpread:
 
         The worst case has every key at the end of its spread that makes it worst, a normal one two deviations off.
         """
-        from scipy.stats.qmc import LatinHypercube
-
-        u = LatinHypercube(len(self.spreads), seed=0).random(DRAWS)
+        u = scipy.stats.qmc.LatinHypercube(len(self.spreads), seed=0).random(DRAWS)
         delta = np.column_stack(
             [(one.values(u[:, k]) - one.mean) / one.deviation for k, one in enumerate(self.spreads)]
         )

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
+from ..common.libraries import scipy
 from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
 from .designs import Design, Designs, Point, Runs, changes_for, in_words
 from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
@@ -316,16 +317,14 @@ class _Study:
 
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
         """Return statistics of `count` points of a Latin hypercube (McKay, Beckman & Conover 1979)."""
-        from scipy.stats.qmc import LatinHypercube
-
         k = len(self._spreads)
         if indices:
-            both = LatinHypercube(2 * k, optimization="random-cd", seed=seed).random(count // 2)
+            both = scipy.stats.qmc.LatinHypercube(2 * k, optimization="random-cd", seed=seed).random(count // 2)
             a, b = both[:, :k], both[:, k:]
             mixed = [np.where(np.arange(k) == i, b, a) for i in range(k)]
             u = np.concatenate([a, b, *mixed])
         else:
-            u = LatinHypercube(k, optimization="random-cd", seed=seed).random(count)
+            u = scipy.stats.qmc.LatinHypercube(k, optimization="random-cd", seed=seed).random(count)
         points = spread_points(self._spreads, u)
         designs = self._designs.run(points)
         values = np.array([self._read(design) for design in designs])

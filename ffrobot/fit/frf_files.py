@@ -10,6 +10,7 @@ import numpy as np
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, check_known, quoted
 from ..common.extras import extras
+from ..common.libraries import scipy
 from ..common.tables import parse_csv
 from ..common.toml_files import read_text
 
@@ -104,10 +105,8 @@ def _of_csv(path: Path) -> Iterator[Column]:
 
 def _of_mat(path: Path) -> Iterator[Column]:
     """FRFs of variables frequency (F,), H (F, p), force and response (p names), and perhaps coherence (F, p)."""
-    from scipy.io import loadmat
-
     try:
-        data = loadmat(path, chars_as_strings=True)
+        data = scipy.io.loadmat(path, chars_as_strings=True)
         frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
         ends = [[str(np.ravel(one)[0]).strip() for one in data[name].ravel()] for name in ENDS]
         coherence = data["coherence"].astype(float) if "coherence" in data else None

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, SolveError
+from ..common.libraries import scipy
 from .frf_measured import MeasuredPose
 from .frf_model import Equations, receptance, unstacked
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
@@ -62,10 +63,8 @@ class PoseComparison:
 
 def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
     """Frequencies of peaks that stand out by `prominence` of the logarithm, by the parabola through three points."""
-    from scipy.signal import find_peaks
-
     size = np.log((np.abs(H) * frequency[:, None]).sum(axis=1))
-    at = find_peaks(size, prominence=prominence)[0]
+    at = scipy.signal.find_peaks(size, prominence=prominence)[0]
     left, middle, right = size[at - 1], size[at], size[at + 1]
     shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
     return as_floats(frequency[at] + shift * 0.5 * (frequency[at + 1] - frequency[at - 1]))
@@ -112,8 +111,6 @@ class _Residuals:
 
     def least(self, width: float = 0.0) -> Array:
         """The x (n,) of least squares, at most `FARTHEST` away; of magnitudes smoothed over a `width` of ln f."""
-        from scipy.optimize import least_squares
-
         smoothing = [_smoothing(pose.frequency, width) for pose in self._poses] if width else []
         known: dict[bytes, tuple[Array, Array]] = {}
 
@@ -123,7 +120,7 @@ class _Residuals:
                 known[x.tobytes()] = self.at(x, smoothing)
             return known[x.tobytes()]
 
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             lambda x: at(x)[0],
             np.zeros(len(self._center)),
             jac=lambda x: at(x)[1],

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
+from ..common.libraries import scipy
 
 STEP = 1e-3  # of ln θ, on both sides: frequencies of finite elements are known to about 1e-9
 NO_EFFECT = 1e-4  # of a parameter, or a combination, against the largest: differences have errors of 1e-6
@@ -75,10 +76,14 @@ class Fit(Parameters):
 
         Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3); NaN of none.
         """
-        from scipy.stats import norm, t
-
         quantile, freedom = 0.5 + 0.5 * probability, self.degrees_of_freedom
-        return float(norm.ppf(quantile) if freedom is None else t.ppf(quantile, freedom) if freedom else np.nan)
+        return float(
+            scipy.stats.norm.ppf(quantile)
+            if freedom is None
+            else scipy.stats.t.ppf(quantile, freedom)
+            if freedom
+            else np.nan
+        )
 
     @property
     def error(self) -> Array:
@@ -110,8 +115,6 @@ def fit_frequencies(
         InputError: fewer frequencies than parameters, or parameters that they cannot tell apart.
         SolveError: the iteration does not converge.
     """
-    from scipy.optimize import least_squares
-
     if len(measured) < len(keys):
         raise InputError(
             "fit: expected at least as many measured frequencies as keys to vary",
@@ -128,7 +131,9 @@ def fit_frequencies(
 
     origin = np.zeros(len(keys))
     check_distinguishable(jacobian(origin), keys)
-    optimum = least_squares(residuals, origin, jac=jacobian, max_nfev=MOST_EVALUATIONS, xtol=1e-10, ftol=1e-14)
+    optimum = scipy.optimize.least_squares(
+        residuals, origin, jac=jacobian, max_nfev=MOST_EVALUATIONS, xtol=1e-10, ftol=1e-14
+    )
     if not optimum.success:
         raise SolveError(f"fit: no convergence within {MOST_EVALUATIONS} steps: start nearer to the measured values")
     J, r = jacobian(optimum.x), optimum.fun

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.libraries import scipy
 from ..common.structs import struct
 
 SPREAD = np.concatenate([-np.geomspace(40.0, 0.03, 200), np.geomspace(0.03, 40.0, 200)])  # half-bandwidths off a mode
@@ -136,8 +137,6 @@ def growth(tip: Tip, cutter: Cutter, depth: float, speed: float) -> float:
     By semi-discretization (T. Insperger and G. Stépán, Int. J. Numer. Meth. Engng 61, 2004): modes couple, and teeth
     enter and leave the cut. `depth` in m, `speed` of the spindle in rad/s.
     """
-    from scipy.linalg import expm
-
     (K, D, J), m = tip, len(tip.K)
     pitch = 2 * np.pi / cutter.teeth
     fastest = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max()))
@@ -150,7 +149,7 @@ def growth(tip: Tip, cutter: Cutter, depth: float, speed: float) -> float:
         A = np.zeros((2 * m + 2, 2 * m + 2))
         A[:m, m : 2 * m], A[m : 2 * m, :m], A[m : 2 * m, m : 2 * m] = np.eye(m), J.T @ C @ J - K, -D
         A[m : 2 * m, 2 * m :] = -J.T @ C
-        moved = expm(A * step)[: 2 * m]
+        moved = scipy.linalg.expm(A * step)[: 2 * m]
         one = np.zeros((size, size))
         one[: 2 * m, : 2 * m] = moved[:, : 2 * m]
         one[: 2 * m, -2:] += moved[:, 2 * m :] / 2  # r one tooth period ago, the mean over the step

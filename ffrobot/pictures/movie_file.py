@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from itertools import chain, repeat
 from pathlib import Path
 
@@ -85,8 +86,6 @@ def make_movie(results_path: Path, path: Path, options: MovieOptions | None, dra
 
 
 def _gif_image(frames: Iterable[Frame]) -> bytes:
-    from io import BytesIO
-
     from PIL import Image
 
     first, *rest = [Image.fromarray(frame).quantize(COLORS, Image.Quantize.FASTOCTREE) for frame in frames]

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..common.arrays import Array, Indices, Integers, as_floats
 from ..common.errors import InputError, is_own_fault
+from ..common.libraries import scipy
 from ..common.rotations import of_rpy, smallest_turn
 from ..common.tables import shown
 from ..fe_models.modal_body import ModalBody, PictureMesh
@@ -251,10 +252,10 @@ def thickened(shape: Shape, radius: float) -> Shape:
 
 def shortest_tree(points: Array) -> Integers:
     """Return the edges (p − 1, 2) of the shortest tree that connects points (p, 3), m."""
-    from scipy.sparse.csgraph import minimum_spanning_tree
-
     distance = np.linalg.norm(points[:, None] - points, axis=2)
-    tree = minimum_spanning_tree(1.0 + distance / max(distance.max(), 1e-300))  # 0 would be no edge: points may be one
+    tree = scipy.sparse.csgraph.minimum_spanning_tree(
+        1.0 + distance / max(distance.max(), 1e-300)
+    )  # 0 would be no edge: points may be one
     return np.array(tree.nonzero(), dtype=np.int64).T
 
 

@@ -14,6 +14,7 @@ from rich.table import Table
 from ..actuation.motor_catalog import JointTask, MotorChoice, choices, read_catalog
 from ..actuation.motors import MotorFeasibility
 from ..common.errors import InputError, check_known, quoted
+from ..common.libraries import scipy
 from ..results.file import Results
 from .lines import plain_table, print_table
 
@@ -76,8 +77,18 @@ def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) ->
             ends = ("", "", "") if k else (share, since, can)
             times = "" if np.isinf(limit) else _number(peak / limit)
             lines.append(("" if k else name, what, _number(peak), _number(limit), times, rms, *ends))
-    headers = "motor of", "at the joint", "peak", "limit", "peak / limit", "RMS", "share above", "first at (s)"
-    return plain_table((*headers, "within?"), lines)
+    headers = (
+        "motor of",
+        "at the joint",
+        "peak",
+        "limit",
+        "peak / limit",
+        "RMS",
+        "share above",
+        "first at (s)",
+        "within?",
+    )
+    return plain_table(headers, lines)
 
 
 def _at_motors(motors: Mapping[str, MotorFeasibility], scene: Mapping[str, Any]) -> Table:
@@ -193,15 +204,13 @@ def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTas
     Accelerations are derivatives of a cubic spline through the rates at outputs. Peaks of the torque between outputs
     count: the load is scaled by their ratio to the largest output.
     """
-    from scipy.interpolate import CubicSpline
-
     time = results[f"{analysis}/time"]
     for joint in results.scene.get("joint", ()):
         place = f"{analysis}/joints/{joint['name']}"
         if not (results.has(f"{place}/moment") and results[f"{place}/moment"].ndim == 1) or len(time) < 4:
             continue
         torque, rate = results[f"{place}/moment"], results[f"{place}/rate"]
-        acceleration = CubicSpline(time, rate)(time, 1)
+        acceleration = scipy.interpolate.CubicSpline(time, rate)(time, 1)
         rotor = joint.get("rotor_inertia", 0.0) * joint.get("gear_ratio", 1.0) ** 2
         peak = np.max(results.attributes(f"{place}/moment").get("peak", 0.0))  # between outputs too
         between = float(peak) / max(float(np.abs(torque).max()), 1e-300)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError
+from ..common.libraries import scipy
 from ..common.structs import struct
 from ..common.tables import parse_csv
 from ..common.toml_files import read_text
@@ -117,8 +118,6 @@ def fitted(frequency: Array, response: ComplexArray) -> Axis:
 
     Least squares of G with pairs of poles ω²/(s² + 2ζω s + ω²), two zeros less, and a delay.
     """
-    from scipy.optimize import least_squares
-
     s = 2j * np.pi * frequency
     unit = float(abs(s[int((np.abs(response) < np.sqrt(0.5)).argmax()) or -1]))  # rad/s, where it falls by 3 dB
 
@@ -138,7 +137,7 @@ def fitted(frequency: Array, response: ComplexArray) -> Axis:
         low, high = np.full((2, len(start)), np.inf) * [[-1.0], [1.0]]
         low[-1], high[:pairs] = 0.0, np.log(FASTEST * np.abs(s).max() / unit)
         low[pairs : 2 * pairs], high[pairs : 2 * pairs] = -np.log(OVERDAMPED), np.log(OVERDAMPED)
-        fit = least_squares(partial(off, pairs=pairs), start, bounds=(low, high), x_scale="jac")
+        fit = scipy.optimize.least_squares(partial(off, pairs=pairs), start, bounds=(low, high), x_scale="jac")
         error = float(np.sqrt(2 * fit.cost / len(s)))
         words = f"measured: {2 * pairs} poles, delay {1e3 * fit.x[-1] / unit:.3g} ms, off by {100 * error:.2g} % (RMS)"
         found.append((error, axis(fit.x, pairs, words)))

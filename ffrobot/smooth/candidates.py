@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..common.arrays import Array, as_floats
+from ..common.libraries import scipy
 from ..common.structs import struct
 from ..mbs.fields.paths import Kind, Piecewise, impulses, polynomial_law
 from ..mbs.fields.waypoints import interpolated
@@ -213,9 +214,7 @@ def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
 
 def distances(points: Array, line: Array) -> Array:
     """Return distances (T,) of points (T, n) from lines through vertices (m, n), about the nearest vertex of each."""
-    from scipy.spatial import cKDTree
-
-    nearest, last = cKDTree(line).query(points)[1], len(line) - 1
+    nearest, last = scipy.spatial.cKDTree(line).query(points)[1], len(line) - 1
     off = []
     for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, last - 1)):
         along, apart = line[first + 1] - line[first], points - line[first]

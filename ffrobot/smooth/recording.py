@@ -10,6 +10,7 @@ import numpy as np
 
 from ..common.arrays import Array, Booleans, as_floats
 from ..common.errors import InputError, did_you_mean, quoted
+from ..common.libraries import scipy
 from ..common.structs import struct
 from ..exchange.motion.read_motion import read_record
 from ..mbs.analysis.pcid import Pcid
@@ -56,12 +57,10 @@ class Recording:
         """Times (s) and set points between which lines are close: with rates, of cubics every `step` s at most."""
         if self.rates is None:
             return self.times, self.values
-        from scipy.interpolate import CubicHermiteSpline
-
         parts = [np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)[1:]
                  for a, b in zip(self.times[:-1], self.times[1:], strict=True)]  # fmt: skip
         times = np.concatenate([self.times[:1], *parts])
-        return times, as_floats(CubicHermiteSpline(self.times, self.values, self.rates)(times))
+        return times, as_floats(scipy.interpolate.CubicHermiteSpline(self.times, self.values, self.rates)(times))
 
 
 def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> Recording:

@@ -17,6 +17,7 @@ import tomli_w
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import write_atomically
 from ..common.keys import MOST_RUNS, check_name
+from ..common.libraries import scipy
 from ..common.tables import DEEPEST, shown
 from ..common.toml_files import load_toml
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
@@ -105,9 +106,7 @@ def grid(variations: Sequence[Variation]) -> list[tuple[Value, ...]]:
 
 def latin_hypercube(variations: Sequence[Variation], count: int, seed: int) -> list[tuple[Value, ...]]:
     """Return `count` combinations whose values spread evenly over each range (McKay, Beckman & Conover 1979)."""
-    from scipy.stats.qmc import LatinHypercube
-
-    sample = LatinHypercube(len(variations), seed=seed).random(count)
+    sample = scipy.stats.qmc.LatinHypercube(len(variations), seed=seed).random(count)
     return [tuple(v.draw(float(u)) for v, u in zip(variations, row, strict=True)) for row in sample]
 
 

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rich.console import Console
@@ -207,8 +208,6 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
 
     What needs the whole scene, or its results, is not seen.
     """
-    from tempfile import TemporaryDirectory
-
     from ..fe_models.link_file import read_link
     from ..scene.load import load_scene
 

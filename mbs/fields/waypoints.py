@@ -13,6 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
+from ...common.libraries import scipy
 from ...common.tables import LARGEST, parse_csv, shown
 from ...common.toml_files import read_text
 from .._core import TimeFunction
@@ -340,10 +341,8 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
         rates = np.diff(values, axis=0) / np.diff(nodes)[:, None]
         return Piecewise(nodes, np.stack([rates, values[:-1]], axis=1))
     # Loaded here: a scene without waypoints does not pay for it.
-    from scipy.interpolate import make_interp_spline
-
     rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
-    curve = make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
+    curve = scipy.interpolate.make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
     breaks = np.unique(curve.t)
     powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(degree, -1, -1)]
     return Piecewise(breaks, np.array(powers).transpose(1, 0, 2))

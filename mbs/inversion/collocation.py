@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.libraries import scipy
 from ...common.structs import struct
 
 if TYPE_CHECKING:
@@ -142,14 +143,12 @@ def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tupl
     return p_stages, v[:-1, None] + step * once
 
 
-def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
+def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> scipy.interpolate.PPoly:
     """Return coefficients in powers of t − left break, highest first."""
-    from scipy.interpolate import PPoly
-
     h = np.diff(breaks)[:, None]
     powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
-    return PPoly(np.array([*integrated[::-1], v[:-1], p[:-1]]), breaks)
+    return scipy.interpolate.PPoly(np.array([*integrated[::-1], v[:-1], p[:-1]]), breaks)
 
 
 class Elimination:
@@ -190,8 +189,6 @@ class _LinearSystem:
     """Newton's equations: stages eliminated interval by interval, then a banded system for the values at breaks."""
 
     def __init__(self, problem: Problem, breaks: Array, derivatives: list[Array]) -> None:
-        from scipy.linalg.lapack import dgbtrf
-
         self.problem, n = problem, len(problem.scale)
         self.stages = Elimination(problem.scheme, np.diff(breaks), derivatives)
         self.S = np.concatenate([problem.scale, np.ones(n)])
@@ -201,7 +198,7 @@ class _LinearSystem:
         self.boundary = [problem.start.rows / self.S, problem.end.rows / self.S]
         self.n_start = len(problem.start.rows)
         self.lower, self.upper = self.n_start + 2 * n - 1, 4 * n - 1 - self.n_start
-        self.lu, self.pivots, info = dgbtrf(self._banded(blocks), self.lower, self.upper)
+        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(self._banded(blocks), self.lower, self.upper)
         self.singular = info != 0
 
     def _banded(self, blocks: Array) -> Array:
@@ -218,8 +215,6 @@ class _LinearSystem:
 
     def solve(self, r: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array, Array]:
         """Steps of p, ṗ at the breaks and of K at the stages."""
-        from scipy.linalg.lapack import dgbtrs
-
         (N, s, n), stages = r.shape, self.stages
         K_step = -(stages.E_inverse @ r.reshape(N, s * n, 1)).reshape(N, s, n)
         ends = stages.at_end(p[:-1], v[:-1], K + K_step)
@@ -228,7 +223,9 @@ class _LinearSystem:
             -b.rows @ (np.concatenate([p[k], v[k]]) - b.state)
             for k, b in ((0, self.problem.start), (-1, self.problem.end))
         )
-        x, _ = dgbtrs(self.lu, self.lower, self.upper, np.concatenate([start, gap.ravel(), end]), self.pivots)
+        x, _ = scipy.linalg.lapack.dgbtrs(
+            self.lu, self.lower, self.upper, np.concatenate([start, gap.ravel(), end]), self.pivots
+        )
         y = x.reshape(N + 1, 2 * n) / self.S
         K_step -= (stages.E_inverse @ (stages.G @ y[:-1, :, None])).reshape(N, s, n)
         return y[:, :n], y[:, n:], K_step

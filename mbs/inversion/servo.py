@@ -11,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats, as_list
 from ...common.errors import InputError
+from ...common.libraries import scipy
 from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
@@ -214,9 +215,7 @@ def make_servo(
 
 def through(times: Array, values: Array) -> TimeFunction:
     """Quintic Hermite pieces through values, rates and accelerations (3, T) at `times` (T,), s; outside at rest."""
-    from scipy.interpolate import BPoly, PPoly
-
-    curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(times, values.T))
+    curve = scipy.interpolate.PPoly.from_bernstein_basis(scipy.interpolate.BPoly.from_derivatives(times, values.T))
     pieces = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
     return pieces.held(float(times[0]), float(times[-1]))
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
+from ...common.libraries import scipy
 from ...common.structs import struct
 from .. import _core
 from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
@@ -267,9 +268,9 @@ def _with_fastest(s: ComplexArray, is_enforced: Booleans, *, enforced: bool) -> 
 
 
 def _invariant(A: Array, s: ComplexArray, is_enforced: Booleans) -> Array:
-    from scipy.linalg import schur
-
-    _, U, count = schur(A.T, sort=lambda re, im: bool(is_enforced[np.abs(s - complex(re, abs(im))).argmin()]))
+    _, U, count = scipy.linalg.schur(
+        A.T, sort=lambda re, im: bool(is_enforced[np.abs(s - complex(re, abs(im))).argmin()])
+    )
     return U[:, :count]
 
 

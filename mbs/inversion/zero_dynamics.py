@@ -17,6 +17,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
 from ...common.errors import SolveError
+from ...common.libraries import scipy
 from ...common.structs import struct
 from ..linear.statics import static_shapes
 from ..model.system import MultibodySystem
@@ -158,14 +159,12 @@ class Linearisation:
 
         Ways are shares of sizes, so that those of fast zeros, which pass through infinity, do not outweigh others.
         """
-        from scipy.optimize import linear_sum_assignment
-
         places = np.tile(np.arange(self.zeros.shape[1]), (len(self.zeros), 1))
         jumps = np.zeros(self.zeros.shape[1], dtype=bool)
         for k in range(1, len(places)):
             before, now = self.zeros[k - 1, places[k - 1]][:, None], self.zeros[k]
             ways = np.abs(before - now) / np.maximum(np.abs(before) + np.abs(now), TINY)
-            rows, places[k] = linear_sum_assignment(ways)
+            rows, places[k] = scipy.optimize.linear_sum_assignment(ways)
             if k - 1 in self.singular_after:
                 jumps |= ways[rows, places[k]] > JUMP
         return places, jumps

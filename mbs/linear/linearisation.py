@@ -19,6 +19,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError, SolveError
+from ...common.libraries import scipy
 from ...common.rotations import skew
 from ...common.structs import struct
 from ..model.gears import gear_matrices
@@ -244,8 +245,6 @@ def _coordinates(model: Model) -> tuple[list[str], Array]:
 
 def _independent(model: Model, q: Array) -> Indices:
     """Where s is in v: motors first, then other joints, then modes."""
-    from scipy.linalg import qr
-
     modes = np.flatnonzero(~model.tree.joint_columns)
     motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
@@ -254,7 +253,7 @@ def _independent(model: Model, q: Array) -> Indices:
     for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
         rank, order = 0, np.arange(len(group))
         if len(left) and len(group):
-            Q, R, order = qr(left[:, group], pivoting=True)
+            Q, R, order = scipy.linalg.qr(left[:, group], pivoting=True)
             rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * size))
             left = Q[:, rank:].T @ left
         free.append(np.sort(group[order[rank:]]))

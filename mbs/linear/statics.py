@@ -18,6 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices, as_floats, null_space
 from ...common.errors import SolveError, quoted
+from ...common.libraries import scipy
 from .. import _core
 from ..model.body import Body
 from ..model.known_motion import State
@@ -275,11 +276,9 @@ class Statics:
 
 def _independent(J: Array) -> list[int]:
     """Which rows of J (m, k) do not depend on others: of each set of those that do, the largest."""
-    from scipy.linalg import qr
-
     if not J.size:
         return []
-    R, order = qr(J.T, mode="r", pivoting=True)
+    R, order = scipy.linalg.qr(J.T, mode="r", pivoting=True)
     return sorted(order[: np.count_nonzero(np.abs(np.diag(R)) > INDEPENDENT * np.abs(R[0, 0]))].tolist())
 
 

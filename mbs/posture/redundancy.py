@@ -15,6 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, SolveError
+from ...common.libraries import scipy
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.model import Model, constraint_rates
@@ -92,8 +93,6 @@ def _with_prescribed_joints(model: Model, nodes: Sequence[Node], times: Array, q
 
 def _least_motion(model: Model, q: Array, times: Array) -> Array:
     """Q (T, n_q) from q (n_q,) on, with the least v at every time (D. Whitney, IEEE Trans. MMS-10, 1969)."""
-    from scipy.integrate import solve_ivp  # loaded here: others do not pay for it
-
     if len(times) == 1:
         return q[None]
     scales, places, rest = joint_scales(model), joint_places(model), np.zeros((1, model.tree.n_v))
@@ -114,7 +113,9 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
         q_dot[places] = scales[model.tree.joint_columns] * least
         return q_dot
 
-    run = solve_ivp(rates, (0.0, float(times[-1])), 0 * q, "DOP853", times, rtol=TOLERANCE, atol=TOLERANCE)
+    run = scipy.integrate.solve_ivp(
+        rates, (0.0, float(times[-1])), 0 * q, "DOP853", times, rtol=TOLERANCE, atol=TOLERANCE
+    )
     if run.success:
         return q + run.y.T
     raise ends_at(run.t[-1])
@@ -127,15 +128,11 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
     least over a whole motion: what is least at every time alone makes joints run away (J. M. Hollerbach, K. C. Suh,
     IEEE J. Robotics and Automation 3, 1987).
     """
-    from scipy.integrate import simpson
-    from scipy.interpolate import BSpline
-    from scipy.optimize import least_squares
-
     end, count = float(times[-1]), INTERVALS + 5
     knots = np.concatenate([np.zeros(5), np.linspace(0.0, end, INTERVALS + 1), np.full(5, end)])
-    basis = [BSpline.design_matrix(t, knots, 5).toarray()[:, 2:] for t in (times, times[::STRIDE])]
+    basis = [scipy.interpolate.BSpline.design_matrix(t, knots, 5).toarray()[:, 2:] for t in (times, times[::STRIDE])]
     places, scales = [node.q.start for node in nodes], joint_scales(model)
-    weights = np.sqrt(simpson(np.eye(len(times[::STRIDE])), x=times[::STRIDE]))[:, None] * scales
+    weights = np.sqrt(scipy.integrate.simpson(np.eye(len(times[::STRIDE])), x=times[::STRIDE]))[:, None] * scales
     still, start = np.zeros((3, len(weights), int(np.count_nonzero(~model.tree.joint_columns)))), q[::STRIDE]
 
     def moved(c: Array, which: int) -> Array:
@@ -154,7 +151,7 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
 
     size = 1.0
     size = float(np.linalg.norm(moments(np.zeros((count - 2) * len(places))))) or 1.0
-    best = least_squares(
+    best = scipy.optimize.least_squares(
         moments, np.zeros((count - 2) * len(places)), diff_step=1e-6, ftol=1e-8, xtol=1e-6, max_nfev=MOST_STEPS
     )
     if not best.success:

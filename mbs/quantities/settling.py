@@ -15,6 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array, null_space
 from ...common.errors import InputError, SolveError
+from ...common.libraries import scipy
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..linear.statics import Statics
@@ -88,8 +89,6 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
 
     0 where rows leave the robot free to move, or the equilibrium is unstable.
     """
-    from scipy.linalg import eigh
-
     statics, tree = Statics(model, t), model.tree
     at, still = statics.balance(q, np.arange(tree.n_v)), np.zeros(tree.n_v)
     free = null_space(at.gradient, DEPENDENT)
@@ -102,7 +101,7 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     scale = 1.0 / np.sqrt(np.maximum(own, FLOOR * max(own.max(), np.finfo(float).tiny)))
     if np.linalg.eigvalsh(scale[:, None] * K * scale)[0] < FREE:
         return 0.0
-    return float(np.sqrt(eigh(K, M, eigvals_only=True)[0]) / (2 * np.pi))
+    return float(np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True)[0]) / (2 * np.pi))
 
 
 def end_of_paths(paths: Sequence[Trajectory], analysis: TimedAnalysis) -> float:
@@ -153,8 +152,6 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
 
 def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowest: float) -> dict[str, Settling]:
     """Return the residual vibration of `points` in a run that ends at rest; `lowest` is its frequency, Hz, or NaN."""
-    from scipy.interpolate import CubicHermiteSpline
-
     first = max(int(np.searchsorted(run.time, rest.since, side="right")) - 1, 0)
     after = replace(run, time=run.time[first:], q=run.q[first:], v=run.v[first:])
     still = np.zeros((1, rest.model.tree.n_v))
@@ -162,14 +159,13 @@ def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowe
     settled = {}
     for point in points:
         moving, place = section_motion(after, point), section_motion(at_rest, point).r[0]
-        path = CubicHermiteSpline(after.time, moving.r, moving.velocity)
+        path = scipy.interpolate.CubicHermiteSpline(after.time, moving.r, moving.velocity)
         settled[point] = _settling(path, place, rest.since, tolerance, lowest)
     return settled
 
 
 def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: float, lowest: float) -> Settling:
     """Of a point on its `path` (m, by s), by the distance from its final `place` (d,)."""
-    from scipy.optimize import brentq
 
     def off(t: Array | float) -> Array:
         return np.asarray(np.linalg.norm(path(t) - place, axis=-1))
@@ -185,7 +181,7 @@ def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: f
         time_to = float("nan")
     elif beyond.size:
         near = times[beyond[-1] : beyond[-1] + 2]
-        time_to = float(brentq(lambda t: float(off(t)) - tolerance, *near)) - since
+        time_to = float(scipy.optimize.brentq(lambda t: float(off(t)) - tolerance, *near)) - since
     return Settling(
         residual=residual,
         at_path_end=float(off(since)),

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, quoted
+from ...common.libraries import scipy
 from ..joints.twist_spring import TwistSpring
 from ..model.gears import compliance, elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
@@ -226,28 +227,26 @@ def _read(curve: BSpline | PPoly, time: Array) -> Array:
     return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
 
 
-def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
+def _twist(gear: GearSpring, time: Array, moment: Array) -> scipy.interpolate.BSpline:
     """δ(t) with k(δ) + c δ̇ = `moment` at all outputs: a quintic spline without knots next to the ends.
 
     By Newton, which ends where no output changes its part of the spring. Raises `SolveError` where it does not.
     """
-    from scipy.interpolate import BSpline, make_interp_spline
-    from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
 
-    knots, n = make_interp_spline(time, moment, k=DEGREE).t, len(time)
-    values = BSpline.design_matrix(time, knots, DEGREE)
+    knots, n = scipy.interpolate.make_interp_spline(time, moment, k=DEGREE).t, len(time)
+    values = scipy.interpolate.BSpline.design_matrix(time, knots, DEGREE)
     widths = DEGREE / (knots[DEGREE + 1 : DEGREE + n] - knots[1:n])
-    differences = diags([-widths, widths], [0, 1], shape=(n - 1, n))
-    rates = BSpline.design_matrix(time, knots[1:-1], DEGREE - 1) @ differences
+    differences = scipy.sparse.diags([-widths, widths], [0, 1], shape=(n - 1, n))
+    rates = scipy.interpolate.BSpline.design_matrix(time, knots[1:-1], DEGREE - 1) @ differences
     twist = gear.spring.twist(moment)
     for _ in range(MOST_STEPS):
         slope = gear.spring.slope(twist)
-        left = (diags(slope) @ values + gear.damping * rates).tocsc()
+        left = (scipy.sparse.diags(slope) @ values + gear.damping * rates).tocsc()
         coefficients = spsolve(left, moment - gear.spring.moment(twist) + slope * twist)
         twist = values @ coefficients
         if np.array_equal(gear.spring.slope(twist), slope):
-            return BSpline(knots, coefficients, DEGREE)
+            return scipy.interpolate.BSpline(knots, coefficients, DEGREE)
     raise SolveError(
         f"{gear.where}: expected the twist of its gear within {MOST_STEPS} iterations",
         "none: smooth the path, or refine output_step",

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array, Indices
+from ...common.libraries import scipy
 from ...common.structs import struct
 from ..inversion.collocation import GAUSS
 
 if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
+    pass
 
 
 @struct
@@ -31,15 +32,13 @@ class Curves:
         """Where limits of V or its rate act, as shares of an interval: where it is linear, at breaks alone."""
         return np.zeros(1) if self.order == 0 else np.append(0.0, GAUSS.c)
 
-    def curve(self, u: Array) -> PPoly:
+    def curve(self, u: Array) -> scipy.interpolate.PPoly:
         """V(t) by `u` (N + 1, m (order + 1)) at breaks: the linear derivative, then V and the lower ones."""
-        from scipy.interpolate import PPoly
-
         linear, *lower = np.split(u, self.order + 1, axis=1)
         slope = np.diff(linear, axis=0) / (factorial(self.order + 1) * np.diff(self.breaks)[:, None])
         derivatives = [*lower, linear]
         powers = [derivatives[k][:-1] / factorial(k) for k in range(self.order, -1, -1)]
-        return PPoly(np.array([slope, *powers]), self.breaks)
+        return scipy.interpolate.PPoly(np.array([slope, *powers]), self.breaks)
 
     def parts(self, xi: Array, derivative: int = 0) -> Array:
         """A derivative of V at shares ξ (S,) of intervals, (N, S, order + 2), by what it follows from.

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.libraries import scipy
 from ..inversion.collocation import gauss
 from ..inversion.stable_inversion import halved
 from ..model.model import Model
@@ -26,7 +27,7 @@ from .problem import track
 from .transition import Limits, Tracked, Transition
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline, PPoly
+    from scipy.interpolate import PPoly
 
 TEN = gauss(10)
 REACHES = 1e-6  # of the largest singular value of Φ_V: smaller ones are none
@@ -139,11 +140,11 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
 
 def smooth(asked: Transition, tracked: Tracked) -> Motion:
     """P as a quintic spline at rest at both ends, and voltages that leave as little on modes as patches can."""
-    from scipy.interpolate import make_interp_spline
-
     breaks, elastic = tracked.voltage.x, asked.driven.scale**2
     still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2)]
-    curve = _on(make_interp_spline(breaks, tracked.curve(breaks), k=5, bc_type=(still, still)), breaks)
+    curve = _on(
+        scipy.interpolate.make_interp_spline(breaks, tracked.curve(breaks), k=5, bc_type=(still, still)), breaks
+    )
     times = _nodes(breaks)
     p = curve(times)
     wanted = tracked.voltage(times)
@@ -209,54 +210,46 @@ def _nodes(breaks: Array) -> Array:
     return as_floats((breaks[:-1, None] + np.diff(breaks)[:, None] * TEN.c).ravel())
 
 
-def _through(breaks: Array, values: Array) -> PPoly:
+def _through(breaks: Array, values: Array) -> scipy.interpolate.PPoly:
     """Polynomials through values (N · 10, k) at `_nodes`, without what is rounding: their derivatives are used."""
-    from scipy.interpolate import PPoly
-
     h, at_nodes = np.diff(breaks), values.reshape(len(breaks) - 1, len(TEN.c), -1)
     series: Array = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
     series = as_floats(np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0))
     powers = np.einsum("ij,Njk->iNk", POWERS, series) / h[None, :, None] ** DEGREES[:, None, None]
-    return PPoly(powers[::-1], breaks)
+    return scipy.interpolate.PPoly(powers[::-1], breaks)
 
 
-def _on(curve: PPoly | BSpline, breaks: Array) -> PPoly:
+def _on(curve: scipy.interpolate.PPoly | scipy.interpolate.BSpline, breaks: Array) -> scipy.interpolate.PPoly:
     """The same with pieces between other breaks, which contain its own."""
-    from scipy.interpolate import BSpline, PPoly
-
-    degree = curve.k if isinstance(curve, BSpline) else len(curve.c) - 1
-    return PPoly(np.array([curve(breaks[:-1], order) / factorial(order) for order in range(degree, -1, -1)]), breaks)
-
-
-def _column(curve: PPoly, k: int) -> PPoly:
-    from scipy.interpolate import PPoly
-
-    return PPoly(np.ascontiguousarray(curve.c[:, :, k]), curve.x)
+    degree = curve.k if isinstance(curve, scipy.interpolate.BSpline) else len(curve.c) - 1
+    return scipy.interpolate.PPoly(
+        np.array([curve(breaks[:-1], order) / factorial(order) for order in range(degree, -1, -1)]), breaks
+    )
 
 
-def _held(curve: PPoly, values: Array, lasts: float) -> PPoly:
+def _column(curve: scipy.interpolate.PPoly, k: int) -> scipy.interpolate.PPoly:
+    return scipy.interpolate.PPoly(np.ascontiguousarray(curve.c[:, :, k]), curve.x)
+
+
+def _held(curve: scipy.interpolate.PPoly, values: Array, lasts: float) -> scipy.interpolate.PPoly:
     """The same, and then `values` (k,) for so long (s)."""
-    from scipy.interpolate import PPoly
-
     if not lasts:
         return curve
     still = np.zeros_like(curve.c[:, :1])
     still[-1, 0] = values
-    return PPoly(np.concatenate([curve.c, still], axis=1), np.append(curve.x, curve.x[-1] + lasts))
+    return scipy.interpolate.PPoly(np.concatenate([curve.c, still], axis=1), np.append(curve.x, curve.x[-1] + lasts))
 
 
-def _twist(transmitted: PPoly, stiffness: float, damping: float) -> PPoly:
+def _twist(transmitted: scipy.interpolate.PPoly, stiffness: float, damping: float) -> scipy.interpolate.PPoly:
     """δ with K δ + D δ̇ = τ_s from rest on: Σ (−D/K)^j τ_s^{(j)}/K, and what decays as e^{−K t/D} from each break."""
-    from scipy.interpolate import PPoly
-
     breaks, lag = transmitted.x, damping / stiffness
     series, derivative = transmitted.c / stiffness, transmitted
     if not lag:
-        return PPoly(series, breaks)
+        return scipy.interpolate.PPoly(series, breaks)
     for order in range(1, len(series)):
         derivative = derivative.derivative()
         series[order:] += (-lag) ** order * derivative.c / stiffness
-    steady, h = PPoly(series, breaks), np.diff(breaks)
+    steady, h = scipy.interpolate.PPoly(series, breaks), np.diff(breaks)
     first = series[-1]
     last = np.array([np.polyval(series[:, k], h[k]) for k in range(len(h))])
     none = GONE * float(np.abs(first).max())
@@ -276,4 +269,4 @@ def _twist(transmitted: PPoly, stiffness: float, damping: float) -> PPoly:
     coefficients[degree - len(fine.c) :] = fine.c
     powers = EXPONENTIAL[::-1, None] / lag ** np.arange(len(EXPONENTIAL) - 1, -1, -1.0)[:, None]
     coefficients[degree - len(EXPONENTIAL) :] += powers * np.concatenate(sizes)
-    return PPoly(coefficients, fine.x)
+    return scipy.interpolate.PPoly(coefficients, fine.x)

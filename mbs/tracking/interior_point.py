@@ -17,6 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from ...common.arrays import Array, as_floats
+from ...common.libraries import scipy
 from ...common.structs import struct
 
 MOST_ITERATIONS = 60
@@ -126,23 +127,18 @@ class _Band:
 
 class _Newton:
     def __init__(self, ab: Array, layout: _Layout) -> None:
-        from scipy.linalg.lapack import dgbtrf
-
         self.layout, self.matrix = layout, np.asfortranarray(ab[layout.band :])
-        self.lu, self.pivots, info = dgbtrf(ab, layout.band, layout.band, overwrite_ab=True)
+        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(ab, layout.band, layout.band, overwrite_ab=True)
         self.is_singular = info != 0
 
     def solve(self, right: Array, *, is_refined: bool = True) -> Array:
         """The unknowns, with one step of refinement: close to the end weights span many powers of ten."""
-        from scipy.linalg.blas import dgbmv
-        from scipy.linalg.lapack import dgbtrs
-
         b, size = self.layout.band, self.layout.size
-        solution: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
+        solution: Array = scipy.linalg.lapack.dgbtrs(self.lu, b, b, right, self.pivots)[0]
         if not is_refined:
             return solution
-        left = right - dgbmv(m=size, n=size, kl=b, ku=b, alpha=1.0, a=self.matrix, x=solution)
-        return solution + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
+        left = right - scipy.linalg.blas.dgbmv(m=size, n=size, kl=b, ku=b, alpha=1.0, a=self.matrix, x=solution)
+        return solution + as_floats(scipy.linalg.lapack.dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 
 def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:

@@ -14,6 +14,7 @@ import numpy as np
 from ...common.arrays import Array, Integers, as_list, as_rows
 from ...common.errors import InputError, blaming_file, quoted
 from ...common.extras import extras
+from ...common.libraries import scipy
 from ...common.tables import LARGEST, as_csv, shown
 from ...common.toml_files import read_text
 from ...mbs.fields.waypoints import Recorded, Waypoints
@@ -278,8 +279,6 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record
     if len(times) < 2:
         raise InputError("expected joints that are recorded at the same time", f"none for {quoted(series)}")
     if apart:
-        from scipy.interpolate import CubicSpline
-
         whole = (times[-1] - times[0]) / NANO
         remarks.append(
             f"{quoted(map(shown, apart))}: in other messages: by cubic splines at times of the others, the"
@@ -292,6 +291,6 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record
             continue
         once = np.append(True, np.diff(at) > 0)
         own = (at[once] - times[0]) / NANO
-        columns.append(CubicSpline(own, values[once])((times - times[0]) / NANO))
+        columns.append(scipy.interpolate.CubicSpline(own, values[once])((times - times[0]) / NANO))
     table = np.stack([(times - times[0]) / NANO, *columns], axis=1)
     return _record(list(series), [(row[0], row[1:]) for row in as_rows(table)], [None], *remarks)
