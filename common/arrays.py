@@ -31,10 +31,7 @@ def as_rows(values: NDArray[Any]) -> list[list[Any]]:
     return cast(list[list[Any]], values.tolist())
 
 
-def null_space(J: Array, tolerance: float, least: float = 0.0) -> Array:
-    """Orthonormal columns (k, m) that J (r, k) takes to zero: to `tolerance` of its largest singular value.
-
-    Singular values are not compared with less than `least`.
-    """
+def null_space(J: Array, tolerance: float) -> Array:
+    """Orthonormal columns (k, m) that J (r, k) takes to zero: to `tolerance` of its largest singular value."""
     _, sizes, V = np.linalg.svd(J)
-    return as_floats(V[np.count_nonzero(sizes > tolerance * sizes.max(initial=least)) :].T)
+    return as_floats(V[np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)) :].T)

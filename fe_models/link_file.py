@@ -113,8 +113,13 @@ def _check_beam_interfaces(link: BeamLink, path: Path) -> None:
                 _reject(path, key.format("position"), "none: it is an end of the beam", interface.position)
         elif not isinstance(interface.position, float):
             _reject(path, key.format("position"), "one number, m from the root", interface.position)
-        elif interface.position > link.geometry.length:
-            _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
+        else:
+            _check_within(link, interface.position, path, key)
+
+
+def _check_within(link: Link, position: float, path: Path, key: str) -> None:
+    if position > link.geometry.length:
+        _reject(path, key.format("position"), f"within the length, {link.geometry.length}", position)
 
 
 def _check_places(link: Link, path: Path) -> None:
@@ -221,8 +226,7 @@ def _check_solid_interfaces(link: SolidLink, path: Path) -> None:
         if isinstance(interface.position, tuple) and interface.normal is None:
             _reject(path, key.format("normal"), "the outward normal of the face at position", "none")
         if isinstance(interface.position, float):
-            if interface.position > link.geometry.length:
-                _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
+            _check_within(link, interface.position, path, key)
             if interface.coupling == "rigid":
                 _reject(path, key.format("coupling"), '"mean" for a cross section inside the part', '"rigid"')
         is_supported = interface.name == "root" or (interface.name == "tip" and not link.reference.holds_root)

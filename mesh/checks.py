@@ -76,7 +76,7 @@ def check_neighbours(part: PartMesh, where: str) -> None:
 
     Else three cells or more have a facet, or two on the same side of it: some lie in one another.
     """
-    facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
+    facets = part.cell_facets
     smallest = np.argmin(facets, axis=1)[:, None]
     sides, rows = facets.shape[1], np.arange(len(facets))[:, None]
     after, before = facets[rows, (smallest + 1) % sides], facets[rows, (smallest - 1) % sides]
@@ -93,8 +93,7 @@ def check_neighbours(part: PartMesh, where: str) -> None:
 
 def check_connected(part: PartMesh, where: str) -> None:
     """Raise `InputError` unless the cells are connected by their faces."""
-    facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
-    _, number = np.unique(facet_keys(facets, len(part.points)), return_inverse=True)
+    _, number = np.unique(facet_keys(part.cell_facets, len(part.points)), return_inverse=True)
     cell = np.repeat(np.arange(len(part.cells)), len(part.shape.facets))
     incidence = sp.csr_matrix((np.ones(cell.size, dtype=np.int8), (cell, number)))
     count, piece = connected_components(incidence @ incidence.T, directed=False)

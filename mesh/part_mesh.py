@@ -43,6 +43,12 @@ class PartMesh:
         """Corners (c, 4 or 8) of each cell."""
         return self.cells[:, : len(self.shape.corners)]
 
+    @property
+    def cell_facets(self) -> Integers:
+        """Corners (f, 3 or 4) of the facets of all cells, cell by cell."""
+        facets = self.shape.facets
+        return self.corners[:, facets].reshape(-1, facets.shape[1])
+
     def moved(self, points: Array) -> PartMesh:
         """Return the mesh with other `points` (p, 3), m."""
         return replace(self, points=points)
@@ -59,7 +65,7 @@ def facet_keys(facets: Integers, points: int) -> Integers:
 
 def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
     """Return corners (b, 3 or 4) of facets of one cell only, counter-clockwise from outside, and their cells (b,)."""
-    facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
+    facets = part.cell_facets
     _, first, count = np.unique(facet_keys(facets, len(part.points)), return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])
     return facets[alone], alone // len(part.shape.facets)

@@ -301,9 +301,9 @@ def _step(at: Balance, K: Array, free: Indices) -> Array:
     return as_floats(np.linalg.lstsq(matrix, right, rcond=SINGULAR)[0][: len(free)] * scale)
 
 
-def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
-    """The equilibrium at time t near `start`; v is kept on Ċ = 0. Raises `SolveError` where there is none near it."""
-    return with_rates(model, Statics(model, t).equilibrium(start.q), start.v, t)
+def static_equilibrium(model: Model, start: State) -> State:
+    """The equilibrium at t = 0 near `start`; v is kept on Ċ = 0. Raises `SolveError` where there is none near it."""
+    return with_rates(model, Statics(model, 0.0).equilibrium(start.q), start.v, 0.0)
 
 
 def static_shapes(
