@@ -29,14 +29,16 @@ between = ["arm.tip", "hand.root"]
 
 @pytest.fixture
 def scene(tmp_path):
-    """The soft arm of the page, its text changed by pairs."""
+    """The soft arm of the page, its text changed by pairs; `alone`: without the replays."""
     blocks = dict(re.findall(r"`(\w+\.toml)`:\n\n```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
 
-    def write(*changes, link=()):
+    def write(*changes, link=(), alone=False):
         for name, text in blocks.items():
             for old, new in changes if name == "scene.toml" else link:
                 assert old in text
                 text = text.replace(old, new)
+            if alone and name == "scene.toml":
+                text = text[: text.index("[[analysis]]", text.index('name = "carried"'))]
             (tmp_path / name).write_text(text, encoding="utf-8")
         return tmp_path / "scene.toml"
 
@@ -92,7 +94,7 @@ def test_replay_stays_within_the_path_tolerance(scene):
         assert np.abs(rate[-1]).max() < 1e-4 * np.abs(rate).max()
         assert np.abs(modal[-1]).max() < 1e-4 * np.abs(modal).max()
     changes = ("limit = 200.0", "limit = 100.0"), ("tolerance = 1e-4", "tolerance = 1e-4\npath_tolerance = 1e-3")
-    with ffrobot.solve(scene(*changes)) as results:
+    with ffrobot.solve(scene(*changes, alone=True)) as results:
         about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
         assert about["least_voltage"] == 0.0
         assert results.peak("carried/pzt/arm/required_voltage")[0] < 1e-4
@@ -103,7 +105,7 @@ def test_replay_stays_within_the_path_tolerance(scene):
 
 def test_limits_that_are_too_small(scene):
     """The least voltage is found all the same, and said."""
-    path = scene(("limit = 200.0", "limit = 100.0"))
+    path = scene(("limit = 200.0", "limit = 100.0"), alone=True)
     with ffrobot.solve(path) as results:
         about = results.attributes("carried/tracking")
         assert about["objective"] == "least-voltage"
@@ -122,7 +124,7 @@ def test_limits_that_are_too_small(scene):
         [("tolerance = 1e-4", f"tolerance = 1e-4\npath_tolerance = {wider}")],
         [("/0.6", f"/{longer}"), ("end = 0.6", f"end = {longer}"), ("output_step = 0.002", f"output_step = {longer}")],
     ):
-        with ffrobot.solve(scene(("limit = 200.0", "limit = 100.0"), *changes)) as results:
+        with ffrobot.solve(scene(("limit = 200.0", "limit = 100.0"), *changes, alone=True)) as results:
             about = results.attributes("carried/tracking")
             assert about["objective"] == "effort"
             assert 0.9 < about["least_share"] <= 1.0
@@ -136,7 +138,7 @@ def test_patches_that_are_not_needed(scene):
         assert about["without_patches"] == pytest.approx(off_path(results, "without_patches"), rel=0.05)
         assert not about["is_needed"]
         assert any("patches are not needed" in text for text in verdict.advice)
-    with ffrobot.solve(scene()) as results:
+    with ffrobot.solve(scene(alone=True)) as results:
         about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
         assert about["is_needed"]
         assert not verdict.advice
@@ -151,7 +153,7 @@ def test_patches_that_are_not_needed(scene):
 
 def test_twice_the_modes(scene):
     """Spill-over, and the least voltage with four modes: 139.7 V by the prototype's mesh and free ends."""
-    with ffrobot.solve(scene(("tolerance = 1e-4", 'tolerance = 1e-4\ncheck = "finer"'))) as results:
+    with ffrobot.solve(scene(("tolerance = 1e-4", 'tolerance = 1e-4\ncheck = "finer"'), alone=True)) as results:
         about = results.attributes("carried")
         assert about["check_least_voltage"] == pytest.approx(139.7, rel=0.03)
         assert 1e-6 < about["check_error"] < 3e-4
@@ -168,7 +170,7 @@ def test_twice_the_modes(scene):
 )
 def test_what_takes_more_voltage(scene, changes, text):
     """It is said, and no answer calls it feasible; the patches are twice to ten times too weak."""
-    with ffrobot.solve(scene(*changes)) as results:
+    with ffrobot.solve(scene(*changes, alone=True)) as results:
         assert any(text in warning for warning in results.warnings["carried"])
         assert results.verdict["carried"].feasible is False
         assert results.attributes("carried/tracking")["least_share"] > 1.8
@@ -190,7 +192,8 @@ def test_far_beyond_the_limits_is_said_before_the_search(scene):
 def test_least_voltage_that_does_not_settle(scene, timing, is_said):
     """Where acceleration jumps: a warning says by how much it may be lower, where that is more than 6 %."""
     weights = "tolerance = 1e-4\nweights = { voltage = 200.0 }"
-    with ffrobot.solve(scene((SEPTIC, timing), ("limit = 200.0 ", "limit = 400.0 "), (TOLERANCE, weights))) as results:
+    changes = (SEPTIC, timing), ("limit = 200.0 ", "limit = 400.0 "), (TOLERANCE, weights)
+    with ffrobot.solve(scene(*changes, alone=True)) as results:
         about = results.attributes("carried/tracking")
         doubt = about["least_voltage_doubt"] / about["least_voltage"]
         said = [warning for warning in results.warnings["carried"] if "did not settle" in warning]
@@ -202,7 +205,7 @@ def test_least_voltage_that_does_not_settle(scene, timing, is_said):
 @pytest.mark.parametrize("limit", [1.07, *(pytest.param(x, marks=pytest.mark.nightly) for x in (1.1, 1.09))])
 def test_motors_at_their_limits(scene, limit):
     """Torques and voltages stay within both limits, between Gauss points, too; in many intervals all four are at it."""
-    with ffrobot.solve(scene(("moment_limit = 2.0", f"moment_limit = {limit}"))) as results:
+    with ffrobot.solve(scene(("moment_limit = 2.0", f"moment_limit = {limit}"), alone=True)) as results:
         assert results.attributes("carried/tracking")["objective"] == "effort"
         assert results["carried/tracking/torque_price/hub"].max() > 1e-6
         assert 0.999 * limit < results.peak("carried/joints/hub/moment")[0] <= limit
@@ -212,7 +215,8 @@ def test_motors_at_their_limits(scene, limit):
 
 def test_least_voltage_is_an_answer(scene):
     """Forces that the mesh leaves, within the tolerance, are none that actuators lack."""
-    with ffrobot.solve(scene(("tolerance = 1e-4", 'objective = "least-voltage"\ntolerance = 1e-4'))) as results:
+    change = "tolerance = 1e-4", 'objective = "least-voltage"\ntolerance = 1e-4'
+    with ffrobot.solve(scene(change, alone=True)) as results:
         assert results.verdict["carried"].feasible
         assert not any("no actuator provides" in text for text in results.warnings["carried"])
 
@@ -222,7 +226,7 @@ def test_time_before_and_after_lowers_voltages(scene):
     shares = []
     for time in (0.0, 0.02):
         keys = f'objective = "least-voltage"\npre_actuation = {time}\npost_actuation = {time}\ntolerance = 1e-4'
-        path = scene(("tolerance = 1e-4", keys))
+        path = scene(("tolerance = 1e-4", keys), alone=True)
         with ffrobot.solve(path) as results:
             shares.append(float(results.attributes("carried/tracking")["least_share"]))
             assert off_path_of_first(results) < 1e-9
