@@ -31,10 +31,10 @@ from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..sweep.sweep import Key
+from .derivatives import weights
 from .designs import Design, Designs, Point, in_words, repeated_steps
 from .readings import Followed, Reading
 from .responses import KEPT, DesignProblem
-from .sensitivity import weights
 from .variables import DesignSpace, Place
 
 

@@ -4,21 +4,18 @@ Where integrations can be repeated, runs beside the scene's own take its steps a
 noise of their differences is round-off, 1e-13 to 1e-11 of a response after thousands of steps and with new modes of
 links. Truncation grows with the number of periods that vibrations pass through. So the
 steps of every key are small, three of two sizes (`THREE`), which check each other. Others follow where derivatives err
-by more than `AIM`.
+by more than `derivatives.AIM`.
 
 Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
 integrated with a tighter tolerance than the scene's. Where errors are above `AIM` and still fall with smaller steps,
-steps of a quarter follow, twice at most. The derivative is that of the polynomial through the values, exact for n − 1
-as its degree (Fornberg, Mathematics of Computation 51, 1988): with such pairs Richardson's extrapolation, of order h⁶.
+steps of a quarter follow, twice at most.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,198 +24,11 @@ from ..common.errors import InputError
 from ..pictures.studies.study import Bars, Series
 from ..sweep.files import number_at
 from ..sweep.sweep import Key
-from .designs import Designs, Point, Runs, changes_for, may_repeat, parse_key, repeated_steps
+from .derivatives import Base, Entry, Sample, entries, rough_keys
+from .designs import Designs, Runs, changes_for, may_repeat, parse_key, repeated_steps
 from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, numbers
-from .readings import Followed, Reading, Response
+from .readings import Reading, Response
 from .responses import parse_response
-
-LEVELS = 3  # sizes of steps that one extrapolation takes at most
-NOISE = 3.0  # times what one divided difference says of it: with luck it says little
-ROUND_OFF = float(np.finfo(np.float64).eps)
-
-
-class Derivative(NamedTuple):
-    """A derivative, the estimate of its error, and the largest step it was made with; NaN where there is none."""
-
-    value: float
-    error: float
-    step: float
-
-
-def weights(offsets: Array) -> Array:
-    """Return weights w (n,) of f'(0) ≈ Σ w_i f(x_i): Σ w_i x_iᵏ is 1 for k = 1 and 0 for other k < n."""
-    size = np.abs(offsets).max()
-    powers = np.vander(offsets / size, increasing=True).T
-    first = np.zeros(len(offsets))
-    first[1] = 1.0
-    return as_floats(np.linalg.solve(powers, first) / size)
-
-
-def derivative(offsets: Array, values: Array) -> Derivative:
-    """Return the derivative at 0 from `values` (n,) at `offsets` (n,); NaN values are omitted.
-
-    Steps are taken two and three sizes at a time; those whose estimate of the error is least make the derivative
-    (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
-    """
-    known = np.isfinite(values)
-    offsets, values = offsets[known], values[known]
-    sizes = np.unique(np.abs(offsets[offsets != 0.0]))[::-1]
-    best = Derivative(np.nan, np.nan, np.nan)
-    for first, last in combinations(range(sizes.size + 1), 2):
-        estimate = _of_window(offsets, values, sizes[first:last]) if last - first <= LEVELS else None
-        if estimate is not None and not estimate.error >= best.error:
-            best = estimate
-    return best
-
-
-def _of_window(offsets: Array, values: Array, sizes: Array) -> Derivative | None:
-    """With steps of these `sizes`, the largest first, and no step.
-
-    The estimate of the error has two parts. Truncation: how far the derivative without the largest steps is off, which
-    is of lower order. Noise of the values: by their divided difference of the highest order, which hardly knows of
-    anything else.
-    """
-    if sizes.size < 2:
-        return None
-    taken = np.isin(np.abs(offsets), [0.0, *sizes])
-    x, f = offsets[taken], values[taken]
-    inner = np.abs(x) < sizes[0]
-    f = f - f[np.argmin(np.abs(x))]  # round-off of differences, not of values
-    w, u = weights(x), _highest(x)
-    whole, truncation = float(w @ f), abs(float(w @ f - weights(x[inner]) @ f[inner]))
-    noise = NOISE * abs(float(u @ f)) / float(np.abs(u).sum()) + ROUND_OFF * float(np.abs(values[taken]).max())
-    return Derivative(whole, truncation + noise * float(np.abs(w).sum()), float(sizes[0]))
-
-
-def _highest(offsets: Array) -> Array:
-    """Weights (n,) of the divided difference of order n − 1: 0 of all polynomials of lower degree."""
-    x = offsets / np.abs(offsets).max()
-    apart = x[:, None] - x[None, :] + np.eye(x.size)
-    return as_floats(1.0 / np.prod(apart, axis=1))
-
-
-AIM = 1e-5  # estimated error, of the largest percent per percent of a response, or of 1, that needs no other steps
-RESOLVING = 8.0  # times nearer are values between outputs, at least, than with every second output
-ROUGH = 1e-2  # of a derivative: beyond, the response is hardly smooth
-
-
-@dataclass(frozen=True)
-class Base:
-    """Where derivatives are taken: k `keys` with their values `point`, and g `responses` with their `readings`.
-
-    `steps` (k) are the largest ones. `repeats`: the tolerance of runs that take the steps of the scene's own again; 0
-    where they choose their own. `again`: the changes of their scenes with which they do.
-    """
-
-    responses: tuple[Response, ...]
-    readings: tuple[Reading, ...]
-    keys: tuple[Key, ...]
-    point: Point
-    steps: tuple[float, ...]
-    repeats: float = 0.0
-    again: Mapping[Key, Any] = field(default_factory=dict)
-
-    def moved(self, k: int, offset: float) -> Point:
-        """The point with one value changed."""
-        return (*self.point[:k], self.point[k] + offset, *self.point[k + 1 :])
-
-
-@dataclass(frozen=True)
-class Sample:
-    """Key number `k` changed by `offset`: the responses there, none where the run failed, and why it did."""
-
-    k: int
-    offset: float
-    responses: tuple[Followed, ...]
-    failure: str = ""
-
-
-Method = Literal["differences", "repeated steps", "one-sided", "none"]
-"""How a derivative was found; "repeated steps": differences of runs with the same steps of integration."""
-
-
-@dataclass(frozen=True)
-class Entry:
-    """∂response/∂key with the estimate of its error, both in SI units, NaN where there is none.
-
-    `method`: one of `Method`; `step`: the largest one used; `notes`: restrictions; `unresolved`: the part of the error
-    due to the distance of outputs, which no other step reduces.
-    """
-
-    derivative: float
-    error: float
-    step: float
-    method: Method
-    notes: tuple[str, ...] = ()
-    unresolved: float = 0.0
-
-
-def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], ...]:
-    """Return derivatives as rows by response and columns by key."""
-    return tuple(tuple(_entry(base, g, k, samples) for k in range(len(base.keys))) for g in range(len(base.responses)))
-
-
-def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
-    """Numbers of keys with an error above `AIM`, where the least error is that of the smallest (or largest) step."""
-    rough, rows = set(), entries(base, samples)
-    for g, row in enumerate(rows):
-        largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
-        for k, one in enumerate(row):
-            sizes = sorted({abs(each.offset) for each in samples if each.k == k and each.responses}, reverse=True)
-            is_good = _relative(one.error - one.unresolved, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
-            if sizes and not is_good and np.isclose(abs(one.step), sizes[-LEVELS:][0] if smaller else sizes[0]):
-                rough.add(k)
-    return sorted(rough)
-
-
-def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
-    samples = [one for one in all_samples if one.k == k]
-    whole = [one for one in samples if one.responses and np.isfinite(one.responses[g].value)]
-    offsets = np.array([0.0, *(one.offset for one in whole)])
-    nominal, beside = base.readings[g], [one.responses[g] for one in whole]
-    slope = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
-    by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
-    unresolved = abs(by_coarse - slope.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
-    # Steps that are the same for all runs err alike: no difference of runs tells of that.
-    size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
-    slope = slope._replace(error=slope.error + unresolved + base.repeats * max(abs(slope.value), size))
-    notes = [*_notes(base, g, k, samples)]
-    if _is_rough(base, g, k, slope.error - unresolved, slope.value):
-        notes.append("not smooth, or noisy: half of the step yields another derivative")
-    if _is_rough(base, g, k, unresolved, slope.value):
-        notes.append("the peak lies between outputs that are too far apart: take a smaller output_step")
-    return Entry(*slope, _method(base, offsets, slope.value), tuple(notes), unresolved)
-
-
-def _method(base: Base, offsets: Array, value: float) -> Method:
-    if np.isnan(value):
-        return "none"
-    if not offsets.min() < 0.0 < offsets.max():
-        return "one-sided"
-    return "repeated steps" if base.repeats else "differences"
-
-
-def _notes(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Iterator[str]:
-    nearest = sorted(samples, key=lambda one: abs(one.offset))
-    name = ".".join(base.keys[k])
-
-    def at(one: Sample) -> str:
-        return f"with {name} = {base.point[k] + one.offset:.6g}"
-
-    if failed := next((one for one in nearest if one.failure), None):
-        yield f"{at(failed)}: {failed.failure}"
-    if jump := next((one for one in nearest if one.responses and one.responses[g].elsewhere), None):
-        yield f"a kink: {at(jump)} the largest value is {jump.responses[g].elsewhere}"
-
-
-def _is_rough(base: Base, g: int, k: int, error: float, value: float) -> bool:
-    return _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(value)
-
-
-def _relative(error: float, base: Base, g: int, k: int) -> float:
-    """|`error`| of percent per percent; of a response or a key that is 0 in its unit."""
-    return abs(error) * (abs(base.point[k]) or 1.0) / (abs(base.readings[g].value) or 1.0)
-
 
 COLUMNS = (
     "response",

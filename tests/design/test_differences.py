@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ffrobot.design.sensitivity import derivative, weights
+from ffrobot.design.derivatives import derivative, weights
 
 LADDER = np.array([1.0, 0.5, 0.25])
 CENTRAL = np.concatenate([[0.0], LADDER, -LADDER])
