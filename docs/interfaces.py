@@ -16,7 +16,7 @@ from ffrobot.cli import cli
 from ffrobot.design.optimise import Front
 from ffrobot.design.optimum_record import Optimum
 from ffrobot.design.sensitivity import Sensitivity
-from ffrobot.design.uncertainty import Uncertainty
+from ffrobot.design.uncertainty_record import Uncertainty
 from ffrobot.fe_models.link import LinkOutcome
 from ffrobot.fit.fitting import Fit
 from ffrobot.fit.frf_fit import PoseComparison, ResponseFit

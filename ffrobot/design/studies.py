@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .optimise import Front
     from .optimum_record import Optimum
     from .sensitivity import Sensitivity
-    from .uncertainty import Uncertainty
+    from .uncertainty_record import Uncertainty
 
 P = ParamSpec("P")
 R = TypeVar("R")

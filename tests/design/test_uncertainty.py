@@ -17,7 +17,7 @@ from ffrobot.design.spreads import (
     sobol_indices,
     statistics,
 )
-from ffrobot.design.uncertainty import with_error
+from ffrobot.design.uncertainty_record import with_error
 
 MOMENT = "joints.shoulder.moment"
 SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])

@@ -1,0 +1,230 @@
+"""What `ffrobot uncertainty` has found, as texts, tables and diagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..common.arrays import Array
+from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
+from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
+from .readings import Reading
+from .spreads import (
+    NAMES,
+    Indices,
+    Spread,
+    SpreadStatistics,
+)
+
+LinearOrSampled = Literal["samples", "gradients"]
+ROUND_OFF = 1e-13  # of a response: smaller deviations are none
+UNCHANGED = "none of the keys changes it"
+LINEAR = 0.9  # of a variance: below, a note says that shares by regression are small
+BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
+WORST = {"samples": "lowest and highest sample", "gradients": "keys at their worse ends (linear)"}
+
+
+@dataclass(frozen=True)
+class HistoryBand:
+    """A history's statistics at `time` (T,), s; `nominal` (T,) with all keys at the middle of their spreads."""
+
+    name: str
+    unit: str
+    time: Array
+    nominal: Array
+    statistics: SpreadStatistics
+
+
+@dataclass(frozen=True)
+class Uncertainty(Finding):
+    """Statistics of g responses and some histories for k uncertain keys.
+
+    Attributes:
+        scene: its file.
+        spreads: (k,) distributions of the keys.
+        method: samples or gradients.
+        responses, readings: (g,) the responses, and their values with all keys at nominal values.
+        statistics: (g,) of the responses.
+        bands: of the histories.
+        shares: (g, k) shares of the variance by the linear part; `explained` (g,) is their sum, NaN by gradients.
+        indices: Sobol indices, if requested.
+        samples: (n, g) the responses, NaN for failed runs; (0, g) by gradients.
+        failures: failed runs in words; `runs` is the number of all, `table` their file.
+        notes: peaks between outputs; peaks that others exceed near the nominal values (by gradients).
+    """
+
+    name = "uncertainty"
+    title = "Uncertainty"
+
+    scene: Path
+    spreads: tuple[Spread, ...]
+    method: LinearOrSampled
+    responses: tuple[str, ...]
+    readings: tuple[Reading, ...]
+    statistics: SpreadStatistics
+    bands: tuple[HistoryBand, ...]
+    shares: Array
+    explained: Array
+    indices: Indices | None
+    samples: Array
+    failures: tuple[str, ...]
+    notes: tuple[str, ...]
+    runs: int
+    table: Path | None
+
+    def headline(self) -> str:
+        """Intervals of the responses, in one line."""
+        texts = []
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+            low, _, high = self.statistics.quantiles[:, g]
+            texts.append(
+                f"{response}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})"
+            )
+        return "; ".join([*texts, *(f"band of {band.name}" for band in self.bands)])
+
+    def sections(self) -> Iterator[TextTable]:
+        """Tables of each response with the influence of the keys, then the bands."""
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+            heading = (*self.statistics.named, "worst case")
+            nominal = f"{response}: {reading.in_words()} with all parameters at nominal values"
+            yield TextTable(heading, [self._statistics_row(g)], line=nominal)
+            yield self._parts(g)
+        if self.bands:
+            yield TextTable(BAND_HEADINGS, self._band_rows())
+
+    def report_tables(self) -> Iterator[StudyTable]:
+        """The statistics of all responses in one table."""
+        if self.responses:
+            rows = [
+                (response, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
+                for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True))
+            ]
+            heading = ("response", "unit", "nominal", *self.statistics.named, "worst case")
+            yield TextTable(heading, rows).for_report()
+        yield from (self._parts(g).for_report() for g in range(len(self.responses)))
+        if self.bands:
+            yield TextTable(BAND_HEADINGS, self._band_rows()).for_report()
+
+    def _statistics_row(self, g: int) -> tuple[str, ...]:
+        s = self.statistics
+        cells = (with_error(value[g], error[g]) for value, error in s.named.values())
+        return (*cells, f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
+
+    def _parts(self, g: int) -> TextTable:
+        """The keys' shares of the variance of response g, the largest first; Sobol indices where known."""
+        rows = []
+        for k in self.ranked(g):
+            one = self.spreads[k]
+            cells = [f"{100.0 * self.shares[g, k]:.1f} %"]
+            if i := self.indices:
+                pairs = ((i.first, i.first_error), (i.total, i.total_error))
+                cells = [f"{with_error(100.0 * part[g, k], 100.0 * error[g, k])} %" for part, error in pairs]
+            rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
+        parts = ("alone", "with others") if self.indices else ("share of the variance",)
+        return TextTable(("key", "spread", *parts), rows, of=self.responses[g])
+
+    def ranked(self, g: int) -> list[int]:
+        """Key numbers by decreasing influence on response g."""
+        by = self.indices.total[g] if self.indices else self.shares[g]
+        return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
+
+    def _band_rows(self) -> Iterator[tuple[str, ...]]:
+        for band in self.bands:
+            width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
+            cells: list[str] = []
+            for values in (band.statistics.deviation, width):
+                k = int(np.argmax(values))
+                cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
+            yield (band.name, band.unit, *cells)
+
+    def remarks(self) -> Iterator[str]:
+        """Notes on the accuracy, failed runs, and the method."""
+        deviations = self.statistics.deviation
+        for response, reading, explained, deviation in zip(
+            self.responses, self.readings, self.explained, deviations, strict=True
+        ):
+            if deviation <= ROUND_OFF * abs(reading.value):
+                yield f"note       {response}: {UNCHANGED}"
+            if explained < LINEAR and self.indices is None:
+                yield (
+                    f"note       {response}: linear effects of keys make up {100 * explained:.0f} % of the variance:"
+                    " --indices computes the effect of each, alone and with others"
+                )
+        yield from (f"note       {text}" for text in self.notes)
+        yield from failed_runs(self.failures, self.runs)
+        how = (
+            "± the standard error of as many independent samples: the mean of a Latin hypercube is better; worst case:"
+            " the lowest and the highest sample"
+        )
+        if self.method == "gradients":
+            how = (
+                "linear between runs one standard deviation to both sides; ± the difference that curvature makes; worst"
+                " case: all keys at the worse ends of their spreads, normal ones two deviations off"
+            )
+        yield f"how        {self.runs} runs; {how}"
+
+    def csv_files(self) -> Iterator[CsvFile]:
+        """CSV tables with one line for each response, and for each time of a history."""
+        if self.responses:
+            yield CsvFile("uncertainty.csv", "table of uncertainties", self._response_columns(), self._response_rows())
+        for band in self.bands:
+            lines = ([t, band.nominal[k], *band.statistics.numbers(k)] for k, t in enumerate(band.time))
+            columns = ("time", "nominal", *band.statistics.columns)
+            yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", columns, lines)
+
+    def _response_columns(self) -> list[str]:
+        keys = [".".join(one.key) for one in self.spreads]
+        parts = [f"share {key}" for key in keys]
+        if self.indices:
+            parts += [f"{word} {key}" for word in ("first", "first_error", "total", "total_error") for key in keys]
+        return ["response", "unit", "middle", *self.statistics.columns, "linear", *parts]
+
+    def _response_rows(self) -> Iterator[list[object]]:
+        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+            parts = list(self.shares[g])
+            if i := self.indices:
+                parts += [*i.first[g], *i.first_error[g], *i.total[g], *i.total_error[g]]
+            yield [response, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
+
+    def diagrams(self) -> list[Diagram]:
+        """Diagrams of the ranking of keys for each response, and of the bands."""
+        return [*(self._ranking(g) for g in range(len(self.responses))), *map(self._band, self.bands)]
+
+    def _ranking(self, g: int) -> Bars:
+        order = self.ranked(g)
+        if i := self.indices:
+            pairs = {"alone": (i.first, i.first_error), "with others": (i.total, i.total_error)}
+            series = [
+                Series(label=label, values=numbers(100.0 * value[g, order]), errors=floats(100.0 * error[g, order]))
+                for label, (value, error) in pairs.items()
+            ]
+        else:
+            series = [Series(values=numbers(100.0 * self.shares[g, order]))]
+        return Bars(
+            name=f"ranking_{file_name(self.responses[g])}",
+            title=self.responses[g],
+            x_label="Sobol index (%)" if self.indices else "share of the variance (%)",
+            labels=tuple(".".join(self.spreads[k].key) for k in order),
+            series=tuple(series),
+        )
+
+    def _band(self, band: HistoryBand) -> Band:
+        low, median, high = band.statistics.quantiles
+        return Band(
+            name=f"band_{file_name(band.name)}", title=band.name,
+            y_label=with_unit(band.name.rpartition(".")[2], band.unit),
+            time=floats(band.time), nominal=floats(band.nominal), median=floats(median), low=floats(low),
+            high=floats(high), lowest=floats(band.statistics.lowest), highest=floats(band.statistics.highest),
+            band_label=f"{NAMES[0]} to {NAMES[-1]}", worst_label=WORST[self.method],
+        )  # fmt: skip
+
+
+def with_error(value: float, error: float) -> str:
+    """Return `0.173 ± 0.01`: digits down to a tenth of the error, no more than five; empty if the value is NaN."""
+    known = np.floor(np.log10(abs(value) / error)) + 2 if value and error > 0.0 else 5
+    digits = ((value, int(np.clip(known, 1, 5))), (error, 1))
+    return "" if np.isnan(value) else " ± ".join(f"{float(f'{one:.{count}g}'):g}" for one, count in digits)
