@@ -49,7 +49,8 @@ class RigidArm:
         freedom, count = rigid_freedom(model), sum(len(columns) for columns in model.motors.values())
         if count != freedom:
             raise InputError(
-                f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them)", count
+                f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them)",
+                f"{count}; name them with motor = true",
             )
         scene = model.scene.model_copy(update={"load": (), "trajectory": ()})
         free = build_model(scene, [_rigid(node.body) for node in model.tree.nodes])

@@ -353,6 +353,4 @@ def _unmet_needs(scene: SceneKeys, analysis: Analysis) -> Iterator[str]:
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
     # Linear models of 3D scenes may have no inputs.
     if scene.is_planar and analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
-        yield (
-            f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: nothing to control the robot with'
-        )
+        yield f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: name joints with motor = true'
