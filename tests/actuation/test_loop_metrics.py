@@ -1,13 +1,15 @@
 """Vibration and overshoot of closed loops: closed forms, and arms that ring below 10 Hz in plane and space."""
 
 import warnings
+from time import process_time
 
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from scipy.signal import savgol_filter
 
 import ffrobot
-from ffrobot.actuation.control.metrics import overshoot, ringing, settling, vibration, watched
+from ffrobot.actuation.control.metrics import overshoot, ringing, settling, slow_part, vibration, watched
 
 TIME = np.linspace(0.0, 2.0, 2001)
 TRAVEL = np.column_stack([np.clip(TIME / 0.3, 0.0, 1.0), 0.0 * TIME])
@@ -127,3 +129,16 @@ def test_an_arm_that_rings_below_ten_hertz_is_said_to(space, thickness, hertz):
     assert found[0] == pytest.approx(found[1], rel=5e-3)  # feed-forward is that of the outputs' spline
     if not space:
         assert found[0][0] == pytest.approx(0.051, rel=0.02)
+
+
+@pytest.mark.parametrize("count", [5, 51, 1251])
+def test_slow_parts_are_those_of_savitzky_and_golay(count):
+    """By SciPy, and of as many outputs as a long run has in a time that does not grow with their square."""
+    values = np.cumsum(np.random.default_rng(5).normal(size=(5001, 2)), axis=0)
+    t = np.linspace(0.0, 1.0, len(values))
+    expected = savgol_filter(values, count, 3, axis=0)
+    np.testing.assert_allclose(slow_part(t, values, (count - 1) * t[1]), expected, atol=1e-12 * np.abs(values).max())
+    many = np.linspace(0.0, 1.0, 300_001)
+    began = process_time()
+    slow_part(many, many[:, None], 0.1)
+    assert process_time() - began < 3.0
