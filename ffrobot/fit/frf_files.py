@@ -1,6 +1,7 @@
 """Files of measured FRFs: universal files (dataset 58), CSV tables and .mat files."""
 
 import csv
+import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -11,8 +12,8 @@ from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, check_known, quoted
 from ..common.extras import extras
 from ..common.libraries import scipy
-from ..common.tables import parse_csv
-from ..common.toml_files import read_text
+from ..common.tables import parse_csv, shown
+from ..common.toml_files import read_bytes, read_text
 
 ENDS = ("force", "response")
 COLUMNS = ("frequency", "force", "response", "real", "imaginary", "coherence")
@@ -49,11 +50,14 @@ def _universal(path: Path) -> Iterator[Column]:
     """FRFs of datasets 58 with the coherence of the same ends; other functions are left out."""
     with extras():
         import pyuff
+    read_bytes(path, "universal file")
     try:
-        data = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:  # whatever pyuff finds in a file that is none
-        raise InputError(f"{path}: expected a universal file that pyuff reads, found: {error}") from None
-    sets = [one for one in (data if isinstance(data, list) else [data]) if one.get("type") == 58]
+        file = pyuff.UFF(str(path))
+        sets = [file.read_sets(k) for k in np.flatnonzero(np.array(file.get_set_types()) == 58).tolist()]
+        for one in sets:
+            one["data"].real, one["x"], one["func_type"]
+    except Exception:  # whatever pyuff finds in a file that is none
+        raise InputError(f"{path}: expected datasets 58 of a universal file, found some that are damaged") from None
     ends = [(one["ref_node"], one["ref_dir"], one["rsp_node"], one["rsp_dir"]) for one in sets]
     coherence = {at: one["data"].real for at, one in zip(ends, sets, strict=True) if one["func_type"] == COHERENCE}
     for at, one in zip(ends, sets, strict=True):
@@ -83,39 +87,58 @@ def _of_csv(path: Path) -> Iterator[Column]:
     """FRFs of a table with a line for each frequency of each function."""
     try:
         header, table = parse_csv(read_text(path, "table of FRFs"))
-        for name in header:
-            check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
-        if missing := [name for name in COLUMNS[:-1] if name not in header]:
-            raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
-        for line, row in table:
-            if len(row) != len(header):
-                raise InputError(f"{path}: line {line}: expected {len(header)} cells", len(row))
-        cells = [dict(zip(header, row, strict=True)) for _, row in table]
-        ends = [(one["force"], one["response"]) for one in cells]
-        numbers = np.array(
-            [[float(one[name]) for name in COLUMNS if name in one and name not in ENDS] for one in cells]
-        )
-    except (csv.Error, ValueError) as error:
+    except csv.Error as error:
         raise InputError(f"{path}: expected a table with the columns {quoted(COLUMNS)}, found: {error}") from None
-    for force, response in dict.fromkeys(ends):
-        values = numbers[[at == (force, response) for at in ends]]
+    for name in header:
+        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+    if missing := [name for name in COLUMNS[:-1] if name not in header]:
+        raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
+    if not table:
+        raise InputError(f"{path}: expected a line for each frequency of each function below line 1", "none")
+    functions: dict[tuple[str, ...], list[list[float]]] = {}
+    for line, row in table:
+        if len(row) != len(header):
+            raise InputError(f"{path}: line {line}: expected {len(header)} cells", len(row))
+        cells = dict(zip(header, row, strict=True))
+        numbers = [_number(path, line, cells[name]) for name in COLUMNS if name in cells and name not in ENDS]
+        functions.setdefault(tuple(cells[end] for end in ENDS), []).append(numbers)
+    for (force, response), rows in functions.items():
+        values = np.array(rows)
         coherence = as_floats(values[:, 3]) if values.shape[1] > 3 else None
         yield Column(force, response, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
 
 
+def _number(path: Path, line: int, cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise InputError(f'{path}: line {line}: expected a number', f'"{shown(cell)}"') from None
+
+
 def _of_mat(path: Path) -> Iterator[Column]:
     """FRFs of variables frequency (F,), H (F, p), force and response (p names), and perhaps coherence (F, p)."""
+    content = io.BytesIO(read_bytes(path, "file of FRFs"))
     try:
-        data = scipy.io.loadmat(path, chars_as_strings=True)
+        data = scipy.io.loadmat(content, chars_as_strings=True)
+    except Exception:  # whatever SciPy finds in a file that is none
+        raise InputError(
+            f"{path}: expected a .mat file of version 7 or older (MATLAB: save -v7), found another file"
+        ) from None
+    if missing := [name for name in ("frequency", "H", *ENDS) if name not in data]:
+        raise InputError(f"{path}: expected variables frequency, H, force and response", f"no {quoted(missing)}")
+    try:
         frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
         ends = [[str(np.ravel(one)[0]).strip() for one in data[name].ravel()] for name in ENDS]
-        coherence = data["coherence"].astype(float) if "coherence" in data else None
-        shapes = {H.shape, (len(frequency), len(ends[0])), (len(frequency), len(ends[1]))}
-        if len(shapes) > 1 or (coherence is not None and coherence.shape != H.shape):
-            raise ValueError(f"H of shape {H.shape} for {len(frequency)} frequencies and {len(ends[0])} forces")
-    except Exception as error:  # whatever SciPy finds in a file that is none
+        coherence = data["coherence"].astype(float) if "coherence" in data else np.full(H.shape, np.nan)
+    except (ValueError, TypeError, IndexError):
         raise InputError(
-            f"{path}: expected a .mat file with frequency, H, force and response, found: {error}"
+            f"{path}: expected numbers in frequency, H and coherence, and names in force and response, found others"
         ) from None
+    shape = (len(frequency), len(ends[0]))
+    if not shape == H.shape == coherence.shape == (len(frequency), len(ends[1])):
+        raise InputError(
+            f"{path}: expected H and coherence with a line for each frequency and a column for each force and response,"
+            f" found H of shape {H.shape} for {shape[0]} frequencies, {shape[1]} forces and {len(ends[1])} responses"
+        )
     for k, (force, response) in enumerate(zip(*ends, strict=True)):
-        yield Column(force, response, as_floats(frequency), H[:, k], None if coherence is None else coherence[:, k])
+        yield Column(force, response, as_floats(frequency), H[:, k], coherence[:, k] if "coherence" in data else None)

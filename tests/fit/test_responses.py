@@ -293,7 +293,8 @@ def test_bad_files_are_refused(tmp_path, case):
         ("5.0,1/x,1/x,1e-3,0.0,-0.1\n", "coherence: expected values from 0 to 1, found -0.1"),
         ("5.0,1/x,1/x,0.0,0.0,0.9\n", "finite values that are not 0"),
         ("5.0,1/q,1/x,1e-3,0.0,0.9\n", 'expected POINT/x, POINT/-z, …, found "1/q"'),
-        ("5.0,1/x,1/x,one,0.0,0.9\n", "expected a table with the columns"),
+        ("5.0,1/x,1/x,one,0.0,0.9\n", 'line 2: expected a number, found "one"'),
+        ("", "expected a line for each frequency of each function below line 1, found none"),
         ("5.0,1/x,1/x,1e-3\n", "line 2: expected 6 cells, found 4"),
         ("5.0,1/x,1/x,1e-3,0.0,0.9\n" * 2, "expected each frequency once, in rising order"),
     ],
@@ -305,12 +306,32 @@ def test_bad_tables_are_refused(tmp_path, rows, expected):
         read_tests(tmp_path / "tests.toml")
 
 
-def test_tables_without_a_column_and_empty_files(tmp_path):
-    (tmp_path / "a.csv").write_text("frequency,force,response,real\n5.0,1/x,1/x,1e-3\n")
-    (tmp_path / "b.mat").write_bytes(b"")
-    for name, expected in (("a.csv", 'line 1: expected the columns .* found no "imaginary"'), ("b.mat", "a .mat file")):
+def test_files_of_other_kinds(tmp_path):
+    """Each with one sentence of ours, without what a library says."""
+    savemat(tmp_path / "none.mat", {"x": 1.0})
+    three = {"frequency": np.arange(1.0, 4.0), "H": np.ones((3, 2)), "force": ["1/x", "1/x"]}
+    savemat(tmp_path / "shape.mat", {**three, "response": ["1/x"]})
+    savemat(tmp_path / "text.mat", {**three, "response": ["1/x", "1/x"], "frequency": "fast"})
+    (tmp_path / "lacks.csv").write_text("frequency,force,response,real\n5.0,1/x,1/x,1e-3\n")
+    for name in ("empty.csv", "empty.mat", "empty.uff"):
+        (tmp_path / name).write_bytes(b"")
+    for name in ("other.mat", "other.uff"):
+        (tmp_path / name).write_bytes(b"of something else\n" * 30)
+    for name, expected in {
+        "lacks.csv": 'line 1: expected the columns .* found no "imaginary"',
+        "empty.csv": 'line 1: expected the columns .* found no "frequency", "force", "response", "real", "imaginary"',
+        "empty.mat": r"expected a \.mat file of version 7 or older .*, found another file$",
+        "other.mat": r"expected a \.mat file of version 7 or older .*, found another file$",
+        "none.mat": 'found no "frequency", "H", "force", "response"$',
+        "shape.mat": "found H of shape .3, 2. for 3 frequencies, 2 forces and 1 responses$",
+        "text.mat": "expected numbers in frequency, H and coherence, and names in force and response, found others$",
+        "empty.uff": "type 4 of dataset 58., found none$",
+        "other.uff": "type 4 of dataset 58., found none$",
+    }.items():
+        if name.endswith("uff"):
+            pytest.importorskip("pyuff")
         (tmp_path / "tests.toml").write_text(table(file=name, unit="g/N"))
-        with pytest.raises(InputError, match=expected):
+        with pytest.raises(InputError, match=f"{name}: .*{expected}"):
             read_tests(tmp_path / "tests.toml")
 
 
