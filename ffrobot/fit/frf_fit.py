@@ -104,7 +104,7 @@ class _Residuals:
             off = np.log(H / pose.receptance) / pose.deviation
             by_x = (self._center * np.exp(x))[:, None, None] * dH / H / pose.deviation
             parts = (off.real, off.imag) if S is None else (S @ off.real,)
-            parts_by_x = (by_x.real, by_x.imag) if S is None else (S @ by_x.real,)
+            parts_by_x = (by_x.real, by_x.imag) if S is None else (S @ np.ascontiguousarray(by_x.real),)
             values += [part.ravel() for part in parts]
             slopes += [part.reshape(len(x), -1) for part in parts_by_x]
         return np.concatenate(values), np.hstack(slopes).T

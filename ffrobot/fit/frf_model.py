@@ -13,7 +13,7 @@ import numpy as np
 
 from ..common.arrays import Array, ComplexArray
 from ..map.pose_map import check_point
-from ..mbs.linear.joint_conditions import COMPLIANT, free_coordinates
+from ..mbs.linear.joint_conditions import COMPLIANT, free_coordinates, vibration
 from ..mbs.linear.poses import PoseEvaluator
 from ..mbs.posture.start import undeformed_posture
 from ..mbs.scene.mechanism import Initial
@@ -41,17 +41,19 @@ def receptance(
     equations: Array, pose: MeasuredPose, changes: Sequence[Array] = ()
 ) -> tuple[ComplexArray, ComplexArray]:
     """H (F, p), m/N, where a pose was measured, and its derivatives (n, F, p) along `changes` of the equations."""
-    w, (M, K, D, J) = pose.omega[:, None, None], unstacked(equations)
-    Z, f, r = K + 1j * w * D - w**2 * M, pose.ends.force, pose.ends.response
-    of_all = np.broadcast_to(J.T, (len(w), *J.T.shape))
-    X = np.linalg.solve(Z, of_all)
+    (M, K, D, J), w, f, r = unstacked(equations), pose.omega, pose.ends.force, pose.ends.response
+    X = vibration(M, K, D, J, w)
     H: ComplexArray = np.asarray((J @ X)[:, r, f], dtype=complex)
     slopes = np.empty((len(changes), *H.shape), dtype=complex)
     if len(changes):
-        Y = np.linalg.solve(Z.swapaxes(1, 2), of_all).swapaxes(1, 2)
+        Y = vibration(M.T, K.T, D.T, J, w)[:, :, r]
+        along = np.ascontiguousarray(X.transpose(1, 0, 2)[:, :, f])  # (coordinates, F, p)
+        still, moving, speeding = (
+            part.reshape(len(M), -1) for part in (along, along * 1j * w[:, None], along * w[:, None] ** 2)
+        )
         for k, (dM, dK, dD, dJ) in enumerate(map(unstacked, changes)):
-            dX = dK @ X + 1j * w * (dD @ X) - w**2 * (dM @ X)
-            slopes[k] = (dJ @ X + Y @ dJ.T - Y @ dX)[:, r, f]
+            forces = (dK @ still + dD @ moving - dM @ speeding).reshape(along.shape)
+            slopes[k] = np.einsum("pi,ifp->fp", dJ[r], along) + np.einsum("fip,ifp->fp", Y, dJ[f].T[:, None] - forces)
     return H, slopes
 
 

@@ -152,10 +152,14 @@ def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordina
 
 def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
     """Return (F, k) motion along each row of `J` (k, f) per unit load along it, at `omega` (F,), rad/s."""
-    (N, K, D), w = free, omega[:, None, None]
-    J = J @ N
-    X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
-    return np.asarray(np.einsum("ki,fik->fk", J, X))
+    J = J @ free.N
+    return np.asarray(np.einsum("ki,fik->fk", J, vibration(np.eye(len(J.T)), free.K, free.D, J, omega)))
+
+
+def vibration(M: Array, K: Array, D: Array, J: Array, omega: Array) -> ComplexArray:
+    """Return coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows `J` (k, f), at `omega` (F,)."""
+    w = omega[:, None, None]
+    return np.asarray(np.linalg.solve(K + 1j * w * D - w**2 * M, np.broadcast_to(J.T, (len(omega), *J.T.shape))))
 
 
 def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
