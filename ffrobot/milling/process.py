@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..common.arrays import Array, as_floats
+from ..common.errors import InputError
 from ..common.toml_files import load_toml
 from ..common.validation import Record, validate
 from ..mbs.fields.field_types import NotNegative, Positive, Quantity, Vector3
@@ -15,7 +16,19 @@ from ..mbs.linear.joint_conditions import FreeCoordinates
 from .stability import Cutter, StabilityLimits, Tip, limit_depth, stability_limits
 
 BELOW, ABOVE = 10.0, 1000.0  # the depth without lobes: where those of lobes are sought
+ALONG = 1e-6  # of a direction, across the axis: none
 FEEDS = 12  # directions of feed within half a turn, beyond which forces are the same
+
+
+def spread(given: object) -> object:
+    """Evenly spaced numbers of a text "FIRST:LAST:COUNT"; anything else as it is."""
+    if not isinstance(given, str):
+        return tuple(given) if isinstance(given, list) else given
+    try:
+        first, last, count = given.split(":")
+        return tuple(np.linspace(float(first), float(last), int(count)).tolist())
+    except ValueError:
+        raise ValueError(f'expected a list, or "FIRST:LAST:COUNT", found "{given}"') from None
 
 
 class Milling(Record):
@@ -34,11 +47,11 @@ class Milling(Record):
     axis: Vector3 = (0.0, 0.0, 1.0)
     """Axis of the tool, from the cut into the spindle, in the axes of the point (without own ones: global axes)."""
     feed: Vector3 | None = None
-    """Direction of the feed, normal to the axis; default: the worst one counts."""
+    """Direction of the feed of the tool in global axes; its part across the axis counts. Default: the worst one."""
     highest: Positive = 1000.0
     """Highest natural frequency, Hz, of modes that vibrate; modes above it are rigid."""
-    speeds: Annotated[tuple[Positive, ...], Field(max_length=1000)] = ()
-    """Spindle speeds, rev/min, at which the stable depth is computed."""
+    speeds: Annotated[tuple[Positive, ...], BeforeValidator(spread), Field(max_length=1000)] = ()
+    """Spindle speeds, rev/min, at which the stable depth is computed: a list, or "FIRST:LAST:COUNT"."""
     method: Literal["averaged", "semi-discretization"] = "averaged"
     """Method at these speeds: with averaged cutting forces, or with the forces of each angle, which takes longer."""
 
@@ -48,8 +61,6 @@ class Milling(Record):
             raise ValueError(f"expected 0 ≤ entry < exit ≤ π, found {self.entry:g} and {self.exit:g}")
         if not any(self.axis):
             raise ValueError("expected an axis with a direction, found zero")
-        if self.feed is not None and np.linalg.norm(np.cross(self.feed, self.axis)) < 1e-6:
-            raise ValueError("expected a feed across the axis, found one along it")
         return self
 
     @property
@@ -57,13 +68,17 @@ class Milling(Record):
         """Teeth, coefficients and angles."""
         return Cutter(self.teeth, self.tangential, self.radial, self.entry, self.exit)
 
-    @property
-    def feeds(self) -> Array:
-        """Axes (n, 2, 3): unit vectors along the feed, and normal to it, so that the tool's axis is feed × normal."""
-        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+    def feeds(self, axes: Array) -> Array:
+        """Axes (n, 2, 3): unit vectors along the feed, and normal to it, so that the tool's axis is feed × normal.
+
+        In global axes; `axes` (3, 3) has those of the point in rows. Raises `InputError` for a feed along the axis.
+        """
+        axis = np.array(self.axis) @ axes / np.linalg.norm(self.axis)
         given = np.eye(3)[np.abs(axis).argmin()] if self.feed is None else np.array(self.feed)
         x = given - axis * (axis @ given)
-        x /= np.linalg.norm(x)
+        if (size := np.linalg.norm(x)) <= ALONG * np.linalg.norm(given):
+            raise InputError("milling: feed: expected a direction across the axis of the tool, found one along it")
+        x /= size
         angles = np.arange(FEEDS) * np.pi / FEEDS if self.feed is None else np.zeros(1)
         y, c, s = np.cross(axis, x), np.cos(angles)[:, None], np.sin(angles)[:, None]
         return as_floats(np.stack([c * x + s * y, c * y - s * x], axis=1))
@@ -74,16 +89,16 @@ def read_milling(path: Path) -> Milling:
     return validate(Milling, load_toml(path, "milling file"), path)
 
 
-def stable_depths(milling: Milling, free: FreeCoordinates, J: Array) -> dict[str, Array]:
+def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array) -> dict[str, Array]:
     """Stable depths of a pose: with `free` coordinates and rows J (d, f) of the tip's translations along s.
 
-    `milling_depth` m: without chatter at any speed, of the worst feed; `milling_best_depth` m: of the best one,
-    `milling_feed` (3,). With speeds also `milling_lobes` (S,) m there: averaged forces take the worst feed of each
-    speed, semi-discretization that of `milling_depth`.
+    J is in global axes, `axes` (3, 3) has those of the tip in rows. `milling_depth` m: without chatter at any speed, of
+    the worst feed; `milling_best_depth` m: of the best one, `milling_feed` (3,). With speeds also `milling_lobes` (S,)
+    m there: averaged forces take the worst feed of each speed, semi-discretization that of `milling_depth`.
     """
-    tip, feeds = _tip(free, J, milling.highest), milling.feeds
+    tip, feeds = _tip(free, J, milling.highest), milling.feeds(axes)
     omega, G = tip.response()
-    limits = [stability_limits(milling.cutter.average, omega, axes @ G @ axes.T) for axes in feeds]
+    limits = [stability_limits(milling.cutter.average, omega, across @ G @ across.T) for across in feeds]
     depths = np.array([one.least for one in limits])
     values = {
         "milling_depth": depths.min(),

@@ -28,8 +28,9 @@ from .linearisation import LinearEquations, LinearMechanism, labelled
 from .statics import Statics
 
 NONE = np.zeros(0)
-Judge = Callable[[FreeCoordinates, Array], Mapping[str, Array]]
-"""Further findings, by name, of free coordinates and of rows J (d, f) of the point's translations along s."""
+Judge = Callable[[FreeCoordinates, Array, Array], Mapping[str, Array]]
+"""Further findings, by name: of free coordinates, rows J (d, f) of the point's translations along s, in global axes,
+and the axes (3, 3) of the point, in rows; of a point without own axes the global ones."""
 FREE = 1e-12  # of the largest stiffness: less lets the robot move
 
 
@@ -87,8 +88,10 @@ class PoseEvaluator:
                 response = frequency_response(found_there.free, mechanism.of_tool(self.point), self._omega)
                 values[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
             if self._judge is not None:
-                J = mechanism.of_tool(self.point)[: len(self.space.translations)]
-                more = self._judge(found_there.free, J)
+                J, axes, d = mechanism.points[self.point], np.eye(3), len(self.space.translations)
+                if self.point in mechanism.tool_axes:
+                    axes[:d, :d] = mechanism.tool_axes[self.point][:d, :d]
+                more = self._judge(found_there.free, J[:d], axes)
                 values |= {f"joints_{condition}/{name}": value for name, value in more.items()}
         places = tree.places(q[None])
         values["robot"] = np.array([[places.at(end).r[0] for end in pair] for pair in self.segments])

@@ -181,20 +181,35 @@ def process(folder, **keys):
 def test_depth_of_a_pose_does_not_depend_on_axes(tmp_path):
     """A robot with equal stiffness in the plane of the cut has one depth for all feeds; turned axes change nothing."""
     free = FreeCoordinates(np.eye(3), np.diag([1.0, 1.0, 9.0]) * OMEGA**2, np.eye(3) * 2 * ZETA * OMEGA)
+    J, own = np.eye(3) * MASS**-0.5, np.eye(3)
     expected = stability_limits(HALF_DOWN.average, *TWO.response()).least
-    found = stable_depths(process(tmp_path, speeds=[9000.0]), free, np.eye(3) * MASS**-0.5)
-    exact = stable_depths(
-        process(tmp_path, speeds=[9000.0], method="semi-discretization"), free, np.eye(3) * MASS**-0.5
-    )
-    assert exact["milling_lobes"][0] == pytest.approx(
-        limit_depth(TWO, HALF_DOWN, revolutions(9000.0), (1e-4, 1e-2)), 2e-3
-    )
+    found = stable_depths(process(tmp_path, speeds=[9000.0]), free, J, own)
+    by_steps = process(tmp_path, speeds="9000:9000:1", method="semi-discretization")
+    exact = stable_depths(by_steps, free, J, own)["milling_lobes"][0]
+    assert exact == pytest.approx(limit_depth(TWO, HALF_DOWN, revolutions(9000.0), (1e-4, 1e-2)), 2e-3)
     assert found["milling_depth"] == pytest.approx(expected, rel=1e-9)
     assert found["milling_best_depth"] == pytest.approx(expected, rel=1e-9)
     assert found["milling_lobes"][0] >= expected
     turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # z to x
-    turned = stable_depths(process(tmp_path, axis=[1.0, 0.0, 0.0]), free, turn @ np.eye(3) * MASS**-0.5)
+    turned = stable_depths(process(tmp_path, axis=[1.0, 0.0, 0.0]), free, turn @ J, own)
     assert turned["milling_depth"] == pytest.approx(expected, rel=1e-9)
+    of_tool = stable_depths(process(tmp_path), free, turn @ J, turn.T)  # its z is the global x
+    assert of_tool["milling_depth"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_feed_is_in_global_axes(tmp_path):
+    """Soft along global x: a feed there has a depth of its own, however the tool is turned about its axis."""
+    free = FreeCoordinates(np.eye(3), np.diag([1.0, 9.0, 9.0]) * OMEGA**2, np.eye(3) * 2 * ZETA * OMEGA)
+    quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    along, across = (
+        stable_depths(process(tmp_path, feed=one), free, np.eye(3) * MASS**-0.5, np.eye(3))["milling_depth"]
+        for one in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    )
+    assert abs(along / across - 1.0) > 0.1
+    turned = stable_depths(process(tmp_path, feed=[1.0, 0.0, 0.0]), free, np.eye(3) * MASS**-0.5, quarter)
+    assert turned["milling_depth"] == pytest.approx(along)
+    with pytest.raises(InputError, match="a direction across the axis of the tool"):
+        stable_depths(process(tmp_path, feed=[0.0, 0.0, 1.0]), free, np.eye(3), np.eye(3))
 
 
 @pytest.mark.parametrize(
@@ -203,7 +218,7 @@ def test_depth_of_a_pose_does_not_depend_on_axes(tmp_path):
         ({"exit": "45*deg"}, r"cutter\.toml: expected 0 ≤ entry < exit ≤ π"),
         ({"teeth": 0}, "teeth"),
         ({"axis": [0.0, 0.0, 0.0]}, "an axis with a direction"),
-        ({"feed": [0.0, 0.0, 1.0]}, "a feed across the axis"),
+        ({"speeds": "fast"}, 'expected a list, or "FIRST:LAST:COUNT", found "fast"'),
         ({"tangential": -1.0}, "tangential"),
     ],
 )
