@@ -16,6 +16,7 @@ from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.tables import as_csv
 from ..common.version import VERSION
+from ..mbs.posture.workspace import TURN
 from ..present.lines import print_table
 from .pose_map import STATUS, PoseMap
 
@@ -38,6 +39,9 @@ UNITS = {
     "milling_best_depth": "m",
     "milling_feed": "",
     "milling_lobes": "m",
+    "milling_deviation": "m",
+    "best_turn": "rad",
+    "best_turn_depth": "m",
 }
 NOT_IN_TABLE = ("compliance", "response", "robot", "milling_lobes")
 
@@ -62,6 +66,10 @@ def write_map(poses: PoseMap) -> Path:
         for name, values in {**poses.values, "torque_share": torque_share(poses), "q": poses.q}.items():
             file[name] = values.reshape(*plan.shape, *values.shape[1:])
             file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
+        for condition, (turn, depth) in best_turns(poses).items():
+            for name, values in {"best_turn": turn, "best_turn_depth": depth}.items():
+                file[f"{condition}/{name}"] = values
+                file[f"{condition}/{name}"].attrs["unit"] = UNITS[name]
         image = image_of(file)
     write_atomically(plan.folder / FILE, sealed(image), "map", make_folder=True, ours=True)
     write_atomically(plan.folder / TABLE, _table(poses).encode(), "table of the map", ours=True)
@@ -92,6 +100,23 @@ def _columns(poses: PoseMap, name: str, values: Array) -> dict[str, Array]:
         is_vector = name.rpartition("/")[2] in ("place", "sag", "stiffness", "direction", "milling_feed")
         labels = tuple("xyz" if is_vector else map(str, range(1, values.shape[1] + 1)))
     return {f"{name} {label}": column for label, column in zip(labels, values.T, strict=False)}
+
+
+def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
+    """Turn of the tool (rad) with the largest stable depth (m) at each place of the other axes, by condition.
+
+    NaN where no turn is possible; empty for grids without turns, and without milling.
+    """
+    plan = poses.plan
+    if plan.turned_about is None:
+        return {}
+    angles, found = plan.axes[_turn_axis(poses)].values, {}
+    for name in (name for name in poses.values if name.endswith("/milling_depth")):
+        depth = np.moveaxis(poses.values[name].reshape(plan.shape), _turn_axis(poses), -1)
+        best = np.where(np.isnan(depth), -1.0, depth).argmax(axis=-1)
+        largest = np.take_along_axis(depth, best[..., None], axis=-1)[..., 0]
+        found[name.partition("/")[0]] = as_floats(np.where(np.isnan(largest), np.nan, angles[best])), largest
+    return found
 
 
 CONDITIONS = {"compliant": "compliant gears", "locked": "joints locked"}
@@ -177,6 +202,8 @@ def print_map(poses: PoseMap, console: Console) -> None:
     """A table of quantities: the worst and the best value with the poses; then how many poses there are."""
     console.print(f"{poses.plan.point} over {' and '.join(axis.name for axis in poses.plan.axes)}", soft_wrap=True)
     print_table(console, ("quantity", "worst", "at", "best", "at"), _ranges(poses))
+    for line in _milling(poses):
+        console.print(f"milling    {line}", soft_wrap=True)
     counts = ", ".join(f"{int((poses.status == k).sum())} {name}" for k, name in enumerate(STATUS))
     console.print(f"poses      {counts}", soft_wrap=True)
 
@@ -188,6 +215,33 @@ def _ranges(poses: PoseMap) -> Iterator[tuple[str, ...]]:
         elif np.isfinite(quantity.values).any():
             ends = ((quantity.text(k), _place(poses, k)) for k in (quantity.worst, quantity.best))
             yield quantity.title, *(cell for end in ends for cell in end)
+
+
+def _milling(poses: PoseMap) -> Iterator[str]:
+    """What the smallest stable depth would be with another feed or another turn of the tool, and its deviation."""
+    condition = next((f"joints_{one}" for one in CONDITIONS if f"joints_{one}/milling_depth" in poses.values), "")
+    of = {name.partition("/")[2]: values for name, values in poses.values.items() if name.startswith(condition)}
+    if not condition or not np.isfinite(of["milling_depth"]).any():
+        return
+    worst = int(np.nanargmin(of["milling_depth"]))
+    least, best = 1e3 * of["milling_depth"][worst], 1e3 * of["milling_best_depth"][worst]
+    if "milling_deviation" in of:
+        yield f"{least:.4g} mm ± {2e3 * of['milling_deviation'][worst]:.2g} mm (two deviations by errors of the fit)"
+    if best > least * (1 + CONSTANT):
+        feed = ", ".join(f"{x:.3g}" for x in of["milling_feed"][worst])
+        yield f"{best:.4g} mm in the worst pose with the best feed, along ({feed}), instead of {least:.4g} mm"
+    if condition in (turns := best_turns(poses)):
+        depth = np.moveaxis(of["milling_depth"].reshape(poses.plan.shape), _turn_axis(poses), 0)
+        at_all = np.where(np.isnan(depth), -1.0, depth).reshape(len(depth), -1).min(axis=1)
+        if at_all.max() > 0.0:
+            angle = poses.plan.axes[_turn_axis(poses)].values[at_all.argmax()]
+            yield f"{1e3 * at_all.max():.4g} mm at all places with the tool turned by {np.degrees(angle):.4g}°"
+        each = turns[condition][1]
+        yield f"{1e3 * np.nanmin(each):.4g} mm with the best turn of each place"
+
+
+def _turn_axis(poses: PoseMap) -> int:
+    return [axis.name for axis in poses.plan.axes].index(TURN)
 
 
 def _place(poses: PoseMap, number: int) -> str:

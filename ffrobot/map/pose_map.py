@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from ..common.arrays import Array, Booleans, Indices
+from ..common.arrays import Array, Booleans, Indices, as_floats
 from ..common.errors import InputError, SolveError, check_known, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
 from ..common.interrupts import SIGNALS, end_with_parent
@@ -29,7 +29,7 @@ from ..common.tables import shown
 from ..mbs.fields.field_types import Quantity
 from ..mbs.linear.linearisation import labelled
 from ..mbs.linear.poses import PoseEvaluator
-from ..mbs.posture.workspace import GridAxis, Postures, grid_postures
+from ..mbs.posture.workspace import TURN, GridAxis, Postures, grid_postures
 from ..mbs.scene.space import SPACES
 from ..milling.process import Milling, stable_depths
 from ..run.inputs import changed, fingerprints, read_tables
@@ -52,10 +52,14 @@ def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
     names = [axis.name for axis in axes]
     if twice := {name for name in names if names.count(name) > 1}:
         raise InputError("--over: expected each joint or direction once", f"{quoted(sorted(twice))} again")
-    if len({axis.is_place for axis in axes}) > 1:
-        raise InputError("--over: expected joints alone or directions of a point alone", quoted(names))
-    if not 1 <= len(axes) <= MOST_AXES:
-        raise InputError(f"--over: expected one to {MOST_AXES} axes", len(axes))
+    long = [axis for axis in axes if len(axis.values) > 1]
+    if any(axis.is_place for axis in axes) and not all(axis.is_place for axis in long):
+        raise InputError(
+            "--over: expected joints alone or directions of a point alone, beside which joints have one value",
+            quoted(names),
+        )
+    if not axes or len(long) > MOST_AXES:
+        raise InputError(f"--over: expected one to {MOST_AXES} axes with several values", len(long))
     if (count := math.prod(len(axis.values) for axis in axes)) > MOST_RUNS:
         raise InputError(f"--over: expected at most {MOST_RUNS} poses", count)
     return axes
@@ -63,7 +67,7 @@ def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
 
 def _axis(text: str, scene: Scene) -> GridAxis:
     name, equals, values = (part.strip() for part in text.partition("="))
-    places = ["xyz"[k] for k in SPACES[scene.space].translations]
+    places = ["xyz"[k] for k in SPACES[scene.space].translations] + [TURN] * (not scene.is_planar)
     units = {joint.name: joint.units[0] for joint in scene.joint if joint.units}
     joints = list(units)
     if not equals or name not in (*joints, *places):
@@ -71,7 +75,7 @@ def _axis(text: str, scene: Scene) -> GridAxis:
             f"--over: expected NAME=FIRST:LAST:COUNT of a joint ({quoted(joints)}) or of {quoted(places)}",
             f'"{shown(text)}"{did_you_mean(name, joints)}',
         )
-    return GridAxis(name, _values(values, text), name not in joints, units.get(name, "m"))
+    return GridAxis(name, _values(values, text), name not in joints, units.get(name, "rad" if name == TURN else "m"))
 
 
 def _values(text: str, whole: str) -> Array:
@@ -124,6 +128,13 @@ class MapPlan:
         """Number of grid points along each axis."""
         return tuple(len(axis.values) for axis in self.axes)
 
+    @property
+    def turned_about(self) -> Array | None:
+        """Unit vector (3,) about which the tool turns over the grid."""
+        if self.milling is None or TURN not in [axis.name for axis in self.axes]:
+            return None
+        return as_floats(np.array(self.milling.axis) / np.linalg.norm(self.milling.axis))
+
 
 @dataclass(frozen=True)
 class PoseMap:
@@ -155,9 +166,11 @@ def plan_map(
     check_folder(folder)
     loaded = load_scene(scene)
     axes = parse_grid(over, loaded)
+    if milling is None and TURN in [axis.name for axis in axes]:
+        raise InputError(f"--over: {TURN}: expected --milling with the axis that the tool turns about", "none")
     keeps = orientation == "start"
     if orientation == "auto":
-        keeps = axes[0].is_place and any(path.orientation is not None for path in loaded.trajectory)
+        keeps = any(axis.is_place for axis in axes) and any(path.orientation is not None for path in loaded.trajectory)
     omega = np.zeros(0) if frequencies is None else frequencies
     return MapPlan(
         scene=scene,
@@ -196,7 +209,13 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     watcher.stage("postures")
     request = _request(plan)
     kept = _kept_postures(plan, request)
-    postures = kept or grid_postures(solution.model, plan.axes, plan.point, keeps_orientation=plan.keeps_orientation)
+    postures = kept or grid_postures(
+        solution.model,
+        plan.axes,
+        plan.point,
+        keeps_orientation=plan.keeps_orientation,
+        turned_about=plan.turned_about,
+    )
     good = postures.reached & postures.within
     if not good.any():
         raise SolveError(f"{plan.scene}: no pose of the grid is within reach and the limits of the joints")

@@ -12,7 +12,6 @@ from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError
 from ...common.rotations import logarithm
 from ...common.structs import struct
-from .._core import TimeFunction
 from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
 from ..fields.waypoints import spline
@@ -23,6 +22,7 @@ from .posture import solve_postures
 from .reach import are_regular, random_angles, turning_joints
 from .start import undeformed_posture
 
+TURN = "turn"  # axis of a grid: of the body of the point about an axis of it
 TOGETHER = 500  # postures that are solved at once
 PLACES, TRIES = 32, 16  # that are tried where no neighbor leads, and guesses for each
 BEYOND = 1e3  # rad: postures beyond limits of joints come after all others
@@ -30,7 +30,7 @@ BEYOND = 1e3  # rad: postures beyond limits of joints come after all others
 
 @struct
 class GridAxis:
-    """One direction of a grid: a joint's coordinate, or "x", "y" or "z" of the point; `unit` is "rad" or "m"."""
+    """A joint's coordinate, "x", "y" or "z" of the point, or "turn", of its body; `unit` is "rad" or "m"."""
 
     name: str
     values: Array
@@ -50,20 +50,33 @@ class Postures(NamedTuple):
     within: Booleans
 
 
-def grid_postures(model: Model, axes: Sequence[GridAxis], point: str, *, keeps_orientation: bool) -> Postures:
+def grid_postures(
+    model: Model, axes: Sequence[GridAxis], point: str, *, keeps_orientation: bool, turned_about: Array | None = None
+) -> Postures:
     """Postures over the grid: each by Newton from a neighbor that is solved, beginning next to the start of the scene.
 
     Joints that the grid leaves open move as little as they can from the neighbor. `point` is where the model has it.
-    With `keeps_orientation` its body keeps the orientation that it has at the start.
+    With `keeps_orientation` its body keeps the orientation that it has at the start. With an axis `TURN` it turns from
+    there about `turned_about` (3,), in the axes of a tool or else global ones, and stays at the x, y and z of the start
+    that the grid leaves open.
     Raises `InputError` for axes that the robot has not, or that ask for more than it can do.
     """
     start, shape = undeformed_posture(model).q, tuple(len(axis.values) for axis in axes)
     values = np.stack(np.meshgrid(*(axis.values for axis in axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
-    rows = [_row(model, axis, point, values[:, k]) for k, axis in enumerate(axes)]
+    turn = next((values[:, k] for k, axis in enumerate(axes) if axis.name == TURN), np.zeros(1))
+    rows = [_row(model, axis, point, values[:, k]) for k, axis in enumerate(axes) if axis.name != TURN]
+    measured = np.zeros(len(axes))
+    is_row = np.array([axis.name != TURN for axis in axes])
     along = replace(model, rows=tuple(rows))
-    measured = constraint_values(along, start[None], np.zeros(1))[0][0] + values[0]
-    if keeps_orientation:
-        rows += _orientation(model, point, start)
+    measured[is_row] = constraint_values(along, start[None], np.zeros(1))[0][0] + values[0, is_row]
+    if turned_about is not None:
+        kept = set("xyz") - {axis.name for axis in axes}
+        place = model.tree.places(start[None]).at(model.tree.section(point)).r[0]
+        rows += [_row(model, GridAxis(name, place, True), point, place[["xyz".index(name)]]) for name in sorted(kept)]
+    if keeps_orientation or turned_about is not None:
+        rows += _orientation(
+            model, point, start, turn[:, None] * (np.zeros(3) if turned_about is None else turned_about)
+        )
     robot = without_paths(model)
     robot = replace(robot, rows=(*robot.rows, *rows))
     seed = tuple(int(np.abs(axis.values - now).argmin()) for axis, now in zip(axes, measured, strict=True))
@@ -163,15 +176,19 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
     return row_of_joint(model.tree, joint, axis.name, target)
 
 
-def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
-    """Rows by which the body of `point` is turned as at the start: about z in the plane, about all axes else."""
+def _orientation(model: Model, point: str, start: Array, turns: Array) -> list[ConstraintRow]:
+    """Rows by which the body of `point` is turned as at the start: about z in the plane, about all axes else.
+
+    And from there by `turns` (P, 3), rad, in the axes of a tool, or else global ones, by the number of the posture.
+    """
     tree = model.tree
     ground, section = map(tree.section, (GROUND, point))
     triad = tree.places(start[None]).at(section).F[0]
     reference = logarithm(triad)
-    law = OrientationLaw(
-        "rotation_vector", (TimeFunction.constant(0.0),) * 3, (reference[0], reference[1], reference[2])
-    )
+    if point in tree.tools:
+        turns = turns @ triad.T
+    functions = spline(np.arange(float(len(turns))), turns, 1)
+    law = OrientationLaw("rotation_vector", tuple(functions), (reference[0], reference[1], reference[2]))
     axes = np.eye(3)[2:] if model.scene.is_planar else np.eye(3)
     return [ConstraintRow("orientation", "rotation", ground, section, e, e, law=law) for e in axes]
 

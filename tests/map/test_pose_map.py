@@ -215,6 +215,7 @@ def test_poses_judged_before_stay_where_inverse_kinematics_rounds_otherwise(arm,
         (("elbow=0:1:3", "x=0:1:3"), "expected joints alone or directions of a point alone"),
         (("elbow=0:1:3", "elbow=0:1:3"), "expected each joint or direction once"),
         (("z=0:1:3",), "expected NAME=FIRST:LAST:COUNT of a joint"),
+        (("elbow=0", "turn=0:1:2"), "expected NAME=FIRST:LAST:COUNT of a joint"),
         (("x=0:1:1000", "y=0:1:1000"), "expected at most 100000 poses, found 1000000"),
     ],
 )
@@ -347,7 +348,7 @@ def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
     modes = np.linalg.eigh(K)[1][:, :1]  # below 40 Hz
     J, K, D = J @ modes, modes.T @ K @ modes, modes.T @ D @ modes
     G = J @ np.linalg.solve(K + 1j * w * D - w**2, np.broadcast_to(J.T, (len(w), *J.T.shape)))
-    feeds = milling.feeds[:, :, :2]
+    feeds = milling.feeds(np.eye(3))[:, :, :2]
     depth = min(0.5 / np.linalg.eigvals(milling.cutter.average @ E @ G @ E.T).real.max() for E in feeds)
     assert found.values["joints_compliant/milling_depth"][1] == pytest.approx(depth, rel=1e-3)
     assert "milling_compliant" in quantities(found)
