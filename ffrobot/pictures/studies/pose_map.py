@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from ...common.arrays import Array
 from ...common.files import write_atomically
 from ...common.rotations import in_3d
-from ...map.map_file import Quantity, quantities
+from ...map.map_file import CONDITIONS, Quantity, quantities
 from ...map.pose_map import PoseMap
 from ...mbs.posture.workspace import GridAxis
-from ..figures.style import ORDERED, SIZE, SceneAxes, legend, projected, style
+from ..figures.style import ORDERED, SIZE, SceneAxes, legend, new_axes, projected, style
 from ..projection import FRONT, PLANE, SIDE, SPACE
 
 WORST, BEST = "#c22f2f", "#1f5fa8"
@@ -36,7 +36,31 @@ def draw_map(pose_map: PoseMap) -> list[Path]:
             _draw(pose_map, quantity).savefig(content, format="png")
             write_atomically(path, content.getvalue(), "picture", ours=True)
             files.append(path)
+        files += _lobes(pose_map)
     return files
+
+
+def _lobes(pose_map: PoseMap) -> Iterator[Path]:
+    """Stable depths over the spindle speed in the worst and in the best pose; their files."""
+    milling, table = pose_map.plan.milling, quantities(pose_map)
+    for condition in CONDITIONS if milling is not None and len(milling.speeds) > 1 else ():
+        lobes, name = pose_map.values.get(f"joints_{condition}/milling_lobes"), f"milling_{condition}"
+        if milling is None or lobes is None or not np.isfinite(lobes).any():
+            continue
+        order, content = np.argsort(milling.speeds), io.BytesIO()
+        figure, axes = new_axes(f"depth of cut with chatter above, {CONDITIONS[condition]}")
+        for (number, color, _), label in zip(_marks(table[name]), LABELS, strict=True):
+            depth = np.where(np.isfinite(lobes[number]), 1e3 * lobes[number], np.nan)[order]
+            axes.plot(np.array(milling.speeds)[order], depth, color=color, label=f"{label} pose")
+            axes.axhline(table[name].values[number], color=color, linestyle=":", label="at any speed")
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlabel("spindle speed (rev/min)")
+        axes.set_ylabel("depth of cut (mm)")
+        legend(axes)
+        figure.savefig(content, format="png")
+        path = pose_map.plan.folder / f"lobes_{condition}.png"
+        write_atomically(path, content.getvalue(), "picture", ours=True)
+        yield path
 
 
 def _draw(pose_map: PoseMap, quantity: Quantity) -> Figure:
@@ -66,7 +90,7 @@ def _heat_map(axes: Axes, pose_map: PoseMap, quantity: Quantity, long: list[Grid
         axes.plot(*at, marker, color=color, markeredgecolor="white", markersize=7)
     axes.set_xlabel(_label(long[0]))
     axes.set_ylabel(_label(long[1]))
-    if long[0].is_place:
+    if all(axis.is_place and axis.unit == "m" for axis in long):
         axes.set_aspect("equal")
 
 
