@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     "--response", metavar="FIRST:LAST:COUNT", help="Frequency response of the point, with these frequencies (Hz)."
 )
 @click.option("--milling", metavar="CUTTER.toml", type=FILE, help="Milling process: stable depths of cut.")
+@click.option(
+    "--covariance", metavar="FITTED.covariance.toml", type=FILE, help="Errors of a fit: deviations of stable depths."
+)
 @click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
 @processes_option("Number of parallel processes.")
 @output_option("DIR", "Folder of the map [SCENE.map next to the input].")
@@ -46,6 +49,7 @@ def map_(
     modes: int,
     response: str | None,
     milling: Path | None,
+    covariance: Path | None,
     figures: bool,
     processes: int,
     output: Path | None,
@@ -55,6 +59,7 @@ def map_(
     \b
     --over shoulder=-90*deg:90*deg:31 --over elbow=0:2:21    a grid of joint coordinates (rad or m)
     --over x=0.2:0.8:31 --over z=0.2:1.0:31                  a grid of places of the point (m), inverse kinematics
+    --over turn=-90*deg:90*deg:7 --milling cutter.toml       turns of the tool about its axis
 
     Motors keep the pose; links and compliant gears deflect under weight and loads. Joints that the grid leaves open
     stay as near to the start of the scene as they can. The same command resumes a stopped map.
@@ -66,7 +71,7 @@ def map_(
     from ..run.inputs import files_of
 
     folder = output or scene_file.with_suffix(".map")
-    protect([*files_of(scene_file), *([milling] if milling else [])])
+    protect([*files_of(scene_file), *(file for file in (milling, covariance) if file)])
     plan = plan_map(
         scene=scene_file,
         over=over,
@@ -79,6 +84,11 @@ def map_(
     )
     with Display() as display:
         made = make_map(plan, processes, display)
+        if covariance:
+            from ..fit.covariance import with_deviations
+
+            display.stage("deviations of stable depths")
+            made = with_deviations(made, covariance)
     path, console = write_map(made), summary_console()
     print_map(made, console)
     if figures:

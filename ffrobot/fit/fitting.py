@@ -255,9 +255,14 @@ class VariedKeys:
             at = ", ".join(f"{'.'.join(key)} = {value:.6g}" for key, value in self.changes(values).items())
             raise type(error)(f"with {at}:\n{error}") from None
 
+    @property
+    def written(self) -> tuple[Path, ...]:
+        """The files that `write` makes, that of the target last."""
+        return tuple(self.target.files(self._starts, self._place))
+
     def check_new(self, *, replace: bool) -> None:
         """Raise `InputError` where a file that `write` makes exists, unless to `replace` it."""
-        for new in self.target.files(self._starts, self._place):
+        for new in self.written:
             check_new_file(new, replace=replace)
 
     def write(self, values: Array) -> tuple[str, ...]:

@@ -11,12 +11,13 @@ from rich.console import Console
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..common.files import AnyPath
+from ..common.files import AnyPath, check_new_file
 from ..common.toml_files import load_toml
 from ..common.validation import check_texts
 from ..mbs.scene.mechanism import Initial
 from ..present.lines import print_table
 from ..run.solve import prepare_scene
+from .covariance import write_covariance
 from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
 from .frf_fit import PoseComparison, ResponseFit, fit_receptances
 from .frf_measured import MeasuredPose, read_tests
@@ -63,6 +64,8 @@ def fit_responses(
     target = RobotTarget(path, motors)
     varied = VariedKeys(path, target, vary, output)
     varied.check_new(replace=force)
+    covariance = varied.written[-1].with_suffix(".covariance.toml")
+    check_new_file(covariance, replace=force)
     measured = read_tests(Path(tests))
     poses = [PoseModel(one, _start(Path(tests), target, one), motors) for one in measured]
 
@@ -72,7 +75,9 @@ def fit_responses(
             return [pose.at(robot) for pose in poses]
 
     found = fit_receptances(equations, varied.names, varied.start, measured)
-    return replace(found, files=varied.write(found.value))
+    files = varied.write(found.value)
+    write_covariance(found, covariance)
+    return replace(found, files=(*files, str(covariance)))
 
 
 def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | None:

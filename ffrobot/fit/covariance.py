@@ -1,0 +1,105 @@
+"""Covariance of fitted parameters in a file, and what it makes of stable depths of cut over a map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Self
+
+import numpy as np
+import tomli_w
+from pydantic import Field, model_validator
+
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError, SolveError
+from ..common.files import write_atomically
+from ..common.toml_files import load_toml
+from ..common.validation import Record, validate
+from ..map.pose_map import MapPlan, PoseMap
+from ..mbs.fields.field_types import NotNegative
+from ..mbs.linear.poses import PoseEvaluator
+from ..milling.process import Milling, stable_depths
+from ..run.solve import prepare_scene
+from .fitting import RobotTarget, VariedKeys
+from .least_squares import Parameters
+
+DEPTH, DEVIATION = "milling_depth", "milling_deviation"
+ROUND_OFF = 1e-9  # of correlations, below which an eigenvalue is 0
+
+
+class Covariance(Record):
+    """Errors of fitted parameters, relative to them."""
+
+    keys: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Keys of the scene; "KEY=KEY" have a common factor."""
+    deviation: tuple[NotNegative, ...]
+    """Relative standard deviations."""
+    correlation: tuple[tuple[float, ...], ...]
+    """Correlations of the errors: a list for each key."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        sizes = {len(self.deviation), len(self.correlation), *map(len, self.correlation)}
+        if sizes != {len(self.keys)}:
+            raise ValueError(f"expected a deviation and a list of correlations for each of {len(self.keys)} keys")
+        return self
+
+    @property
+    def steps(self) -> Array:
+        """Independent changes (k, n) of ln θ of one standard deviation each: Σ step stepᵀ is the covariance."""
+        values, vectors = np.linalg.eigh(np.array(self.correlation))
+        if values[0] < -ROUND_OFF * len(values):
+            raise InputError("correlation: expected one without negative eigenvalues, found others")
+        return as_floats((vectors * np.sqrt(values.clip(min=0.0))).T * np.array(self.deviation))
+
+
+def write_covariance(fit: Parameters, path: Path) -> None:
+    """Write keys, deviations and correlations of a fit to a TOML file."""
+    tables = {
+        "keys": list(fit.keys),
+        "deviation": fit.relative_deviation.tolist(),
+        "correlation": fit.correlation.tolist(),
+    }
+    write_atomically(path, tomli_w.dumps(tables).encode(), "covariance of the fit")
+
+
+def with_deviations(poses: PoseMap, path: Path) -> PoseMap:
+    """The map with `milling_deviation` (P,), m: standard deviations of `milling_depth` by the covariance in a file.
+
+    σ² = Σ ((a₊ − a₋)/2)² over independent changes of one standard deviation of the parameters to both sides; NaN where
+    a changed robot has no equilibrium, or no limit. Raises `InputError` for a map without milling or a wrong file.
+    """
+    plan, table = poses.plan, validate(Covariance, load_toml(path, "covariance of a fit"), path)
+    if (milling := plan.milling) is None:
+        raise InputError(f"{path}: --covariance: expected --milling, found none")
+    target = RobotTarget(plan.scene, "locked")
+    varied, variances = VariedKeys(plan.scene, target, table.keys, None), dict[str, Array]()
+    for step in table.steps:
+        sides = [_depths(poses, plan, milling, target, varied, varied.start * np.exp(sign * step)) for sign in (1, -1)]
+        for name, ahead in sides[0].items():
+            with np.errstate(invalid="ignore"):
+                variances[name] = variances.get(name, 0.0) + ((ahead - sides[1][name]) / 2) ** 2
+    named = {name.replace(DEPTH, DEVIATION): np.sqrt(values) for name, values in variances.items()}
+    return replace(poses, values={**poses.values, **named})
+
+
+def _depths(
+    poses: PoseMap, plan: MapPlan, milling: Milling, target: RobotTarget, varied: VariedKeys, values: Array
+) -> dict[str, Array]:
+    """Stable depths (P,) in all poses with other values of the parameters; NaN where there are none."""
+    with varied.named(values):
+        model = prepare_scene(target.scene(varied.changes(values), "static")).model
+    names = [name for name in poses.values if name.endswith(f"/{DEPTH}")]
+    depths = {name: np.full(len(poses.q), np.nan) for name in names}
+    good = np.flatnonzero(poses.status == 0)
+    judge = partial(stable_depths, milling.model_copy(update={"speeds": ()}))
+    evaluator = PoseEvaluator(model, poses.q[good[0]], plan.point, judge=judge)
+    for pose in good:
+        try:
+            found = evaluator.at(poses.q[pose])
+        except SolveError:
+            continue
+        for name in names:
+            depths[name][pose] = found[name]
+    return depths
