@@ -72,9 +72,9 @@ class Tip(NamedTuple):
         poles, V = np.linalg.eig(A)
         left = np.linalg.inv(V)[:, m:] @ self.J.T
         right = self.J @ V[:m]
-        vibrates = poles[poles.imag > 0.0]
-        bandwidth = np.maximum(np.abs(vibrates.real), LEAST * np.abs(vibrates))
-        omega = (np.abs(vibrates)[:, None] + bandwidth[:, None] * SPREAD).ravel()
+        size = np.abs(poles[poles.imag >= 0.0])  # real ones, too: strong damping leaves depths a limit
+        bandwidth = np.maximum(np.abs(poles.real[poles.imag >= 0.0]), LEAST * size)
+        omega = (size[:, None] + bandwidth[:, None] * SPREAD).ravel()
         omega = np.unique(omega[omega > 0.0])
         residues = right.T[:, :, None] * left[:, None, :]
         return as_floats(omega), np.tensordot(1.0 / (1j * omega[:, None] - poles), residues, axes=1)

@@ -30,6 +30,14 @@ def test_turning_has_the_closed_form():
     assert limits.least == pytest.approx(2 * MASS * OMEGA**2 * ZETA * (1 + ZETA) / K_T, rel=1e-4)
 
 
+@pytest.mark.parametrize("zeta", [0.3, 1.0 + 1e-9, 4.0])
+def test_turning_with_strong_damping_has_a_limit(zeta):
+    """a = 2 k ζ (1 + ζ)/K_s for any ζ."""
+    tip = Tip(ONE.K, np.array([[2 * zeta * OMEGA]]), ONE.J)
+    limits = stability_limits(np.array([[-K_T]]), *tip.response())
+    assert limits.least == pytest.approx(2 * MASS * OMEGA**2 * zeta * (1 + zeta) / K_T, rel=2e-3)
+
+
 def test_lobes_of_turning_have_the_closed_form():
     """At ω, exp(−iωτ) = −G*/G, so that ωτ = 2 arg G + π + 2πk: a speed for each lobe k, with the depth at ω."""
     omega, G = ONE.response()
