@@ -181,6 +181,8 @@ def _check(where: str, column: Column, inside: Booleans) -> None:
         )
     if not (np.isfinite(values).all() and np.abs(values).all()):
         raise InputError(f"{where}: expected finite values that are not 0", "others")
+    if len(at) > 1 and (values.real > 0.0).all() and not values.imag.any():
+        raise InputError(f"{where}: expected complex values", "positive real ones: a magnitude is no FRF")
     coherence = np.ones(1) if column.coherence is None else column.coherence[inside]
     if not ((coherence >= 0.0) & (coherence <= 1.0)).all():
         raise InputError(f"{where}: coherence: expected values from 0 to 1", f"{_worst(coherence):g}")

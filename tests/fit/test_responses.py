@@ -296,6 +296,7 @@ def test_bad_files_are_refused(tmp_path, case):
         ("5.0,1/x,1/x,one,0.0,0.9\n", 'line 2: expected a number, found "one"'),
         ("", "expected a line for each frequency of each function below line 1, found none"),
         ("5.0,1/x,1/x,1e-3\n", "line 2: expected 6 cells, found 4"),
+        ("5.0,1/x,1/x,1e-3,0.0,0.9\n6.0,1/x,1/x,2e-3,0.0,0.9\n", "expected complex values, found positive real ones"),
         ("5.0,1/x,1/x,1e-3,0.0,0.9\n" * 2, "expected each frequency once, in rising order"),
     ],
 )
