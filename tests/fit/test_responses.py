@@ -197,6 +197,21 @@ def test_arm_in_gravity_from_far_starts(tmp_path, start):
     np.testing.assert_allclose(fit.value, [300.0, 2.0], rtol=1e-6)
 
 
+def test_payload_from_a_mobility(tmp_path):
+    """iω l²/(k − (I + m l²) ω² + iωd) with m = 2.5 kg, in mm/s/N."""
+    files, w = arm_in_gravity(tmp_path, 400.0, 3.0), 2 * np.pi * np.linspace(0.5, 8.0, 60)
+    scene = tomllib.loads(files[0].read_text())
+    payload = [{"point": "arm.tip", "mass": 1.0}]
+    files[0].write_text(tomli_w.dumps(scene | {"gravity": [0.0, 0.0], "payload": payload}))
+    H = 1e3j * w * 0.7**2 / (300.0 - (0.3 + 8.0 * 0.4**2 + 2.5 * 0.7**2) * w**2 + 2j * w)
+    pairs = zip((w / (2 * np.pi)).tolist(), H.tolist(), strict=True)
+    rows = [f"{f!r},arm.tip/y,arm.tip/y,{h.real!r},{h.imag!r}" for f, h in pairs]
+    (tmp_path / "0.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+    files[1].write_text(tomli_w.dumps({"test": [{"name": "one", "file": "0.csv", "unit": "mm/s/N"}]}))
+    fit = ffrobot.fit_responses(*files, ["joint.a.stiffness", "joint.a.damping", "payload.0.mass"])
+    np.testing.assert_allclose(fit.value, [300.0, 2.0, 2.5], rtol=1e-6)
+
+
 def test_frfs_without_motion_and_keys_that_are_there_twice(tmp_path):
     files = arm_in_gravity(tmp_path, 1e3, 1.0)
     with pytest.raises(InputError, match=r'each key once, found "joint.a.stiffness" again'):
