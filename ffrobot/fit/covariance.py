@@ -50,7 +50,7 @@ class Covariance(Record):
         """Independent changes (k, n) of ln θ of one standard deviation each: Σ step stepᵀ is the covariance."""
         values, vectors = np.linalg.eigh(np.array(self.correlation))
         if values[0] < -ROUND_OFF * len(values):
-            raise InputError("correlation: expected one without negative eigenvalues, found others")
+            raise InputError("correlation: expected one without negative eigenvalues", "others")
         return as_floats((vectors * np.sqrt(values.clip(min=0.0))).T * np.array(self.deviation))
 
 
@@ -72,7 +72,7 @@ def with_deviations(poses: PoseMap, path: Path) -> PoseMap:
     """
     plan, table = poses.plan, validate(Covariance, load_toml(path, "covariance of a fit"), path)
     if (milling := plan.milling) is None:
-        raise InputError(f"{path}: --covariance: expected --milling, found none")
+        raise InputError(f"{path}: --covariance: expected --milling", "none")
     target = RobotTarget(plan.scene, "locked")
     varied, variances = VariedKeys(plan.scene, target, table.keys, None), dict[str, Array]()
     for step in table.steps:

@@ -57,7 +57,7 @@ def _universal(path: Path) -> Iterator[Column]:
         for one in sets:
             one["data"].real, one["x"], one["func_type"]
     except Exception:  # whatever pyuff finds in a file that is none
-        raise InputError(f"{path}: expected datasets 58 of a universal file, found some that are damaged") from None
+        raise InputError(f"{path}: expected datasets 58 of a universal file", "damaged ones") from None
     ends = [(one["ref_node"], one["ref_dir"], one["rsp_node"], one["rsp_dir"]) for one in sets]
     coherence = {at: one["data"].real for at, one in zip(ends, sets, strict=True) if one["func_type"] == COHERENCE}
     for at, one in zip(ends, sets, strict=True):
@@ -112,7 +112,7 @@ def _number(path: Path, line: int, cell: str) -> float:
     try:
         return float(cell)
     except ValueError:
-        raise InputError(f'{path}: line {line}: expected a number', f'"{shown(cell)}"') from None
+        raise InputError(f"{path}: line {line}: expected a number", f'"{shown(cell)}"') from None
 
 
 def _of_mat(path: Path) -> Iterator[Column]:
@@ -122,7 +122,7 @@ def _of_mat(path: Path) -> Iterator[Column]:
         data = scipy.io.loadmat(content, chars_as_strings=True)
     except Exception:  # whatever SciPy finds in a file that is none
         raise InputError(
-            f"{path}: expected a .mat file of version 7 or older (MATLAB: save -v7), found another file"
+            f"{path}: expected a .mat file of version 7 or older (MATLAB: save -v7)", "another file"
         ) from None
     if missing := [name for name in ("frequency", "H", *ENDS) if name not in data]:
         raise InputError(f"{path}: expected variables frequency, H, force and response", f"no {quoted(missing)}")
@@ -132,13 +132,13 @@ def _of_mat(path: Path) -> Iterator[Column]:
         coherence = data["coherence"].astype(float) if "coherence" in data else np.full(H.shape, np.nan)
     except (ValueError, TypeError, IndexError):
         raise InputError(
-            f"{path}: expected numbers in frequency, H and coherence, and names in force and response, found others"
+            f"{path}: expected numbers in frequency, H and coherence, and names in force and response", "others"
         ) from None
     shape = (len(frequency), len(ends[0]))
     if not shape == H.shape == coherence.shape == (len(frequency), len(ends[1])):
         raise InputError(
-            f"{path}: expected H and coherence with a line for each frequency and a column for each force and response,"
-            f" found H of shape {H.shape} for {shape[0]} frequencies, {shape[1]} forces and {len(ends[1])} responses"
+            f"{path}: expected H and coherence with a line for each frequency and a column for each force and response",
+            f"H of shape {H.shape} for {shape[0]} frequencies, {shape[1]} forces and {len(ends[1])} responses",
         )
     for k, (force, response) in enumerate(zip(*ends, strict=True)):
         yield Column(force, response, as_floats(frequency), H[:, k], coherence[:, k] if "coherence" in data else None)

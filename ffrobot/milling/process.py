@@ -77,7 +77,7 @@ class Milling(Record):
         given = np.eye(3)[np.abs(axis).argmin()] if self.feed is None else np.array(self.feed)
         x = given - axis * (axis @ given)
         if (size := np.linalg.norm(x)) <= ALONG * np.linalg.norm(given):
-            raise InputError("milling: feed: expected a direction across the axis of the tool, found one along it")
+            raise InputError("milling: feed: expected a direction across the axis of the tool", "one along it")
         x /= size
         angles = np.arange(FEEDS) * np.pi / FEEDS if self.feed is None else np.zeros(1)
         y, c, s = np.cross(axis, x), np.cos(angles)[:, None], np.sin(angles)[:, None]

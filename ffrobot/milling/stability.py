@@ -146,9 +146,8 @@ def growth(tip: Tip, cutter: Cutter, depth: float, speed: float) -> float:
     fastest = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0)))
     if (turned := fastest * pitch / speed) > FINE * STEPS[1]:
         raise InputError(
-            f"milling: semi-discretization: expected modes that turn by at most {FINE * STEPS[1]:g} rad in a tooth"
-            f" period, found {turned:.4g} rad at {speed * 30 / np.pi:g} rev/min: lower the key highest, or"
-            ' method = "averaged"'
+            f"milling: semi-discretization: expected modes within {FINE * STEPS[1]:g} rad of a tooth period",
+            f"{turned:.4g} rad at {speed * 30 / np.pi:g} rev/min: lower the key highest, or average forces",
         )
     steps = max(STEPS[0], int(np.ceil(turned / FINE)))
     edges, angles = np.linspace(0.0, pitch, steps + 1)[:, None], pitch * np.arange(cutter.teeth)
