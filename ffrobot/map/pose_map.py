@@ -55,7 +55,7 @@ def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
     long = [axis for axis in axes if len(axis.values) > 1]
     if any(axis.is_place for axis in axes) and not all(axis.is_place for axis in long):
         raise InputError(
-            "--over: expected joints alone or directions of a point alone, beside which joints have one value",
+            "--over: expected joints alone or directions of a point alone, or with joints of one value",
             quoted(names),
         )
     if not axes or len(long) > MOST_AXES:
