@@ -70,6 +70,13 @@ def map_(
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
 
+    if covariance and not milling:
+        raise InputError("--covariance: expected --milling, too", "none")
+    errors = None
+    if covariance:  # what reads it loads more than a map does
+        from ..fit.covariance import read_covariance, with_deviations
+
+        errors = read_covariance(covariance)
     folder = output or scene_file.with_suffix(".map")
     protect([*files_of(scene_file), *(file for file in (milling, covariance) if file)])
     plan = plan_map(
@@ -84,11 +91,9 @@ def map_(
     )
     with Display() as display:
         made = make_map(plan, processes, display)
-        if covariance:
-            from ..fit.covariance import with_deviations
-
+        if errors:
             display.stage("deviations of stable depths")
-            made = with_deviations(made, covariance)
+            made = with_deviations(made, errors)
     path, console = write_map(made), summary_console()
     print_map(made, console)
     if figures:

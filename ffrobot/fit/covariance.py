@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,10 +17,10 @@ from ..common.errors import InputError, SolveError
 from ..common.files import write_atomically
 from ..common.toml_files import load_toml
 from ..common.validation import Record, validate
-from ..map.pose_map import MapPlan, PoseMap
+from ..map.pose_map import PoseMap
 from ..mbs.fields.field_types import NotNegative
 from ..mbs.linear.poses import PoseEvaluator
-from ..milling.process import Milling, stable_depths
+from ..milling.process import stable_depths
 from ..run.solve import prepare_scene
 from .fitting import RobotTarget, VariedKeys
 from .least_squares import Parameters
@@ -64,42 +65,39 @@ def write_covariance(fit: Parameters, path: Path) -> None:
     write_atomically(path, tomli_w.dumps(tables).encode(), "covariance of the fit")
 
 
-def with_deviations(poses: PoseMap, path: Path) -> PoseMap:
-    """The map with `milling_deviation` (P,), m: standard deviations of `milling_depth` by the covariance in a file.
+def read_covariance(path: Path) -> Covariance:
+    """The covariance in the TOML file at `path`. Raises `InputError` for wrong keys."""
+    return validate(Covariance, load_toml(path, "covariance of a fit"), path)
+
+
+def with_deviations(poses: PoseMap, covariance: Covariance) -> PoseMap:
+    """The map of stable depths with `milling_deviation` (P,), m: standard deviations of `milling_depth`.
 
     σ² = Σ ((a₊ − a₋)/2)² over independent changes of one standard deviation of the parameters to both sides; NaN where
-    a changed robot has no equilibrium, or no limit. Raises `InputError` for a map without milling or a wrong file.
+    a changed robot has no equilibrium, or no limit. Raises `InputError` for keys that the scene has not.
     """
-    plan, table = poses.plan, validate(Covariance, load_toml(path, "covariance of a fit"), path)
-    if (milling := plan.milling) is None:
-        raise InputError(f"{path}: --covariance: expected --milling", "none")
-    target = RobotTarget(plan.scene, "locked")
-    varied, variances = VariedKeys(plan.scene, target, table.keys, None), dict[str, Array]()
-    for step in table.steps:
-        sides = [_depths(poses, plan, milling, target, varied, varied.start * np.exp(sign * step)) for sign in (1, -1)]
-        for name, ahead in sides[0].items():
+    target = RobotTarget(poses.plan.scene, "locked")
+    varied, variances = VariedKeys(poses.plan.scene, target, covariance.keys, None), dict[str, Array]()
+    for step in covariance.steps:
+        ahead, behind = (_depths(poses, target, varied, varied.start * np.exp(sign * step)) for sign in (1, -1))
+        for name, depth in ahead.items():
             with np.errstate(invalid="ignore"):
-                variances[name] = variances.get(name, 0.0) + ((ahead - sides[1][name]) / 2) ** 2
+                variances[name] = variances.get(name, 0.0) + ((depth - behind[name]) / 2) ** 2
     named = {name.replace(DEPTH, DEVIATION): np.sqrt(values) for name, values in variances.items()}
     return replace(poses, values={**poses.values, **named})
 
 
-def _depths(
-    poses: PoseMap, plan: MapPlan, milling: Milling, target: RobotTarget, varied: VariedKeys, values: Array
-) -> dict[str, Array]:
-    """Stable depths (P,) in all poses with other values of the parameters; NaN where there are none."""
+def _depths(poses: PoseMap, target: RobotTarget, varied: VariedKeys, values: Array) -> dict[str, Array]:
+    """Stable depths (P,) in all poses with other values of the parameters, by name; NaN where there are none."""
     with varied.named(values):
         model = prepare_scene(target.scene(varied.changes(values), "static")).model
-    names = [name for name in poses.values if name.endswith(f"/{DEPTH}")]
-    depths = {name: np.full(len(poses.q), np.nan) for name in names}
-    good = np.flatnonzero(poses.status == 0)
-    judge = partial(stable_depths, milling.model_copy(update={"speeds": ()}))
-    evaluator = PoseEvaluator(model, poses.q[good[0]], plan.point, judge=judge)
+    depths = {name: np.full(len(poses.q), np.nan) for name in poses.values if name.endswith(f"/{DEPTH}")}
+    good, milling = np.flatnonzero(poses.status == 0), poses.plan.milling
+    judge = None if milling is None else partial(stable_depths, milling.model_copy(update={"speeds": ()}))
+    evaluator = PoseEvaluator(model, poses.q[good[0]], poses.plan.point, judge=judge)
     for pose in good:
-        try:
+        with suppress(SolveError):
             found = evaluator.at(poses.q[pose])
-        except SolveError:
-            continue
-        for name in names:
-            depths[name][pose] = found[name]
+            for name in depths:
+                depths[name][pose] = found[name]
     return depths

@@ -12,7 +12,7 @@ from rigid_chain import ARM, TOOL, frames, receptance, scene
 from scipy.spatial.transform import Rotation
 
 from ffrobot.common.errors import InputError
-from ffrobot.fit.covariance import with_deviations
+from ffrobot.fit.covariance import read_covariance, with_deviations
 from ffrobot.map.map_file import print_map, write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.milling.process import read_milling
@@ -75,7 +75,8 @@ def test_deviation_of_the_depth_is_that_of_samples(mapped, tmp_path):
     keys, deviation, correlation = ("joint.elbow.stiffness", "joint.elbow.damping"), np.array([0.04, 0.1]), 0.6
     table = {"keys": keys, "deviation": deviation.tolist(), "correlation": [[1.0, correlation], [correlation, 1.0]]}
     (tmp_path / "fitted.covariance.toml").write_text(tomli_w.dumps(table))
-    found = with_deviations(mapped, tmp_path / "fitted.covariance.toml").values["joints_compliant/milling_deviation"]
+    errors_of_fit = read_covariance(tmp_path / "fitted.covariance.toml")
+    found = with_deviations(mapped, errors_of_fit).values["joints_compliant/milling_deviation"]
     errors = np.random.default_rng(4).multivariate_normal([0.0, 0.0], [[1.0, correlation], [correlation, 1.0]], 40)
     pose, depths = mapped.q[2, :8], []
     for error in errors * deviation:
@@ -87,7 +88,7 @@ def test_deviation_of_the_depth_is_that_of_samples(mapped, tmp_path):
     for name, wrong in (("bad.toml", "without negative eigenvalues"), ("short.toml", "for each of 2 keys")):
         (tmp_path / "short.toml").write_text(tomli_w.dumps(table | {"deviation": [0.1]}))
         with pytest.raises(InputError, match=wrong):
-            with_deviations(mapped, tmp_path / name)
+            with_deviations(mapped, read_covariance(tmp_path / name))
 
 
 def test_turns_need_a_tool_that_mills(mapped):
