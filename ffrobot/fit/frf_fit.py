@@ -135,8 +135,9 @@ class _Residuals:
 
 
 def _smoothing(frequency: Array, width: float) -> Array:
-    """(F, F) means over ln f with Gaussian weights."""
-    apart = np.log(frequency[:, None] / frequency) / width
+    """(k, F) means over ln f with Gaussian weights, a quarter of their width apart."""
+    places = np.log(frequency)
+    apart = (np.arange(places[0], places[-1] + width / 4, width / 4)[:, None] - places) / width
     weights = np.exp(-0.5 * apart**2)
     return as_floats(weights / weights.sum(axis=1, keepdims=True))
 

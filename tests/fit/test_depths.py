@@ -94,3 +94,20 @@ def test_deviation_of_the_depth_is_that_of_samples(mapped, tmp_path):
 def test_turns_need_a_tool_that_mills(mapped):
     with pytest.raises(InputError, match="--over: turn: expected --milling with the axis"):
         plan_map(mapped.plan.scene, ("turn=0:1:3",), mapped.plan.folder)
+
+
+def test_the_axis_of_a_tool_frame_is_in_its_own_axes(mapped, tmp_path):
+    """The same turns and depths with z of a frame along the axis at the start."""
+    upright = Rotation.from_rotvec([-np.arctan2(0.6, 0.8), 0.0, 0.0])
+    rpy = (Rotation.from_matrix(frames(ARM, POSE)[-1][2]).inv() * upright).as_euler("xyz").tolist()
+    of_tool = scene(ARM, TOOL, POSE) | {"tool": [{"name": "cutter", "point": "body7.end", "rpy": rpy}]}
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(of_tool))
+    (tmp_path / "cutter.toml").write_text(tomli_w.dumps(PROCESS | {"axis": [0.0, 0.0, 1.0]}))
+    over, milling = ("tilt_x=0", "tilt_y=0", "turn=0:40*deg:2"), read_milling(tmp_path / "cutter.toml")
+    found = make_map(
+        plan_map(tmp_path / "arm.toml", over, tmp_path / "map", "body7.cutter", milling=milling), 1, Watcher()
+    )
+    np.testing.assert_allclose(found.q, mapped.q[[2, 4]], atol=1e-7)
+    for name in ("milling_best_depth", "milling_depth"):
+        expected = mapped.values[f"joints_compliant/{name}"][[2, 4]]
+        np.testing.assert_allclose(found.values[f"joints_compliant/{name}"], expected, rtol=0.02)
