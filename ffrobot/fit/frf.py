@@ -77,7 +77,7 @@ def fit_responses(
     found = fit_receptances(equations, varied.names, varied.start, measured)
     files = varied.write(found.value)
     write_covariance(found, covariance)
-    return replace(found, files=(*files, str(covariance)))
+    return replace(found, files=(str(covariance), *files))
 
 
 def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | None:

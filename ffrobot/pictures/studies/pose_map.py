@@ -52,7 +52,8 @@ def _lobes(pose_map: PoseMap) -> Iterator[Path]:
         for (number, color, _), label in zip(_marks(table[name]), LABELS, strict=True):
             depth = np.where(np.isfinite(lobes[number]), 1e3 * lobes[number], np.nan)[order]
             axes.plot(np.array(milling.speeds)[order], depth, color=color, label=f"{label} pose")
-            axes.axhline(table[name].values[number], color=color, linestyle=":", label="at any speed")
+            line = axes.axhline(table[name].values[number], color=color, linestyle=":")
+        line.set_label("at any speed")
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel("spindle speed (rev/min)")
         axes.set_ylabel("depth of cut (mm)")
