@@ -41,19 +41,15 @@ def receptance(
     equations: Array, pose: MeasuredPose, changes: Sequence[Array] = ()
 ) -> tuple[ComplexArray, ComplexArray]:
     """H (F, p), m/N, where a pose was measured, and its derivatives (n, F, p) along `changes` of the equations."""
-    (M, K, D, J), w, f, r = unstacked(equations), pose.omega, pose.ends.force, pose.ends.response
-    X = vibration(M, K, D, J, w)
+    (M, K, D, J), f, r = unstacked(equations), pose.ends.force, pose.ends.response
+    X, w = vibration(M, K, D, J, pose.omega), pose.omega[:, None, None]
     H: ComplexArray = np.asarray((J @ X)[:, r, f], dtype=complex)
     slopes = np.empty((len(changes), *H.shape), dtype=complex)
     if len(changes):
-        Y = vibration(M.T, K.T, D.T, J, w)[:, :, r]
-        along = np.ascontiguousarray(X.transpose(1, 0, 2)[:, :, f])  # (coordinates, F, p)
-        still, moving, speeding = (
-            part.reshape(len(M), -1) for part in (along, along * 1j * w[:, None], along * w[:, None] ** 2)
-        )
+        Y = vibration(M.T, K.T, D.T, J, pose.omega).swapaxes(1, 2)
         for k, (dM, dK, dD, dJ) in enumerate(map(unstacked, changes)):
-            forces = (dK @ still + dD @ moving - dM @ speeding).reshape(along.shape)
-            slopes[k] = np.einsum("pi,ifp->fp", dJ[r], along) + np.einsum("fip,ifp->fp", Y, dJ[f].T[:, None] - forces)
+            dX = dK @ X + 1j * w * (dD @ X) - w**2 * (dM @ X)
+            slopes[k] = (dJ @ X + Y @ dJ.T - Y @ dX)[:, r, f]
     return H, slopes
 
 
