@@ -29,39 +29,41 @@ def draw_map(pose_map: PoseMap) -> list[Path]:
     """A picture of each quantity that differs from pose to pose, in the folder of the map; their files."""
     files = []
     with style():
-        for name, quantity in quantities(pose_map).items():
-            if not np.isfinite(quantity.values).any() or quantity.everywhere:
-                continue
-            content, path = io.BytesIO(), pose_map.plan.folder / f"{name}.png"
-            _draw(pose_map, quantity).savefig(content, format="png")
-            write_atomically(path, content.getvalue(), "picture", ours=True)
-            files.append(path)
-        files += _lobes(pose_map)
+        for name, figure in (*_maps(pose_map), *_lobes(pose_map)):
+            files.append(pose_map.plan.folder / f"{name}.png")
+            content = io.BytesIO()
+            figure.savefig(content, format="png")
+            write_atomically(files[-1], content.getvalue(), "picture", ours=True)
     return files
 
 
-def _lobes(pose_map: PoseMap) -> Iterator[Path]:
-    """Stable depths over the spindle speed in the worst and in the best pose; their files."""
+def _maps(pose_map: PoseMap) -> Iterator[tuple[str, Figure]]:
+    for name, quantity in quantities(pose_map).items():
+        if np.isfinite(quantity.values).any() and not quantity.everywhere:
+            yield name, _draw(pose_map, quantity)
+
+
+def _lobes(pose_map: PoseMap) -> Iterator[tuple[str, Figure]]:
+    """Stable depths over the spindle speed in the worst and in the best pose."""
     milling, table = pose_map.plan.milling, quantities(pose_map)
     for condition in CONDITIONS if milling is not None and len(milling.speeds) > 1 else ():
         lobes, name = pose_map.values.get(f"joints_{condition}/milling_lobes"), f"milling_{condition}"
         if milling is None or lobes is None or not np.isfinite(lobes).any():
             continue
-        order, content = np.argsort(milling.speeds), io.BytesIO()
+        order, label = np.argsort(milling.speeds), "at any speed"
         figure, axes = new_axes(f"depth of cut with chatter above, {CONDITIONS[condition]}")
-        for (number, color, _), label in zip(_marks(table[name]), LABELS, strict=True):
-            depth = np.where(np.isfinite(lobes[number]), 1e3 * lobes[number], np.nan)[order]
-            axes.plot(np.array(milling.speeds)[order], depth, color=color, label=f"{label} pose")
-            line = axes.axhline(table[name].values[number], color=color, linestyle=":")
-        line.set_label("at any speed")
+        for (number, color, _), pose in zip(_marks(table[name]), LABELS, strict=True):
+            depth, least = 1e3 * lobes[number], table[name].values[number]
+            depth[~np.isfinite(depth)] = np.nan
+            axes.plot(np.array(milling.speeds)[order], depth[order], color=color, label=f"{pose} pose")
+            if np.isfinite(least):
+                axes.axhline(least, color=color, linestyle=":", label=label)
+                label = ""
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel("spindle speed (rev/min)")
         axes.set_ylabel("depth of cut (mm)")
         legend(axes)
-        figure.savefig(content, format="png")
-        path = pose_map.plan.folder / f"lobes_{condition}.png"
-        write_atomically(path, content.getvalue(), "picture", ours=True)
-        yield path
+        yield f"lobes_{condition}", figure
 
 
 def _draw(pose_map: PoseMap, quantity: Quantity) -> Figure:
