@@ -9,29 +9,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats, null_space
+from ...common.arrays import Array, Booleans, as_floats, null_space
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.model import Model, constraint_rates
 from ..model.motors import driven_mechanism
-from ..model.nodes import Node, coordinate_row
-from .posture import Mobility, joint_scales, mobility, natural_gradients, row_sizes
+from ..model.nodes import Node, coordinate_row, rows_of_joint
+from .posture import Mobility, joint_scales, mobility, natural_gradients, row_sizes, solve_postures
 from .prescribed import joint_places, prescribed_motion
 from .start import undeformed_posture
 
 OWNER = "redundancy"  # of the rows that this adds
 NODES = 401  # of the splines that joints follow
 TOLERANCE = 1e-9  # of the motion with rigid links
-INTERVALS = 4  # of the splines among which that of least moments is
-STRIDE = 20  # of these nodes at which moments count
+INTERVALS = 4  # of the splines by which joints move
+STRIDE = 10  # of these nodes at which moments count
 OUT_OF_REACH = 1e3
-MOST_STEPS = 60  # to the least moments: most motions take 10 to 25
+MOST_MOVES = 40  # to the least torque: most motions take 4 to 10
+LONGEST = 0.5  # of joints in one of them, rad or sizes of the robot
+SETTLED = 1e-4  # share of the integral that the last one takes off
 RANK = 1e-6  # of the largest singular value
 TELLS = 0.02  # share of a motion left free that joints must have at all times to tell it
 
@@ -49,12 +51,14 @@ def resolved(model: Model, end: float) -> Model:
     _check(model, criterion, free)
     times = as_floats(np.linspace(0.0, end, NODES)) if end > 0 else np.zeros(1)
     q = _least_motion(model, start.q, times)
-    nodes = _most_observable(model, q, times, free.freedom - free.followed)
+    redundant = free.freedom - free.followed
     if not end > 0:
+        nodes = _most_observable(model, q, times, redundant)
         return _with_prescribed_joints(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
-    return _with_prescribed_joints(
-        model, nodes, times, _least_torque(model, nodes, times, q) if criterion == "least-torque" else q
-    )
+    if criterion == "least-torque":
+        q = _least_torque(model, times, q)
+    nodes = _most_observable(model, q, times, redundant)
+    return _with_prescribed_joints(model, nodes, times, q)
 
 
 def resolving_joints(model: Model) -> list[str]:
@@ -91,6 +95,16 @@ def _with_prescribed_joints(model: Model, nodes: Sequence[Node], times: Array, q
     return replace(model, rows=(*model.rows, *rows))
 
 
+def _with_all_joints(model: Model, times: Array, q: Array) -> Model:
+    """With rows by which all joints follow q (T, n_q) at `times` (T,), and none of the path."""
+    rows = [
+        row
+        for node in model.tree.nodes if node.joint.freedoms
+        for row in rows_of_joint(OWNER, node, np.r_[node.v], spline(times, q[:, node.q], 5))
+    ]  # fmt: skip
+    return replace(model, rows=tuple(rows))
+
+
 def _least_motion(model: Model, q: Array, times: Array) -> Array:
     """Q (T, n_q) from q (n_q,) on, with the least v at every time (D. Whitney, IEEE Trans. MMS-10, 1969)."""
     if len(times) == 1:
@@ -121,49 +135,65 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
     raise ends_at(run.t[-1])
 
 
-def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -> Array:
-    """Q (T, n_q), of which the joints of `nodes` count, with the least ∫ Σ τ² dt from the state at t = 0 on.
+def _least_torque(model: Model, times: Array, q: Array) -> Array:
+    """Q (T, n_q) with the least ∫ Σ τ² dt from the state at t = 0 on, from q (T, n_q).
 
-    The motions of these joints are those of q and quintic B-splines that leave place and rate at t = 0 as they are. The
-    least over a whole motion: what is least at every time alone makes joints run away (J. M. Hollerbach, K. C. Suh,
+    The least over a whole motion: what is least at every time alone makes joints run away (J. M. Hollerbach, K. C. Suh,
     IEEE J. Robotics and Automation 3, 1987).
     """
-    end, count = float(times[-1]), INTERVALS + 5
-    knots = np.concatenate([np.zeros(5), np.linspace(0.0, end, INTERVALS + 1), np.full(5, end)])
-    basis = [scipy.interpolate.BSpline.design_matrix(t, knots, 5).toarray()[:, 2:] for t in (times, times[::STRIDE])]
-    places, scales = [node.q.start for node in nodes], joint_scales(model)
-    weights = np.sqrt(scipy.integrate.simpson(np.eye(len(times[::STRIDE])), x=times[::STRIDE]))[:, None] * scales
-    still, start = np.zeros((3, len(weights), int(np.count_nonzero(~model.tree.joint_columns)))), q[::STRIDE]
+    last = np.inf
+    for _ in range(MOST_MOVES):
+        q, squares = _less_torque(model, times, q)
+        if squares > (1.0 - SETTLED) * last:
+            return q
+        last = squares
+    raise SolveError(
+        f'{model.scene.path}: redundancy = "least-torque": expected the least within {MOST_MOVES} moves',
+        'none: "least-motion" needs none, or prescribe a joint by a trajectory',
+    )
 
-    def moved(c: Array, which: int) -> Array:
-        best = (q if which == 0 else start).copy()
-        best[:, places] += basis[which] @ c.reshape(count - 2, len(places))
-        return best
+
+def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float]:
+    """Q (T, n_q) with the least ∫ Σ τ² dt near q, and this integral.
+
+    Quintic B-splines, which leave the state at t = 0, lead away from q along what the path leaves free; the nearest
+    posture on the path follows, so that nothing leaves its reach.
+    """
+    end, count, of_joints = float(times[-1]), INTERVALS + 3, model.tree.joint_columns
+    knots = np.concatenate([np.zeros(5), np.linspace(0.0, end, INTERVALS + 1), np.full(5, end)])
+    basis = scipy.interpolate.BSpline.design_matrix(times, knots, 5).toarray()[:, 2:]
+    places, scales, seen = joint_places(model), joint_scales(model), slice(None, None, STRIDE)
+    weights = np.sqrt(scipy.integrate.simpson(np.eye(len(times[seen])), x=times[seen]))[:, None] * scales
+    still = np.zeros((3, len(weights), int(np.count_nonzero(~of_joints))))
+    free = [null_space(C_v[:, of_joints], RANK) for C_v in natural_gradients(model, q, times, scales)]
+    for k in range(1, len(free)):  # the least turned from one time to the next
+        U, _, V = np.linalg.svd(free[k].T @ free[k - 1])
+        free[k] = free[k] @ U @ V
+    ways = scales[of_joints, None] * np.stack(free)  # (T, joints, motions)
+
+    def moved(shares: Array, at: slice) -> tuple[Array, Booleans]:
+        best = q[at].copy()
+        best[:, places] += np.einsum("tjk,tk->tj", ways[at], basis[at] @ shares.reshape(count, -1))
+        return solve_postures(model, times[at], best)
 
     def moments(c: Array) -> Array:
-        driven = _with_prescribed_joints(model, nodes, times, moved(c, 0))
-        try:
-            mechanism = _core.SpatialPrescribedMotion(driven_mechanism(driven, has_motors=False), start[0])
-            motion = prescribed_motion(driven, mechanism, still, times[::STRIDE], moved(c, 1))
-        except SolveError:  # out of reach: worse than anything within it
-            return np.full(weights.size, OUT_OF_REACH)
-        return (weights * motion.required).ravel() / size
+        best, is_met = moved(c - 1.0, seen)
+        driven = _with_all_joints(model, times[seen], best)
+        mechanism = _core.SpatialPrescribedMotion(driven_mechanism(driven, has_motors=False), best[0])
+        motion = prescribed_motion(driven, mechanism, still, times[seen], best)
+        return (weights * motion.required).ravel() / size if is_met.all() else np.full(weights.size, OUT_OF_REACH)
 
-    size = 1.0
-    size = float(np.linalg.norm(moments(np.zeros((count - 2) * len(places))))) or 1.0
-    best = scipy.optimize.least_squares(
-        moments, np.zeros((count - 2) * len(places)), diff_step=1e-6, ftol=1e-8, xtol=1e-6, max_nfev=MOST_STEPS
-    )
-    if not best.success:
-        raise SolveError(
-            f'{model.scene.path}: redundancy = "least-torque": expected the least within {MOST_STEPS} steps',
-            'none: "least-motion" needs none, or prescribe a joint by a trajectory',
-        )
-    return moved(best.x, 0)
+    size, start = 1.0, np.ones(count * ways.shape[-1])  # at 1, where small steps are far above round-off of postures
+    size = float(np.linalg.norm(moments(start))) or 1.0
+    near = (start - LONGEST, start + LONGEST)
+    best = scipy.optimize.least_squares(moments, start, diff_step=1e-5, bounds=near, ftol=1e-5, xtol=1e-5, max_nfev=20)
+    return moved(best.x - 1.0, slice(None))[0], 2.0 * best.cost * size**2
 
 
 def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:
     """The `count` joints with one coordinate whose share in the motion left free is never small at q (T, n_q).
+
+    Nor does it change its sign, between outputs either: there the joint turns back, and tells two motions.
 
     Raises `SolveError` where no such joints tell it all along the path.
     """
@@ -177,7 +207,8 @@ def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[
         share = min(
             float(np.linalg.svd(N[columns], compute_uv=False)[-1]) if N.shape[1] == count else 0.0 for N in free
         )
-        best = max(best, (share, nodes), key=lambda one: one[0])
+        goes_back = any(np.linalg.det(a[columns] @ a.T @ b @ b[columns].T) < 0.0 for a, b in pairwise(free))
+        best = max(best, (0.0 if goes_back else share, nodes), key=lambda one: one[0])
     if best[0] < TELLS:
         raise SolveError(
             f"{model.scene.path}: redundancy: expected joints that move in every motion which the path leaves free",
