@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.libraries import scipy
 from ...common.structs import struct
 
@@ -24,6 +24,7 @@ MOST_ITERATIONS = 60
 FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
 GAP = 1e-9  # of the objective: closer, weights of dependent limits spoil the factors
 STATIONARY = 1e-8  # of the Lagrangian's gradient, relative to its terms
+EXACT = 1e-12  # of what Newton's equations contain: that may be left
 HALFWAY = 1e-3  # of the objective: the gap where a similar program begins
 BACK = 0.995  # of the way to the nearest bound
 
@@ -94,6 +95,7 @@ class _Band:
         used = np.flatnonzero(program.C.any(axis=(0, 1)))
         self.layout, self.C = layout, program.C[:, :, : used.max(initial=-1) + 1]
         self.ab = np.zeros((layout.size, 3 * layout.band + 1)).T  # columns contiguous, as LAPACK takes them
+        self.factors = np.empty_like(self.ab)
         self._add_costs(self.ab, program.H)
         x, equations = layout.x[:, 0], layout.equations[0, 0]
         for row, column, of in (
@@ -105,11 +107,19 @@ class _Band:
             self._add(self.ab, row, column, of)
             self._add(self.ab, column, row, of.transpose(0, 2, 1))
 
-    def newton(self, W: Array) -> _Newton:
-        """Factors of [H + CᵀWC, Aᵀ; A, 0]."""
-        ab = self.ab.copy(order="F")
-        self._add_costs(ab, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
-        return _Newton(ab, self.layout)
+    def factorize(self, W: Array) -> bool:
+        """Factors of [H + CᵀWC, Aᵀ; A, 0] in the place of those before; False where it is singular."""
+        self.factors[...] = self.ab
+        self._add_costs(self.factors, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
+        b = self.layout.band
+        self.factors, self.pivots, info = scipy.linalg.lapack.dgbtrf(self.factors, b, b, overwrite_ab=True)
+        return bool(info == 0)
+
+    def solve(self, right: Array) -> Array:
+        """The unknowns."""
+        b = self.layout.band
+        solution: Array = scipy.linalg.lapack.dgbtrs(self.factors, b, b, right, self.pivots)[0]
+        return solution
 
     def _add_costs(self, ab: Array, blocks: Array) -> None:
         (first, second), s = self.layout.x[:2, 0], self.layout.s
@@ -123,22 +133,6 @@ class _Band:
         first = ab.T.ravel()[column * length + 2 * self.layout.band + row - column :]
         strides = self.layout.period * length, 1, length - 1
         as_strided(first, blocks.shape, [first.itemsize * stride for stride in strides])[...] += blocks
-
-
-class _Newton:
-    def __init__(self, ab: Array, layout: _Layout) -> None:
-        self.layout, self.matrix = layout, np.asfortranarray(ab[layout.band :])
-        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(ab, layout.band, layout.band, overwrite_ab=True)
-        self.is_singular = info != 0
-
-    def solve(self, right: Array, *, is_refined: bool = True) -> Array:
-        """The unknowns, with one step of refinement: close to the end weights span many powers of ten."""
-        b, size = self.layout.band, self.layout.size
-        solution: Array = scipy.linalg.lapack.dgbtrs(self.lu, b, b, right, self.pivots)[0]
-        if not is_refined:
-            return solution
-        left = right - scipy.linalg.blas.dgbmv(m=size, n=size, kl=b, ku=b, alpha=1.0, a=self.matrix, x=solution)
-        return solution + as_floats(scipy.linalg.lapack.dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 
 def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:
@@ -174,8 +168,8 @@ class _CentralPath:
     def _begin(self) -> None:
         """At the minimum of ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive."""
         self.unknown = np.zeros(self.layout.size)
-        to = _residuals(self.program, self.layout, self.unknown, -self.program.d)
-        self.unknown = self.band.newton(np.ones_like(self.program.d)).solve(to)
+        self.band.factorize(np.ones_like(self.program.d))
+        self.unknown = self.band.solve(_residuals(self.program, self.layout, self.unknown, -self.program.d))
         slack = self._slack()
         least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
         self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
@@ -208,42 +202,60 @@ class _CentralPath:
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""
         slack, z = self.slack, self.z
-        newton = self.band.newton(z / slack)
-        if newton.is_singular or not np.isfinite(self.gap):
+        if not self.band.factorize(z / slack) or not np.isfinite(self.gap):
             return False
-        _, d_slack, dz = self._toward(newton, slack * z, is_refined=False)
+        _, d_slack, dz = self._toward(slack * z, is_refined=False)
         ways = min(1.0, _way(slack, d_slack)), min(1.0, _way(z, dz))
         after = float(((slack + ways[0] * d_slack) * (z + ways[1] * dz)).sum()) / self.count
         target = self.gap * (after / self.gap) ** 3 if self.gap else 0.0
         target = max(target, 0.5 * self.relative_gap * self.size() / self.count)  # less spoils the factors' weights
-        dx, d_slack, dz = self._toward(newton, slack * z + d_slack * dz - target)
+        dx, d_slack, dz = self._toward(slack * z + d_slack * dz - target)
         step = min(1.0, BACK * min(_way(slack, d_slack), _way(z, dz)))
         self.unknown, self.slack, self.z = self.unknown + step * dx, slack + step * d_slack, z + step * dz
         self._look()
         return True
 
-    def _toward(self, newton: _Newton, products: Array, *, is_refined: bool = True) -> tuple[Array, Array, Array]:
-        """Steps of unknowns, slack and z by which slack × z loses `products`."""
+    def _toward(self, products: Array, *, is_refined: bool = True) -> tuple[Array, Array, Array]:
+        """Steps of unknowns, slack and z by which slack × z loses `products`.
+
+        With a step of refinement where it is needed: close to the end weights span many powers of ten.
+        """
+        program, layout = self.program, self.layout
         pull = (products + self.z * self.of_slack) / self.slack
         to = self.right.copy()
-        self.layout.add(to, _transposed_times(self.program.C, pull))
-        dx = newton.solve(to, is_refined=is_refined)
-        d_slack = self.of_slack - _times(self.program.C, self.program.z(dx[self.layout.x]))
+        layout.add(to, _transposed_times(program.C, pull))
+        dx = self.band.solve(to)
+        if is_refined:
+            weighted = self.z / self.slack * _times(program.C, program.z(dx[layout.x]))
+            left = to - _linear(program, layout, dx, weighted)
+            if np.abs(left).max() > EXACT * np.abs(to).max():
+                dx += self.band.solve(left)
+        d_slack = self.of_slack - _times(program.C, program.z(dx[layout.x]))
         return dx, d_slack, -(products + self.z * d_slack) / self.slack
 
 
 def _residuals(program: Program, layout: _Layout, unknown: Array, z: Array) -> Array:
     """Minus the gradient of the Lagrangian by all unknowns."""
+    left = -_linear(program, layout, unknown, z)
+    layout.add(left, -program.g)
+    left[layout.equations] += program.c
+    left[layout.of_start] += program.start[1]
+    left[layout.of_end] += program.end[1]
+    return left
+
+
+def _linear(program: Program, layout: _Layout, unknown: Array, z: Array) -> Array:
+    """The part of this gradient that is linear in `unknown` and in multipliers z (N, i)."""
     left = np.zeros(layout.size)
     x, multiplier = unknown[layout.x], unknown[layout.equations]
-    layout.add(left, program.g + _times(program.H, program.z(x)) + _transposed_times(program.C, z))
+    layout.add(left, _times(program.H, program.z(x)) + _transposed_times(program.C, z))
     left[layout.x[:-1]] += _transposed_times(program.F, multiplier)
     left[layout.x[1:]] += _transposed_times(program.G, multiplier)
-    for (rows, values), at, k in ((program.start, layout.of_start, 0), (program.end, layout.of_end, -1)):
+    for (rows, _), at, k in ((program.start, layout.of_start, 0), (program.end, layout.of_end, -1)):
         left[layout.x[k]] += rows.T @ unknown[at]
-        left[at] = rows @ x[k] - values
-    left[layout.equations] = _times(program.F, x[:-1]) + _times(program.G, x[1:]) - program.c
-    return -left
+        left[at] = rows @ x[k]
+    left[layout.equations] = _times(program.F, x[:-1]) + _times(program.G, x[1:])
+    return left
 
 
 def _times(A: Array, x: Array) -> Array:

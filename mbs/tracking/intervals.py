@@ -20,6 +20,7 @@ CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander
 LOST = 0.5  # of the largest elastic force: where more is left over between Gauss points, no motion is near
 OUT_OF_REACH = 5.0  # times the limits: more than so much voltage is not found to the end
 TURNING = 0.3  # of the largest voltage, or of the limit of ë: by so much one changes in intervals that are then halved
+QUICKLY = 5e-3  # of the share by Newton's steps, on intervals that are to change
 
 
 def graded(start: float, end: float, intervals: int) -> Array:
@@ -90,7 +91,7 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
         if asked.is_limited and tracked.surely > OUT_OF_REACH:
             break
         breaks = halved(breaks, _changes(asked, tracked) > TURNING * tracked.share)
-        finer = track(asked, breaks, tracked, calm)
+        finer = track(asked, breaks, tracked, calm, QUICKLY)
         if not finer.converged:  # from other voltages steps wander less
             finer = track(asked, breaks, None, calm)
         if not finer.converged:
@@ -98,7 +99,9 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
         least = max(finer.share, NO_SHARE)
         change = abs(finer.share - tracked.share) / least
         tracked = replace(finer, doubt=2 * change + finer.added / least)
-    return tracked, change <= SETTLED
+    if change <= SETTLED:
+        tracked = replace(track(asked, breaks, tracked, calm), doubt=tracked.doubt)
+    return tracked, tracked.converged and change <= SETTLED
 
 
 def _changes(asked: Transition, tracked: Tracked) -> Array:

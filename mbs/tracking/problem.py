@@ -66,8 +66,8 @@ def track(
         u = np.hstack([near.voltage(breaks, order) for order in (asked.order, *range(asked.order))])
         K = near.curve(flat, 2).reshape(K.shape)
     steps = Steps(asked, breaks, tau_qs, size)
-    steps.tolerance = within if calm is None else WHILE_SETTLING
-    steps.gap = GAP if calm is None else ROUGH_GAP
+    steps.tolerance = within if calm is None else max(within, WHILE_SETTLING)
+    steps.gap = GAP if calm is None and within == TOLERANCE else ROUGH_GAP
     e = np.zeros((N + 1, 3 * asked.errors))
     if near is not None and near.error is not None:
         e = np.hstack([near.error(breaks, order) for order in (2, 0, 1)])
@@ -94,7 +94,8 @@ def track(
 def _newton(steps: Steps, start: Iterate, most: int) -> Iterate:
     """Newton's steps from `start`, no more than `most`, counted on from it."""
     scale, size = steps.asked.driven.scale, steps.size
-    now, steps.sigma, previous, previous_share = replace(start, converged=False), start.share, start.moved, np.inf
+    now, steps.sigma, previous = replace(start, converged=False), start.share, start.moved
+    share = np.inf if start.found is None else start.share
     for iteration in range(start.iterations + 1, start.iterations + most + 1):
         old = now
         now = steps.take(old)
@@ -103,11 +104,13 @@ def _newton(steps: Steps, start: Iterate, most: int) -> Iterate:
         now = replace(now, iterations=iteration, moved=moved)
         if not (np.isfinite(moved) and now.found is not None and now.found.converged):
             break
+        shrunk = moved**2  # about the size of the next step, which is not taken where it is small
         if steps.has_share:  # V(t) of linear programs is not unique
-            moved = abs(now.share - previous_share) / max(abs(now.share), NO_SHARE)
-            previous_share = now.share
-        shrinks = moved**2 <= steps.tolerance * previous < np.inf  # so does the next step, which is not taken
-        if moved <= steps.tolerance or (shrinks and not steps.has_share) or (moved <= 1e-7 and moved > 0.3 * previous):
+            moved = abs(now.share - share) / max(abs(now.share), NO_SHARE)
+            share = now.share
+        else:
+            shrunk = shrunk / previous if previous < np.inf else np.inf
+        if min(moved, shrunk) <= steps.tolerance or (moved <= 1e-7 and moved > 0.3 * previous):
             return replace(now, converged=True)
         if not steps.has_share and moved > SLOW * previous:
             steps.damping = max(DAMPING, 4 * steps.damping)
