@@ -182,14 +182,17 @@ def _share(servo: Servo, asked: Transition, breaks: Array) -> float:
 
 def _enough(share_with: Callable[[float], float], share: float, rate: float) -> float:
     """The least x ≥ 0 with share_with(x) just below one, by secants of its logarithm; about `share` e^{−rate x}."""
-    more, tried = 0.0, [(0.0, np.log(share))]
+    more, low, high, tried = 0.0, 0.0, np.inf, [(0.0, np.log(share))]
     for _ in range(MOST_TRIES):
         more += (tried[-1][1] - np.log(NEAR)) / rate
+        if not low < more < high:
+            more = (low + min(high, 4 * low)) / 2
         found = share_with(more)
         if not np.isfinite(found):
             break
         if NEAR**2 <= found <= 1.0:
             return float(more)
+        low, high = (more, high) if found > 1.0 else (low, more)
         tried.append((more, np.log(found)))
         (x_0, log_0), (x_1, log_1) = tried[-2:]
         rate = max((log_0 - log_1) / (x_1 - x_0), 0.1 * rate)
@@ -242,8 +245,7 @@ def singular_times(linear: Linearisation) -> Iterator[str]:
     for k in linear.singular_after[:1]:
         yield (
             f"between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s a zero of the modes passes through"
-            " infinity. Put less mass behind flexible links, take another number of modes in the link files, or another"
-            " path"
+            " infinity. Put less mass behind flexible links, or take another number of modes in the link files"
         )
 
 
