@@ -172,9 +172,14 @@ def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
     return Shares(of_voltages, torques.max(axis=0) / asked.limits.torque, times[torques.argmax(axis=0)])
 
 
+def motor_names(model: Model) -> list[str]:
+    """Joints of motors, one for each torque."""
+    return [joint for joint, columns in model.motors.items() for _ in columns]
+
+
 def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
     """Warnings on motors whose torques exceed their limits between the points at which these are constraints."""
-    names = [joint for joint, columns in model.motors.items() for _ in columns]
+    names = motor_names(model)
     for k in np.flatnonzero(shares.torques > 1.0):
         yield (
             f"the motor of {names[k]} reaches {100 * shares.torques[k]:.4g} % of its moment_limit at"

@@ -25,11 +25,14 @@ from .advice import (
     rough_ends,
     singular_times,
 )
-from .intervals import SETTLED
+from .gear_motion import motor_names
+from .intervals import OUT_OF_REACH, SETTLED
 from .problem import track
-from .transition import Tracked, Transition
+from .transition import Limits, Tracked, Transition
 
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
+WEAK = 1.05  # times the limits of motors: least torques on few intervals that finer ones do not bring within them
+AMPLE = 1e3  # times the largest torque along the path: as good as no limit
 NONE = 1e-4  # of the limits: voltages that motors alone do without
 
 
@@ -53,8 +56,34 @@ class Posed:
             return None
 
 
+def check_motors(posed: Posed) -> None:
+    """Raise `SolveError` where motors need more than their limits, with patches of `OUT_OF_REACH` times theirs.
+
+    Their least torque is looked for where torques along the path exceed the limits without patches.
+    """
+    limits, linear = posed.asked.limits, posed.linear
+    peaks = np.abs(posed.servo.quasi_static(linear.times, linear.shape)).max(axis=0)
+    if (peaks <= limits.torque).all():
+        return
+    far = OUT_OF_REACH * limits.patches.range
+    torque = np.where(np.isfinite(limits.torque), limits.torque, AMPLE * peaks.max())
+    asked = replace(posed.asked, objective="least-torque", limits=Limits(replace(limits.patches, range=far), torque))
+    least = track(asked, posed.coarse)
+    if least.converged and least.share > WEAK:
+        needed = [
+            f"of {name} from {torque[k]:g} to more than {least.share * torque[k]:.3g}"
+            for k, name in enumerate(motor_names(posed.servo.model))
+            if least.prices["torque"][k] > 0.0
+        ]
+        raise SolveError(
+            f"{posed.servo.where}: no motion follows the path within the motors' limits, not even with"
+            f" {OUT_OF_REACH:g} times the voltages: raise moment_limit {' and '.join(needed)}, or slow the path down if"
+            " torques at rest are within limits"
+        )
+
+
 def check_found(context: Context, posed: Posed, least: Tracked) -> None:
-    """Raise `SolveError` where there is no least voltage: motors are too weak, or the path is too fast."""
+    """Raise `SolveError` where there is no least voltage: amplifiers are too slow, or the path is too fast."""
     if least.converged:
         return
     asked, limits = posed.asked, posed.asked.limits
@@ -66,17 +95,20 @@ def check_found(context: Context, posed: Posed, least: Tracked) -> None:
                 f"{posed.servo.where}: no motion follows the path within the largest current and slew rate of the"
                 " amplifiers, whatever the voltages: slow the path down, or raise current or slew"
             )
-    if np.isfinite(limits.torque).any():
-        free = replace(asked, limits=replace(limits, torque=np.full_like(limits.torque, np.inf)))
-        if track(free, posed.breaks).converged:
-            raise SolveError(
-                f"{posed.servo.where}: no motion follows the path within the motors' limits, whatever the voltages:"
-                " slow the path down, if torques at rest are within them, or raise moment_limit"
-            )
     raise SolveError(
         f"{posed.servo.where}: no motion of motors and patches was found: "
-        + (causes(context, posed) or "slow the path down, or allow pre_actuation and post_actuation")
+        + (causes(context, posed) or f"slow the path down, allow pre_actuation and post_actuation, or {raised(posed)}")
     )
+
+
+def raised(posed: Posed) -> str:
+    """Advice to raise the limits that there are: of motors, by their joints, and of patches."""
+    limits = posed.asked.limits
+    names = [name for name, most in zip(motor_names(posed.servo.model), limits.torque, strict=True) if most < np.inf]
+    keys = [f"moment_limit of {' and '.join(names)}"] if names else []
+    keys += ["limit of patches"] if posed.asked.is_limited else []
+    keys += ["current or slew of amplifiers"] if limits.patches.has_rates else []
+    return f"raise {', '.join(keys)}" if keys else "take another path"
 
 
 def causes(context: Context, posed: Posed) -> str:

@@ -37,7 +37,7 @@ from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
 from .intervals import refined, settled, start_breaks
 from .path_error import Tolerance, displaced_along, rows_of_points
-from .posed import Posed, causes, check_found, check_reach, is_beyond, needs_none, warnings_of
+from .posed import Posed, causes, check_found, check_motors, check_reach, is_beyond, needs_none, raised, warnings_of
 from .transition import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights
 
 VOLT = 200.0  # V_ref where patches have no limits
@@ -127,6 +127,7 @@ class Tracking(TimedAnalysis):
         try:
             posed = _pose(model, context.patches, self, progress)
             check_reach(posed, None)
+            check_motors(posed)
             least = settled(posed.asked, posed.coarse, progress)
             check_found(context, posed, least)
             check_reach(posed, least)
@@ -233,7 +234,8 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
     if isinstance(servo, GearedServo):
         raise InputError(
             f'{servo.where}: expected either rigid gears or no "path_tolerance"',
-            "compliant gears with one: their motors would need torques that jump with its acceleration",
+            "compliant gears with one: their motors would need torques that jump with its acceleration. Remove it, or"
+            " stiffness and damping of joints",
         )
     times = as_floats(np.linspace(0.0, servo.end, len(servo.near_times)))
     rows = [servo.model.rows[k] for k in rows_of_points(servo)]
@@ -261,7 +263,7 @@ def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -
         tracked = within_limits(asked, limits, meshes, least, tolerance=analysis.tolerance, step=analysis.output_step)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
-        cure = causes(context, posed) or "loosen limits or tolerance"
+        cure = causes(context, posed) or f"{raised(posed)}, or the tolerance"
         raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
     return tracked, objective
 
