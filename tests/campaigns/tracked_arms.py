@@ -4,7 +4,8 @@
 
 One or two links in the plane, or a rod on a waist and a shoulder in 3D; 2 to 6 modes, payloads. With `--tolerance` (m)
 gears are rigid, else they have 10 to 80 Hz. A line for each: least voltage, largest distance of the replay from the
-planned motion (m), intervals and Newton steps, time of the processor; or the reason.
+planned motion (m), intervals and Newton steps, time of the processor; or the reason, and when det M_i of an own
+evaluation changes its sign (`tests/mbs/internal_inertia.py`).
 """
 
 import sys
@@ -18,6 +19,7 @@ from record import options
 import ffrobot
 
 sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("", "cases", "mbs")]
+from internal_inertia import Chain, changes
 from test_tracked_robots import ORIGIN, geared, in_3d, patches, revolute, scene, septic, strip
 
 
@@ -57,6 +59,23 @@ def random_arm(rng, tolerance):
     return f"{what}, {f:.0f} Hz, payload {payload:.2f} kg", geared(tables, f, **inertias)
 
 
+def own_changes(tables):
+    """Times (s) at which a zero passes through infinity."""
+    links = [body["link"] for body in tables["body"] if "link" in body]
+    sections = [(of["geometry"]["length"], *(of["geometry"]["section"][k] for k in ("height", "width"))) for of in links]
+    (path,), is_3d, start = tables["trajectory"], tables["space"] == "spatial", tables["initial"]
+    texts = [path[axis] for axis in "xyz" if axis in path]
+    angles = list(start["joints" if is_3d else "angles"].values())
+    mass = sum(load["mass"] for load in tables.get("payload", ()))
+    count, end = links[0]["modes"]["count"], tables["analysis"][0]["end"]
+
+    def output(t):
+        return np.array([eval(text, {"t": min(max(t, 0.0), end)}) for text in texts])
+
+    chain = Chain(sections, count // (1 + is_3d), mass, output, is_3d=is_3d, gravity=9.81 * is_3d)
+    return changes(chain, np.array(angles if is_3d else np.diff(angles, prepend=0.0)), end)
+
+
 def main():
     asked = options(__doc__, count=30, seed=62, first=0, tolerance=0.0).parse_args()
     warnings.simplefilter("ignore")
@@ -71,7 +90,7 @@ def main():
                 found = f"{about['least_voltage']:.4g} V, {about['objective']}, replay off by {off:.2g} m"
                 found += f", {of_run['steps']} intervals, {of_run['evaluations']} steps"
         except ffrobot.FfrobotError as error:
-            found = f"{type(error).__name__}: {error}"
+            found = f"{type(error).__name__}: {error}; own changes of sign at t = {np.round(own_changes(tables), 4)} s"
         print(f"{number}: {what}: {found}; {time.process_time() - began:.1f} s", flush=True)
 
 

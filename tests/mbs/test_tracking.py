@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from internal_inertia import Chain, changes
 from patch_sets import amplifiers
 
 import ffrobot
@@ -214,12 +215,25 @@ def test_least_voltage_within_a_path_tolerance(modes, T, error, expected):
     assert max(np.abs([e[[0, -1]], T * e_dot[[0, -1]]]).ravel()) < 1e-9 * error
 
 
-def test_path_tolerance_of_the_paper():
-    """Section 4: a micrometer is much where links are stiff; two coordinates."""
+@pytest.mark.parametrize(
+    ("error", "expected", "beyond"), [(1e-6, 40.634, 0.02), (2e-6, 24.263, 0.02), (3e-6, 8.629, 0.05)]
+)
+def test_path_tolerance_of_the_paper(error, expected, beyond, monkeypatch):
+    """Section 4: micrometers are much where links are stiff; two coordinates. The notes bound e at breaks alone.
+
+    Between these it exceeds the tolerance then, by 2 and 5 % at 2 and 3 µm: 1.5 and 5 % more voltage avoid that.
+    """
     servo, Phi_V = arm(2, 5, 0.7)
-    problem = within_tolerance(servo, asked_of_arm(servo, Phi_V, "least-voltage", 100.0, is_free=True), 1e-6)
-    found = track(problem, breaks_of_the_notes(0.7), None, 1e-3)
-    assert 100.0 * found.share == pytest.approx(40.634, rel=1e-2)
+    problem = within_tolerance(servo, asked_of_arm(servo, Phi_V, "least-voltage", 100.0, is_free=True), error)
+    within = track(problem, breaks_of_the_notes(0.7), None, 1e-3)
+    monkeypatch.setattr("ffrobot.mbs.tracking.steps.HALVES", np.zeros(1))
+    monkeypatch.setattr("ffrobot.mbs.tracking.steps.OF_HALVES", np.ones((1, 1)))
+    at_breaks = track(problem, breaks_of_the_notes(0.7), None, 1e-3)
+    assert 100.0 * at_breaks.share == pytest.approx(expected, rel=1e-3)
+    assert 1.0 <= within.share / at_breaks.share < 1.0 + 1.1 * beyond
+    times = np.linspace(0.0, 0.7, 5001)
+    assert np.abs(within.error(times)).max() < error * (1 + 1e-6)
+    assert np.abs(at_breaks.error(times)).max() < error * (1 + beyond)
 
 
 def test_price_of_a_path_tolerance():
@@ -248,6 +262,33 @@ def test_slopes_by_path_errors():
     after = np.hstack(displaced_at(servo, times, change).forces(times, *motion))
     expected = np.einsum("otfk,otk->tf", slopes, change)
     assert np.abs(after - before - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    ("modes", "T", "expected"),
+    [(2, 0.6, []), (3, 0.6, []), (4, 0.6, [0.11, 0.17, 0.44, 0.50]), (5, 0.6, []), (6, 0.6, [0.06, 0.23, 0.38, 0.55]),
+     (4, 0.8, []), (6, 0.8, [0.11, 0.26, 0.54, 0.69])],
+)  # fmt: skip
+def test_zeros_that_pass_through_infinity(modes, T, expected):
+    """Checkpoint 7 of ../shared/tracking_gears_notes.md: det M_i changes its sign with even numbers of modes only.
+
+    Against an own evaluation of the strip; of T = 0.8 s the notes say how often.
+    """
+    servo, times = strip(modes, T)[0], np.linspace(0.0, T, 121)
+    chain = Chain([(1.0, 0.004, 0.02)], modes, 0.0, lambda t: np.sin([np.pi / 4 * seventh(t / T) - np.pi / 8]))
+    own = changes(chain, np.array([-np.pi / 8]), T)
+    linear = linearise(servo, T, len(times))
+    np.testing.assert_allclose(own, expected, atol=0.01)
+    np.testing.assert_allclose(times[list(linear.singular_after)], own, atol=times[1])
+
+
+def test_no_zero_of_the_paper_passes_through_infinity():
+    assert not linearise(arm(4, 10, 0.7)[0], 0.7).singular_after
+
+
+def seventh(s):
+    s = np.clip(s, 0.0, 1.0)
+    return 35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7
 
 
 def test_bounds_of_zeros():
