@@ -118,24 +118,43 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
     driven, gears = asked.driven, asked.gears
     assert isinstance(driven, GearedServo)
     assert gears is not None
-    motion = smooth(asked, tracked)
-    breaks = motion.curve.x
-    times = _nodes(breaks)
-    torques = driven.forces(times, *(motion.curve(times, k) for k in range(3)))[1]
+    motion, n = smooth(asked, tracked), len(asked.Phi_V)
+    breaks, still = motion.curve.x, np.zeros((2, 1, n))
     lasts = step * ceil(LASTS * float((gears.damping / gears.stiffness).max()) / step)
-    torques_at_rest = driven.forces(breaks[-1:], asked.rest[1][None], *np.zeros((2, 1, len(asked.rest[1]))))[1]
-    polynomials = _held(_through(breaks, torques), torques_at_rest[0], lasts)
-    motors = torques.shape[1] - len(gears.joints)
+    at_rest = driven.forces(breaks[-1:], asked.rest[1][None], *still)[1][0]
+
+    def curves(breaks: Array, torques: Array) -> dict[str, GearCurve]:
+        of_all, motors = _held(_through(breaks, torques), at_rest, lasts), len(at_rest) - len(gears.joints)
+        return {
+            joint: _gear(gears, k, _column(of_all, motors + k), _column(of_all, gears.columns[k]))
+            for k, joint in enumerate(gears.joints)
+        }
+
+    def along(breaks: Array) -> tuple[Array, list[Array]]:
+        times = _nodes(breaks)
+        return times, [motion.curve(times, k) for k in range(3)]
+
+    times, states = along(breaks)
+    alone = curves(breaks, driven.forces(times, *states)[1])
+    pieces = np.concatenate([of.twist.x for of in alone.values()])
+    breaks = np.union1d(breaks, pieces[pieces < breaks[1]])  # where δ̈ begins within D/K
+    times, states = along(breaks)
+    ahead = np.column_stack([of.twist(times, 2) for of in alone.values()]) * gears.inertia
+    pushed = np.einsum("Tk,Tkf->Tf", ahead, driven.reactions(times, *states))
+    torques = driven.forces(times, *states)[1] + np.hstack([pushed[:, n:], pushed[:, n + gears.columns]])
+    more = pushed[:, :n] @ _inverse(asked.Phi_V).T
     return replace(
         tracked,
         curve=_held(motion.curve, asked.rest[1], lasts),
-        voltage=_held(motion.voltage, np.zeros(asked.Phi_V.shape[1]), lasts),
-        gears={
-            joint: _gear(gears, k, _column(polynomials, motors + k), _column(polynomials, gears.columns[k]))
-            for k, joint in enumerate(gears.joints)
-        },
+        voltage=_held(_through(breaks, motion.voltage(times) + more), np.zeros(asked.Phi_V.shape[1]), lasts),
+        gears=curves(breaks, torques),
         unmet=motion.unmet,
     )
+
+
+def _inverse(Phi_V: Array) -> Array:
+    """Least voltages (m, n) by forces on modes, as far as patches reach these."""
+    return np.linalg.pinv(Phi_V, rcond=REACHES)
 
 
 def smooth(asked: Transition, tracked: Tracked) -> Motion:
@@ -149,7 +168,7 @@ def smooth(asked: Transition, tracked: Tracked) -> Motion:
     p = curve(times)
     wanted = tracked.voltage(times)
     left = asked.driven.residuals(times, p, curve(times, 1), curve(times, 2)) - wanted @ asked.Phi_V.T
-    more = left @ np.linalg.pinv(asked.Phi_V, rcond=REACHES).T
+    more = left @ _inverse(asked.Phi_V).T
     unmet = float(np.abs(left - more @ asked.Phi_V.T).max() / np.abs(elastic * p).max())
     return Motion(curve, _through(breaks, wanted + more), unmet)
 

@@ -3,7 +3,7 @@
 Links do not feel the gear of a motor: with its rotor as behind a rigid gear the same p(t) and V(t) carry them (Spong,
 J. Dyn. Syst. Meas. Control 109, 1987). The gear transmits τ_s, the torque of a rigid gear without its own rotor. Its
 twist is that of K δ + D δ̇ = τ_s, and the motor supplies I δ̈ more, I = J N². The moment J N δ̈ on the body that carries
-the rotor, 1/N of that, is left out.
+the rotor is 1/N of that: with twists that are found without it, voltages and torques make up for it.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ..model.motors import turning_motors
 from ..model.nodes import rotor
 
 SAMPLES = 5  # along the path, at which the torque of a gear is found in two ways
+TINY = 1e-300
 SAME = 1e-8  # of the largest torque of its motor, these two
 
 
@@ -68,6 +69,20 @@ class GearedServo(Servo):
             found.append((M, D, K))
         M, D, K = (np.concatenate(parts, axis=1) for parts in zip(*found, strict=True))
         return M, D, K
+
+    def reactions(self, times: Array, p: Array, v: Array, a: Array) -> Array:
+        """Forces on modes, and torques of motors (N, k, n + motors), by I δ̈ of each gear, of J N δ̈ on the carrier.
+
+        A rotor enters them by its spin-up ψ̈, of which its own motor takes N times as much.
+        """
+        M, n, shares = super().slopes(times, p, v, a)[0], p.shape[1], list[Array]()
+        for servo, column in zip(self.without, self.gears.columns, strict=True):
+            of_rotor = M - servo.slopes(times, p, v, a)[0]
+            own = of_rotor[:, n + column]
+            share = np.einsum("Tfn,Tn->Tf", of_rotor, own) / np.maximum((own**2).sum(axis=1), TINY)[:, None]
+            share[:, n + column] = 0.0
+            shares.append(share)
+        return np.stack(shares, axis=1)
 
     def quasi_static(self, times: Array, p: Array) -> Array:
         """Torques of motors alone (N, motors)."""

@@ -62,7 +62,8 @@ def random_arm(rng, tolerance):
 def own_changes(tables):
     """Times (s) at which a zero passes through infinity."""
     links = [body["link"] for body in tables["body"] if "link" in body]
-    sections = [(of["geometry"]["length"], *(of["geometry"]["section"][k] for k in ("height", "width"))) for of in links]
+    shapes = [(of["geometry"]["length"], of["geometry"]["section"]) for of in links]
+    sections = [(length, of["height"], of["width"]) for length, of in shapes]
     (path,), is_3d, start = tables["trajectory"], tables["space"] == "spatial", tables["initial"]
     texts = [path[axis] for axis in "xyz" if axis in path]
     angles = list(start["joints" if is_3d else "angles"].values())
