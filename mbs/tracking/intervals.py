@@ -40,7 +40,7 @@ def start_breaks(start: float, path_end: float, end: float, intervals: int) -> A
 def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool], near: Tracked) -> Tracked:
     """Return the solution on intervals halved until residual forces are below `tolerance` of the largest elastic one.
 
-    Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
+    Nor are torques then further beyond the limits asked for than by half this share of them, where they are looked at.
     """
     tracked, within = near, tolerance**0.5  # Newton's next step is about the square of the last one
     while True:
@@ -61,7 +61,7 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
     r, tau = asked.driven_at(times, tracked.error).forces(times, *motion)
     r = r - tracked.voltage(times) @ asked.Phi_V.T
     unmet = np.abs(r).max(axis=1) / float(np.abs(asked.driven.scale**2 * motion[0]).max())
-    beyond = (np.abs(tau[:, : len(asked.limits.torque)]) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
+    beyond = 2 * (np.abs(tau[:, : len(asked.limits.torque)]) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
     return float(unmet.max()), np.maximum(unmet, beyond).reshape(len(breaks) - 1, -1).max(axis=1) / tolerance
 
 
