@@ -15,9 +15,23 @@ _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE")
 _RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
 
 
+_is_apart = False
+
+
+def work_apart() -> None:
+    """From here on the processes of mpirun share nothing but the jobs that the first one distributes."""
+    global _is_apart
+    _is_apart = True
+
+
+def is_apart() -> bool:
+    """Whether `work_apart` has been called: what is collective would wait for ever."""
+    return _is_apart
+
+
 def processes() -> int:
-    """Return the number of processes of this program; 1 without mpirun."""
-    return _environment(_SIZES, 1)
+    """Return the number of processes that do the same; 1 without mpirun, and where they work apart."""
+    return 1 if _is_apart else _environment(_SIZES, 1)
 
 
 def processors() -> int:
@@ -27,7 +41,7 @@ def processors() -> int:
 
 def is_first() -> bool:
     """Whether this is the process that reads, writes and prints."""
-    return _environment(_RANKS, 0) == 0
+    return _is_apart or _environment(_RANKS, 0) == 0
 
 
 def on_first(work: Callable[[], T]) -> T:

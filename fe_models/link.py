@@ -28,7 +28,7 @@ from ..common.cache import cache_folder, is_own
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import AnyPath, check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
-from ..common.parallel import on_first, processes, without_daemon
+from ..common.parallel import is_apart, on_first, processes, without_daemon
 from ..common.structs import struct
 from ..common.validation import plain
 from ..common.version import digest_of_code
@@ -208,6 +208,8 @@ def _with_same_modes(link: Link, earlier: Sequence[Path], cache: Path) -> ModalB
 
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
+    if is_apart() and not isinstance(link, BeamLink):
+        raise SolveError(f"{source_path}: expected a solid that ffrobot link has computed before a study under mpirun")
     try:
         without_daemon()
         with ending_at_once(), deferred_interrupts():

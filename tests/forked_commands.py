@@ -23,7 +23,7 @@ LOADED = (
     "ffrobot.fe_models.link", "ffrobot.present.details", "ffrobot.present.summary",
     "ffrobot.pictures.figures.plot", "ffrobot.pictures.report", "ffrobot.present.console",
     "ffrobot.present.start_postures", "ffrobot.scene.plausibility", "ffrobot.results.judging", "ffrobot.sweep.sweep",
-    "ffrobot.actuation.feasibility", "scipy.integrate", "scipy.signal", "email.message", "concurrent.futures.thread",
+    "ffrobot.actuation.feasibility", "scipy.integrate", "scipy.signal", "email.message", "concurrent.futures.process",
 )  # fmt: skip
 CASES = Path(__file__).parent.parent / "cases"
 LIMIT = 600  # s, of a command: also where much else runs

@@ -39,6 +39,7 @@ FLOORS = {
         "results",
         "present",
         "milling",
+        "batch",
         "map",
         "exchange",
         "pictures",

@@ -17,6 +17,7 @@ from ..present.logs import logging_options, python_option, together
 from .options import F, options_of, protect, runs_options, scene_argument
 
 if TYPE_CHECKING:
+    from ..batch.batch import Batch
     from ..design.finding import Finding
 
 
@@ -32,7 +33,7 @@ def study_options(folder: str, figures: str) -> Callable[[F], F]:
 
 
 def _study(
-    find: Callable[..., Finding], scene_file: Path, *args: object, folder: Path, figures: bool, **how: Any
+    find: Callable[..., Finding], scene_file: Path, *args: object, folder: Path, figures: bool, batch: Batch, **how: Any
 ) -> None:
     """Find, print, and write tables, the file for reports, and figures.
 
@@ -43,7 +44,7 @@ def _study(
 
     protect(files_of(scene_file))
     with Display() as display:
-        study = find(scene_file, *args, folder, watcher=display, **how)
+        study = find(scene_file, *args, folder, executor=batch, watcher=display, **how)
     study.print(summary_console())
     for path in (*study.write_tables(folder), *study.write_study(folder, figures=figures)):
         click.echo(f"written    {path}")

@@ -9,9 +9,10 @@ import click
 
 from ..common.errors import InputError
 from ..present.logs import FILE, logging_options, python_option
-from .options import output_option, processes_option, protect, scene_argument
+from .options import batch_options, output_option, protect, scene_argument
 
 if TYPE_CHECKING:
+    from ..batch.batch import Batch
     from ..common.arrays import Array
 
 
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     "--covariance", metavar="FITTED.covariance.toml", type=FILE, help="Errors of a fit: deviations of stable depths."
 )
 @click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
-@processes_option("Number of parallel processes.")
+@batch_options("Number of parallel processes.")
 @output_option("DIR", "Folder of the map [SCENE.map next to the input].")
 @python_option
 @logging_options
@@ -51,7 +52,7 @@ def map_(
     milling: Path | None,
     covariance: Path | None,
     figures: bool,
-    processes: int,
+    batch: Batch,
     output: Path | None,
 ) -> None:
     """Map of the workspace: natural frequencies, stiffness, torque and deflection at rest, pose by pose.
@@ -90,7 +91,7 @@ def map_(
         milling=read_milling(milling) if milling else None,
     )
     with Display() as display:
-        made = make_map(plan, processes, display)
+        made = make_map(plan, batch, display)
         if errors:
             display.stage("deviations of stable depths")
             made = with_deviations(made, errors)

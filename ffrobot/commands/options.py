@@ -5,13 +5,13 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import click
 
 from ..common.outputs import protected
-from ..common.parallel import processors
 from ..design.studies import FiniteRange
 from ..present.logs import FILE, together
 
@@ -26,16 +26,33 @@ def output_option(metavar: str, text: str, *, required: bool = False) -> Callabl
     return click.option("-o", "--output", metavar=metavar, type=FILE, required=required, help=text)
 
 
-def processes_option(text: str) -> Callable[[F], F]:
-    """Decorator: add option `-j`, the number of processes."""
-    return click.option(
-        "-j",
-        "--processes",
-        type=click.IntRange(1, 1000),
-        default=processors,
-        show_default="one for each processor",
-        help=text,
-    )
+def batch_options(text: str) -> Callable[[F], F]:
+    """Decorator: add the options that say who does the jobs of a command; it gets the argument `batch`."""
+
+    def decorate(command: F) -> F:
+        @wraps(command)
+        def run(*args: object, processes: int | None, scheduler: str | None, **named: object) -> object:
+            from ..batch.batch import batch_of
+
+            with batch_of(processes, scheduler) as batch:
+                return command(*args, batch=batch, **named)
+
+        return together(
+            click.option(
+                "-j",
+                "--processes",
+                type=click.IntRange(1, 1000),
+                help=f"{text}  [default: one for each processor, those of mpirun]",
+            ),
+            click.option(
+                "--scheduler",
+                metavar="ADDRESS",
+                envvar="FFROBOT_SCHEDULER",
+                help="Dask scheduler whose workers replace these processes, such as tcp://node1:8786.",
+            ),
+        )(run)  # type: ignore[return-value]
+
+    return decorate
 
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
@@ -43,7 +60,7 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
     return together(
         output_option("DIR", f"{of} [{folder} next to the input]."),
         click.option("--retry", is_flag=True, help="Repetition of failed runs."),
-        processes_option("Number of parallel runs."),
+        batch_options("Number of parallel runs."),
     )
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ..common.parallel import is_first, on_first
 from ..present.logs import logging_options, python_option
 from .options import protect, runs_options, scene_argument
+
+if TYPE_CHECKING:
+    from ..batch.batch import Batch
 
 MOST = 100_000  # runs
 
@@ -36,7 +39,7 @@ def sweep(
     sample: int | None,
     seed: int,
     collect: tuple[str, ...],
-    processes: int,
+    batch: Batch,
     retry: bool,
     keep: bool,
     output: Path | None,
@@ -50,7 +53,7 @@ def sweep(
     --vary gravity.1=-9.81,0                                 an entry of a list by its number, from 0
 
     Entries of lists of tables are selected by name or body. The same command resumes a stopped sweep. -j runs in
-    parallel on one machine, mpirun on several.
+    parallel on one machine, mpirun and --scheduler on several.
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
@@ -59,15 +62,13 @@ def sweep(
 
     folder = output or scene_file.with_suffix(".sweep")
     protect(files_of(scene_file))
-    plan = on_first(lambda: plan_sweep(scene_file, vary, folder, sample, seed, collect))
-    if retry and is_first():
+    plan = plan_sweep(scene_file, vary, folder, sample, seed, collect)
+    if retry:
         forget_failures(plan)
-    if is_first() and (changes := stale_rows(plan)):
+    if changes := stale_rows(plan):
         click.echo(f"ffrobot: {changes}", err=True)
     with Display() as display:
-        rows = run_sweep(plan, processes, display)
-    if not is_first():
-        return
+        rows = run_sweep(plan, batch, display)
     for line in missing_columns(rows, plan.collect, plan.folder):
         click.echo(f"ffrobot: {line}", err=True)
     if not keep:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..batch.batch import Batch, batch_of
 from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath, check_folder
 from ..common.outputs import protected
@@ -28,7 +30,7 @@ from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from ..sweep.files import Variation, run_files
-from ..sweep.runs import RESULTS, Row, Workers
+from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, run_sweep
 from .readings import Followed, Reading, Response
 
@@ -109,42 +111,45 @@ def in_words(keys: Iterable[Key], point: Point) -> str:
 
 @dataclass(frozen=True)
 class Runs:
-    """Settings of the runs of designs: scene file, folder (`kept` or temporary), number of parallel processes.
+    """Settings of the runs of designs: scene file, folder (`kept` or temporary), the batch that performs them.
 
     `retry`: whether what failed in an earlier command is run again.
     """
 
     path: Path
     folder: Path
+    batch: Batch
     kept: bool = True
-    processes: int = 1
     retry: bool = False
     watcher: Watcher = field(default_factory=Watcher)
 
 
 @contextmanager
 def runs_of(
-    command: str,
     scene: AnyPath,
     output: AnyPath | None,
     *,
     processes: int = 1,
+    executor: Executor | Batch | None = None,
     retry: bool = False,
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Iterator[Runs]:
     """Runs of a scene file in the folder `output`, or in a temporary one; no output replaces an input.
 
-    Raises `InputError` under mpirun.
+    They are the jobs of `executor`, or of so many `processes` here. Raises `InputError` for neither under mpirun.
     """
-    if of_mpi() > 1:
-        raise InputError(f"{command}: expected one process", "several under mpirun: -j runs designs in parallel")
+    if executor is None and of_mpi() > 1:
+        raise InputError("executor: expected one under mpirun, as of mpi4py.futures.MPICommExecutor", "none")
     path, places = Path(scene), [Path(place) for place in allow_python]
     with ExitStack() as stack:
         folder = output if output is not None else stack.enter_context(TemporaryDirectory())
         stack.enter_context(protected(files_of(path)))
         stack.enter_context(python_allowed(places))
-        yield Runs(path, Path(folder), output is not None, processes, retry, watcher or Watcher())
+        if executor is None:
+            executor = stack.enter_context(batch_of(processes))
+        batch = executor if isinstance(executor, Batch) else stack.enter_context(Batch(lambda: executor))
+        yield Runs(path, Path(folder), batch, output is not None, retry, watcher or Watcher())
 
 
 @dataclass(frozen=True)
@@ -201,7 +206,7 @@ class Designs:
         self._sweep = Sweep(
             runs.path, variations, (), runs.folder, (), allow_python=allowed, fixed=fixed, own=own, growing=True
         )
-        self._runs, self._workers, self.most = runs, Workers(), most
+        self._runs, self.most = runs, most
         self._designs: dict[Path, Design] = {}
         self._inputs = _digests(runs.path)
 
@@ -261,7 +266,7 @@ class Designs:
             lot = replace(wanted, points=tuple(new.values()), earlier=earlier)
             if self._runs.retry:
                 forget_failures(lot)
-            rows = run_sweep(lot, self._runs.processes, self._runs.watcher, self._workers)
+            rows = run_sweep(lot, self._runs.batch, self._runs.watcher)
             triples = zip(new.items(), rows, strict=True)
             self._designs |= {folder: Design(point, row, folder) for (folder, point), row in triples}
         return [self._designs[folder] for folder in folders]

@@ -15,6 +15,9 @@ from ..common.errors import InputError, either
 from ..common.files import AnyPath
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from ..batch.batch import Batch
     from ..run.watcher import Watcher
     from .optimise import Front
     from .optimum_record import Optimum
@@ -45,6 +48,7 @@ class RunOptions(TypedDict, total=False):
     """Options of all studies."""
 
     processes: Annotated[int, IntRange(1, 1000)]
+    executor: "Executor | Batch | None"
     retry: bool
     allow_python: Sequence[AnyPath]
     watcher: "Watcher | None"
@@ -117,8 +121,9 @@ def sensitivity(
         step: largest change of a parameter, relative to its value.
         tolerance: tolerance of the runs, if the scene has a larger one.  [default: 1e-07 with reused time steps, else
             1e-09]
-        how: `processes`, runs in parallel; `retry`, whether to repeat designs that failed before; `allow_python`, as in
-            `solve`; `watcher`, an object that observes progress and can stop the study.
+        how: `processes`, runs in parallel here, or `executor`, which performs them: one of `concurrent.futures`,
+            `mpi4py.futures` or dask, with processes that import ffrobot; `retry`, whether to repeat designs that failed
+            before; `allow_python`, as in `solve`; `watcher`, an object that observes progress and can stop the study.
 
     Returns:
         Derivatives with their errors.
@@ -133,7 +138,7 @@ def sensitivity(
     from .designs import runs_of
     from .sensitivity import find_sensitivity
 
-    with runs_of("sensitivity", scene, output, **how) as runs:
+    with runs_of(scene, output, **how) as runs:
         return find_sensitivity(runs, of, to, step, tolerance)
 
 
@@ -188,7 +193,7 @@ def optimise(
     from .designs import runs_of
     from .optimise import find_optimum
 
-    with runs_of("optimise", scene, output, **how) as runner:
+    with runs_of(scene, output, **how) as runner:
         return find_optimum(
             runner, vary, minimise, maximise, subject_to,
             method=method, starts=starts, seed=seed, runs=runs, tolerance=tolerance,
@@ -238,7 +243,7 @@ def trade_off(
     from .designs import runs_of
     from .optimise import find_front
 
-    with runs_of("optimise", scene, output, **how) as runner:
+    with runs_of(scene, output, **how) as runner:
         return find_front(runner, vary, minimise, against, points, subject_to, runs=runs, tolerance=tolerance)
 
 
@@ -281,5 +286,5 @@ def uncertainty(
     from .designs import runs_of
     from .uncertainty import find_uncertainty
 
-    with runs_of("uncertainty", scene, output, **how) as runs:
+    with runs_of(scene, output, **how) as runs:
         return find_uncertainty(runs, of, spread, samples, seed, by, indices=indices)

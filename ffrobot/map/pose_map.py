@@ -6,25 +6,23 @@ import hashlib
 import io
 import json
 import math
-import os
-import signal
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
+from threading import local
 from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from ..batch.batch import Batch
 from ..common.arrays import Array, Booleans, Indices, as_floats
 from ..common.errors import InputError, SolveError, check_known, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
-from ..common.interrupts import SIGNALS, end_with_parent
 from ..common.keys import MOST_RUNS
+from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import shown
 from ..mbs.fields.field_types import Quantity
 from ..mbs.linear.linearisation import labelled
@@ -193,7 +191,7 @@ def default_point(scene: Scene) -> str:
     return scene.tool_point or (carried[-1] if carried else f"{body.name}.{last}")
 
 
-def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
+def make_map(plan: MapPlan, batch: Batch, watcher: Watcher) -> PoseMap:
     """All poses of the grid; parts that an earlier run of the same plan has judged are read from the folder.
 
     Raises `InputError` for a point or an axis that the robot has not and without motors, `SolveError` where no pose is
@@ -219,20 +217,15 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     good = postures.reached & postures.within
     if not good.any():
         raise SolveError(f"{plan.scene}: no pose of the grid is within reach and the limits of the joints")
-    evaluator = PoseEvaluator(
-        solution.model,
-        postures.q[int(good.argmax())],
-        plan.point,
-        count=plan.count,
-        omega=2 * np.pi * plan.frequencies,
-        judge=None if plan.milling is None else partial(stable_depths, plan.milling),
-    )
+    first = tuple(postures.q[int(good.argmax())])
+    of = PosesOf(f"{request}{first}", replace(plan, scene=plan.scene.absolute()), allowed_python(), first)
+    evaluator = of.evaluator(solution)
     if kept is None:
         _claim(plan, request, postures)
     numbers = np.flatnonzero(good)
     parts = [numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART)]
     named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
-    judged = _judged(plan, evaluator, postures, named, processes, watcher)
+    judged = _judged(of, postures, named, batch, watcher)
     return _assembled(plan, solution, evaluator, postures, [(part, judged[name]) for name, part in named.items()])
 
 
@@ -243,53 +236,63 @@ def check_point(solution: Solution, point: str, place: str = "--point") -> None:
 
 
 def _judged(
-    plan: MapPlan,
-    evaluator: PoseEvaluator,
-    postures: Postures,
-    parts: Mapping[str, Indices],
-    processes: int,
-    watcher: Watcher,
+    of: PosesOf, postures: Postures, parts: Mapping[str, Indices], batch: Batch, watcher: Watcher
 ) -> Mapping[str, Mapping[str, Array]]:
-    """Findings by name of the part, from files or by processes of their own."""
-    files = {name: plan.folder / PARTS / f"{name}.npz" for name in parts}
+    """Findings by name of the part, from files or as jobs of `batch`."""
+    files = {name: of.plan.folder / PARTS / f"{name}.npz" for name in parts}
     known = {name: columns for name, file in files.items() if (columns := _read(file)) is not None}
     left = {name: part for name, part in parts.items() if name not in known}
     watcher.stage(f"{sum(map(len, left.values()))} poses")
-    global _evaluator
-    _evaluator = evaluator
-    context = get_context("fork")  # with the robot as it is, which no process has to read again
-    with ProcessPoolExecutor(processes, mp_context=context, initializer=_serve, initargs=(os.getpid(),)) as pool:
-        futures = {pool.submit(_judge, postures.q[part]): name for name, part in left.items()}
-        try:
-            for future in as_completed(futures):
-                name, columns = futures[future], future.result()
-                _write(files[name], columns)
-                known[name] = columns
-                watcher.advance(len(known), len(parts))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    names, jobs = list(left), [(of, postures.q[part]) for part in left.values()]
+    for number, columns in batch.results(_judge, jobs):
+        name = names[number]
+        _write(files[name], columns)
+        known[name] = columns
+        watcher.advance(len(known), len(parts))
     return known
 
 
-_evaluator: PoseEvaluator
+_evaluators = local()  # which serves one thread
 
 
-def _serve(parent: int) -> None:
-    """Leave signals to the parent, and end with it where it is killed."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
-    end_with_parent()
-    if os.getppid() != parent:
-        os._exit(1)
+@dataclass(frozen=True)
+class PosesOf:
+    """What poses are judged with: the plan of a map, folders with allowed Python files, some posture q (n_q,).
+
+    `key`: another where any of them, or a file of the scene, is.
+    """
+
+    key: str
+    plan: MapPlan
+    allowed: tuple[Path, ...]
+    q: tuple[float, ...]
+
+    def evaluator(self, solution: Solution | None = None) -> PoseEvaluator:
+        """Made once in each thread; processes forked from this one have it as it is."""
+        kept = vars(_evaluators)
+        if self.key not in kept:
+            kept.clear()
+            with python_allowed(self.allowed):
+                model = (solution or prepare_scene(self.plan.scene)).model
+            kept[self.key] = PoseEvaluator(
+                model,
+                np.array(self.q),
+                self.plan.point,
+                count=self.plan.count,
+                omega=2 * np.pi * self.plan.frequencies,
+                judge=None if self.plan.milling is None else partial(stable_depths, self.plan.milling),
+            )
+        made: PoseEvaluator = kept[self.key]
+        return made
 
 
-def _judge(q: Array) -> dict[str, Array]:
-    """Findings of the poses q (N, n_q) by name, (N, …); nan where there is no equilibrium."""
+def _judge(job: tuple[PosesOf, Array]) -> dict[str, Array]:
+    """Findings of poses q (N, n_q) by name, (N, …); nan where there is no equilibrium."""
+    evaluator = job[0].evaluator()
     poses: list[dict[str, Array] | None] = []
-    for each in q:
+    for each in job[1]:
         try:
-            poses.append(_evaluator.at(each))
+            poses.append(evaluator.at(each))
         except SolveError:
             poses.append(None)
     judged = next((one for one in poses if one is not None), {})

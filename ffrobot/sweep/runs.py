@@ -1,141 +1,27 @@
-"""One run of a sweep, by a worker (`ffrobot.worker`) that later runs take too, and the row that it leaves."""
+"""One run of a sweep and the row that it leaves."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import sys
-import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from subprocess import PIPE, Popen
-from tempfile import TemporaryFile
-from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from ..batch.worker import own_worker
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
 from ..common.locks import is_running, this_process
 from ..common.meanings import meaning
-from ..common.parallel import environment_without_mpi
 from ..common.peaks import root_mean_square
 from ..results.file import Results
 from ..run.inputs import changed, digest_of_file
 from .files import SCENE
-
-ALONE = {
-    "OMP_NUM_THREADS": "1",  # several runs go side by side
-    "OPENBLAS_NUM_THREADS": "1",
-    "MALLOC_MMAP_THRESHOLD_": "33554432",  # of glibc: a run keeps memory that it frees, and pages come in once
-    "MALLOC_TRIM_THRESHOLD_": "268435456",
-    "OMPI_MCA_pml": "ob1",  # Open MPI opens no network, and nothing that several processes share: runs are one process
-    "OMPI_MCA_btl": "self",
-    "OMPI_MCA_ess_singleton_isolated": "1",  # nor a daemon
-}
-
-
-class Done(NamedTuple):
-    """End of a run: exit code, error messages, SHA-256 of modules that the scene's Python files imported, by file."""
-
-    code: int
-    messages: str
-    imported: dict[str, str]
-
-
-class Worker:
-    """One such process, with the environment and in the folder of its making."""
-
-    def __init__(self) -> None:
-        self.place = _place()
-        self._messages = TemporaryFile()  # noqa: SIM115 (as long as the worker, which writes where this process is in it)
-        command = [sys.executable, "-m", "ffrobot.worker"]
-        environment = environment_without_mpi() | ALONE
-        self._process = Popen(command, env=environment, stdin=PIPE, stdout=PIPE, stderr=self._messages)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._requests, self._answers = self._process.stdin, self._process.stdout
-
-    def perform(self, arguments: list[str]) -> Done:
-        """Run `ffrobot ARGUMENTS` in a worker; return exit code and messages, its own if it ends with the run."""
-        self._messages.seek(0)
-        self._messages.truncate()
-        answer = b""
-        with suppress(BrokenPipeError):
-            self._requests.write(json.dumps({"arguments": arguments}).encode() + b"\n")
-            self._requests.flush()
-            answer = self._answers.readline()
-        answered: dict[str, Any] = json.loads(answer) if answer.endswith(b"\n") else {}
-        code = int(answered["code"]) if answered else self._process.wait()
-        self._messages.seek(0)
-        return Done(code, self._messages.read().decode(errors="replace"), answered.get("imported", {}))
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether it takes another run."""
-        return self._process.poll() is None
-
-    def stop(self) -> None:
-        """Ask the current run to end, or, without one, the worker itself."""
-        self._process.terminate()
-
-    def close(self) -> None:
-        """End the idle worker."""
-        with suppress(BrokenPipeError):
-            self._requests.close()
-        self._answers.close()
-        self._process.wait()
-        self._messages.close()
-
-
-class Workers:
-    """Workers as they are needed, ended with this object."""
-
-    def __init__(self) -> None:
-        self._idle: list[Worker] = []
-        self._busy: set[Worker] = set()
-        self._lock = Lock()
-        weakref.finalize(self, _close, self._idle)
-
-    def perform(self, arguments: list[str]) -> Done:
-        """Perform a run as `Worker.perform`, by any idle worker; may be called from several threads."""
-        worker = self._take()
-        try:
-            return worker.perform(arguments)
-        finally:
-            with self._lock:
-                self._busy.discard(worker)
-                if worker.is_alive:
-                    self._idle.append(worker)
-
-    def stop(self) -> None:
-        """Ask all current runs to end."""
-        with self._lock:
-            for worker in self._busy:
-                worker.stop()
-
-    def _take(self) -> Worker:
-        with self._lock:
-            fit = [worker for worker in self._idle if worker.place == _place() and worker.is_alive]
-            _close([worker for worker in self._idle if worker not in fit])
-            self._idle[:] = fit
-            worker = self._idle.pop() if self._idle else Worker()
-            self._busy.add(worker)
-        return worker
-
-
-def _close(idle: list[Worker]) -> None:
-    while idle:
-        idle.pop().close()
-
-
-def _place() -> tuple[Path, dict[str, str]]:
-    return Path.cwd(), dict(os.environ)
-
 
 ROW, RESULTS = "row.json", "results.h5"
 MAKING = "results.of-"  # begins the names of results that a process is about to write
@@ -196,8 +82,8 @@ class Row:
         return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 
-def perform(run: SweepRun, workers: Workers) -> Row | None:
-    """Solve the scene in the run's folder; None where a signal interrupted it.
+def perform(run: SweepRun) -> Row | None:
+    """Solve the scene in the run's folder by this thread's worker; None where a signal interrupted it.
 
     Earlier results are replaced in one step: another command in the same folder may be reading them.
     """
@@ -207,7 +93,7 @@ def perform(run: SweepRun, workers: Workers) -> Row | None:
             left.unlink(missing_ok=True)
     arguments = ["solve", str(run.folder / SCENE), "-o", str(made)]
     arguments += [f"--allow-python={path}" for path in run.allow_python]
-    code, printed, imported = workers.perform(arguments)
+    code, printed, imported = own_worker().perform(arguments)
     if made.exists():
         made.replace(results)
     else:  # earlier ones are of other input, maybe
@@ -219,14 +105,6 @@ def perform(run: SweepRun, workers: Workers) -> Row | None:
     quantities = _quantities(results, run.collect) if results.exists() else {}
     inputs = run.inputs | imported
     return Row(run.number, run.values, status, message, quantities, inputs=inputs, imported=tuple(imported))
-
-
-_of_process = Workers()
-
-
-def perform_under_mpi(run: SweepRun) -> Row | None:
-    """Perform a run as `perform`, in a process of `mpirun`."""
-    return perform(run, _of_process)
 
 
 def finished_row(folder: Path) -> Row | None:

@@ -6,28 +6,27 @@ import hashlib
 import json
 import os
 import signal
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from time import monotonic
 
 from rich.console import Console
 from rich.table import Table
 
+from ..batch.batch import Batch
 from ..common.errors import InputError, StoppedError
 from ..common.files import check_folder, write_atomically
-from ..common.parallel import is_first, processes
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import as_csv
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, Value, Variation, grid, latin_hypercube, parse_variation, run_files
-from .runs import RESULTS, ROW, Row, SweepRun, Workers, collected, finished_row, perform, perform_under_mpi
+from .runs import RESULTS, ROW, Row, SweepRun, collected, finished_row, perform
 
 PLAN = "plan.json"
+TABLE_SHARE = 0.05  # of the time of a sweep that its table may take: that of 10 000 runs is long
 
 Key = tuple[str, ...]
 """Parts of a key, `("payload", "0", "mass")`."""
@@ -72,8 +71,9 @@ class Sweep:
     @property
     def runs(self) -> list[SweepRun]:
         """Runs in the order of the table."""
+        folder = self.folder.absolute() / "runs"
         return [
-            SweepRun(k, values, self.folder / "runs" / self._name(k, values), self.collect, {}, self.allow_python)
+            SweepRun(k, values, folder / self._name(k, values), self.collect, {}, self.allow_python)
             for k, values in enumerate(self.points, start=len(self.earlier))
         ]
 
@@ -116,16 +116,8 @@ def plan_sweep(
     return sweep
 
 
-def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Workers | None = None) -> list[Row]:
-    """The rows of all runs; failures are rows, too. The table in the sweep's folder grows with every run.
-
-    `side_by_side` runs go at once, each in a process of its own; `workers` stay for later runs. Under mpirun all
-    processes call this: the first hands out the runs and has the rows, the others, on whatever machine they are,
-    perform them (mpi4py.futures).
-    """
-    if not is_first():
-        with _performed([], side_by_side, Workers()):
-            return []
+def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
+    """The rows of all runs, jobs of `batch`; failures are rows, too. The table in the folder grows with every run."""
     rows, waiting = _rows_and_runs(sweep)
     before = len(sweep.earlier)
 
@@ -135,8 +127,9 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
     if rows or sweep.table.exists():
         tabulate()
     watcher.stage(f"{len(waiting)} runs" + (f", {len(rows)} done before" if rows else ""))
-    with _performed(list(waiting.values()), side_by_side, workers or Workers()) as finished:
-        for row in finished:
+    due = 0.0  # s, when the table is written next
+    try:
+        for _, row in batch.results(perform, list(waiting.values())):
             if row is None:
                 raise StoppedError(f"{sweep.folder}: stopped; the same command resumes it", signal.SIGINT)
             run = waiting[row.number]
@@ -148,6 +141,11 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
             write_atomically(run.folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep", ours=True)
             rows[row.number] = row
             watcher.advance(before + len(rows), before + len(sweep.points))
+            if (now := monotonic()) >= due:
+                tabulate()
+                due = now + (monotonic() - now) / TABLE_SHARE
+    finally:
+        if rows:
             tabulate()
     return [rows[k] for k in sorted(rows)]
 
@@ -179,24 +177,6 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, SweepRun]]:
             files.write(run.folder)
             waiting[run.number] = replace(run, inputs=files.inputs)
     return rows, waiting
-
-
-@contextmanager
-def _performed(runs: Sequence[SweepRun], side_by_side: int, workers: Workers) -> Iterator[Iterable[Row | None]]:
-    if processes() > 1:
-        from mpi4py.futures import MPICommExecutor
-
-        with MPICommExecutor() as entered:  # None but on the first process: the others serve it until it is done
-            executor: Any = entered  # by the types of mpi4py 4 it is no executor
-            yield () if executor is None else executor.map(perform_under_mpi, runs, unordered=True)
-        return
-    with ThreadPoolExecutor(side_by_side) as threads:  # each waits for a worker
-        futures = [threads.submit(perform, run, workers) for run in runs]
-        try:
-            yield (future.result() for future in as_completed(futures))
-        finally:
-            threads.shutdown(wait=False, cancel_futures=True)
-            workers.stop()
 
 
 def _files(sweep: Sweep, run: SweepRun) -> RunFiles:

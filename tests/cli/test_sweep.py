@@ -2,7 +2,6 @@
 
 import csv
 import math
-import subprocess
 import tomllib
 from math import prod
 
@@ -94,16 +93,6 @@ def test_taken_up_again(ffrobot, short_scene):
     assert second.exists()
     assert not list(folders.glob("*/results.h5"))
     assert deflections(short_scene) == expected
-
-
-def test_under_mpirun(ffrobot, short_scene, mpirun):
-    done = subprocess.run(
-        [*mpirun, ffrobot.path, "sweep", short_scene, "--vary", MASSES],
-        env=ffrobot.environment, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("completed") == 2
-    assert [row["status"] for row in table(short_scene)] == ["completed"] * 2
 
 
 def test_latin_hypercube(ffrobot, short_scene):

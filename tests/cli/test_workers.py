@@ -15,7 +15,8 @@ import tomli_w
 from loops import wheel
 
 import ffrobot
-from ffrobot.sweep.runs import Done, SweepRun, Workers, perform
+from ffrobot.batch.worker import Done, Worker, own_worker
+from ffrobot.sweep.runs import SweepRun, perform
 
 CONTROLLER = '''
 """A motor's constant command, by functions that do much else to their process."""
@@ -203,21 +204,19 @@ def test_interruptions_leave_no_process(ffrobot, scene, number):
 
 def test_workers_are_made_anew_where_the_process_has_changed(scene, monkeypatch, tmp_path):
     """Environment and folder are those of the moment, as of a process that is started then."""
-    workers = Workers()
     solve = ["solve", str(scene), "-o", str(tmp_path / "results.h5"), f"--allow-python={tmp_path}"]
-    assert workers.perform(solve)[:2] == (0, "")
-    assert workers.perform(solve)[:2] == (0, "")
+    assert own_worker().perform(solve)[:2] == (0, "")
+    assert own_worker().perform(solve)[:2] == (0, "")
     monkeypatch.setenv("FFROBOT_MARK", "1")
-    assert workers.perform(solve)[:2] == (0, "")
+    assert own_worker().perform(solve)[:2] == (0, "")
     first, second, third = notes(scene)
     assert first[0] == second[0] != third[0]
     assert [text for *_, text in notes(scene)] == ["clean", "clean", "environment"]
     assert not _is_running(first[0])
-    code, told, _ = workers.perform(["solve", str(tmp_path / "none.toml")])
+    code, told, _ = own_worker().perform(["solve", str(tmp_path / "none.toml")])
     assert code == 2
     assert told.startswith("ffrobot: ")
-    del workers
-    assert not _is_running(third[0])
+    assert _is_running(third[0])
 
 
 def _is_running(pid):
@@ -229,24 +228,24 @@ def _is_running(pid):
         return file.read().rpartition(")")[2].split()[0] != "Z"
 
 
-def test_results_are_replaced_in_one_step(scene, tmp_path):
+def test_results_are_replaced_in_one_step(scene, tmp_path, monkeypatch):
     """Another command in the same folder may read them at any time: two equal studies at once, for one."""
     run = SweepRun(0, (), tmp_path / "run")
     run.folder.mkdir()
     results, seen = run.folder / "results.h5", []
 
-    class Watched(Workers):
-        def perform(self, arguments):
-            seen.append(results.read_bytes() if results.exists() else b"")
-            Path(arguments[arguments.index("-o") + 1]).write_bytes(image)
-            return Done(0, "", {})
+    def watched(_, arguments):
+        seen.append(results.read_bytes() if results.exists() else b"")
+        Path(arguments[arguments.index("-o") + 1]).write_bytes(image)
+        return Done(0, "", {})
 
     solved = ffrobot.solve(scene, tmp_path / "made.h5", allow_python=[tmp_path])
     solved.close()
     image = (tmp_path / "made.h5").read_bytes()
     (run.folder / f"results.of-{platform.node()}-999999999-0.7.h5").write_bytes(b"left by a process that was killed")
+    monkeypatch.setattr(Worker, "perform", watched)
     for _ in range(2):
-        assert perform(run, Watched()).status == "completed"
+        assert perform(run).status == "completed"
     assert seen == [b"", image]
     assert [path.name for path in run.folder.iterdir()] == ["results.h5"]
 
@@ -256,15 +255,14 @@ def test_messages_name_files_of_the_run_without_its_folder(tmp_path, monkeypatch
     (tmp_path / "sw").mkdir()
     (tmp_path / "sw" / "scene.toml").write_text("nothing = 1\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    row = perform(SweepRun(0, (), Path("sw")), Workers())
+    row = perform(SweepRun(0, (), Path("sw")))
     assert row.status == "wrong input"
     assert row.message.startswith("scene.toml: ")
 
 
 def test_messages_of_a_run_are_its_own(tmp_path):
     """A worker that wrote messages of one run begins those of the next at their beginning."""
-    workers = Workers()
-    first, second = (workers.perform(["info", str(tmp_path / f"{name}.h5")]) for name in ("a_long_name", "b"))
+    first, second = (own_worker().perform(["info", str(tmp_path / f"{name}.h5")]) for name in ("a_long_name", "b"))
     assert first.code == second.code == 2
     assert second.messages.startswith("ffrobot: ")
     assert second.messages == first.messages.replace("a_long_name", "b")

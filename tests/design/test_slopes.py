@@ -8,6 +8,7 @@ import tomli_w
 from small_robots import SWING
 
 import ffrobot
+from ffrobot.batch.batch import Batch, Processes
 from ffrobot.design.designs import Designs, Runs, changes_for
 from ffrobot.design.evaluations import Differentiation, Evaluations
 from ffrobot.design.responses import read_problem
@@ -24,7 +25,7 @@ def differentiation(tmp_path, scene):
     problem = read_problem(GOALS[0], None, [f"{GOALS[1]} <= 1"])
     space = read_space(path, [f"{OUTER}=0.018:0.03", f"{LOAD}=0.1:1:log"])
     fixed = changes_for(path, problem.responses, 1e-7, keep_steps=True)
-    designs = Designs(Runs(path, tmp_path / "runs", processes=2), space.keys, space.own, fixed)
+    designs = Designs(Runs(path, tmp_path / "runs", Batch(lambda: Processes(2))), space.keys, space.own, fixed)
     evaluations = Evaluations(designs, space, problem)
     (first,) = evaluations.at([space.start_place])
     found = Differentiation(evaluations, 1e-7)

@@ -25,7 +25,7 @@ LONG = {
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
-FILE = re.compile(r"`([\w.]+\.(?:toml|csv|py|urdf))`")  # the last one in the paragraph before a file
+FILE = re.compile(r"`([\w.]+\.(?:toml|csv|py|urdf|sh))`")  # the last one in the paragraph before a file
 PROGRESS = re.compile(r"ffrobot: .* \(\d+ s\)")  # a line every 30 s, where the machine is slow
 DOCTEST = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 

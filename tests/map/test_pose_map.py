@@ -16,6 +16,7 @@ from beam_links import beam_link, rectangle
 from rich.console import Console
 
 from ffrobot import solve
+from ffrobot.batch.batch import batch_of
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.map import pose_map
 from ffrobot.map.map_file import print_map, quantities, torque_share, write_map
@@ -62,7 +63,8 @@ def arm(tmp_path_factory):
 
 
 def mapped(scene, folder, *over, **keys):
-    return make_map(plan_map(scene, over, folder, **keys), 1, Watcher())
+    with batch_of(1) as batch:
+        return make_map(plan_map(scene, over, folder, **keys), batch, Watcher())
 
 
 def test_a_pose_is_what_static_finds_there(arm, tmp_path):
