@@ -122,8 +122,8 @@ def sensitivity(
         tolerance: tolerance of the runs, if the scene has a larger one.  [default: 1e-07 with reused time steps, else
             1e-09]
         how: `processes`, runs in parallel here, or `executor`, which performs them: one of `concurrent.futures`,
-            `mpi4py.futures` or dask, with processes that import ffrobot; `retry`, whether to repeat designs that failed
-            before; `allow_python`, as in `solve`; `watcher`, an object that observes progress and can stop the study.
+            `mpi4py.futures` or dask, with processes that import ffrobot. `retry`: whether to repeat designs that failed
+            before. `allow_python`: as in `solve`. `watcher`: an object that observes progress and can stop the study.
 
     Returns:
         Derivatives with their errors.
