@@ -97,6 +97,8 @@ def _humps(function: TimeFunction, ends: Array) -> Array:
     """
     times = np.linspace(ends[0], ends[1], ENDS.intervals * ENDS.dense + 1)
     values = np.nan_to_num(function.sample(times)[0])
+    if ENDS.dense * np.abs(np.diff(values)).max() <= ENDS.hump * np.ptp(values):
+        return times[:0]  # no interval has that much of the range
     cells = values[np.arange(ENDS.intervals)[:, None] * ENDS.dense + np.arange(ENDS.dense + 1)]
     change, range_ = cells[:, -1] - cells[:, 0], np.ptp(cells, axis=1)
     off = np.abs(cells - cells[:, :1] - change[:, None] * np.linspace(0.0, 1.0, ENDS.dense + 1)).max(axis=1)
