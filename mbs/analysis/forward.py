@@ -32,6 +32,8 @@ from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 
 STEPS = 20  # of the shortest lag or delay of amplifiers, and of outputs, between which voltages are linear
 MOST_STEPS = 100_000
+OF_RECORD, OF_PRESCRIBED = 1.0, 10.0  # evaluations in the time of finding forces: of a step made again, of a posture
+SEEN = 1e3  # times the tolerance of a motion, which p̈ jumps by: looser steps do not see that
 
 
 class Forward(ActuatedAnalysis):
@@ -79,8 +81,13 @@ class Forward(ActuatedAnalysis):
             replayed, start = _behind_gears(source, model, self, context)
         else:
             replayed, start = _replayed(context, model, source, self), State(source.q[0], source.v[0])
+            replayed = replayed._replace(evaluations=OF_RECORD)
+            if source.prescribed is not None:
+                is_seen = self.tolerance < SEEN * source.analysis.tolerance
+                breaks = source.prescribed.breaks if is_seen else ()
+                replayed = replayed._replace(evaluations=OF_PRESCRIBED, breaks=breaks)
         if self.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
-            replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
+            replayed = replayed._replace(integrator=source.statistics.integrator.name)
         run = drive_robot(
             model,
             self,

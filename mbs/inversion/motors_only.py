@@ -253,7 +253,7 @@ def outcome_along(
         multipliers=states.loops,
         required=states.required,
         statistics=statistics,
-        prescribed=Prescription(servo.equations, shape_of(curve, servo.mode_counts), servo.near[0]),
+        prescribed=Prescription(servo.equations, shape_of(curve, servo.mode_counts), servo.near[0], breaks=curve.x),
     ).at(kept)
 
 

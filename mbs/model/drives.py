@@ -43,7 +43,10 @@ class Replayed(NamedTuple):
     at_points: Mapping[str, Mapping[str, int]] = MappingProxyType({})
     # by joint those that act along its coordinates, N·m or N on its second side
     moments: Mapping[str, Sequence[int]] = MappingProxyType({})
-    integrator: str = ""  # with which the earlier analysis ended, where this run repeats its motion; else empty
+    # in the time of which the numbers at one time are found: those of a motion solved anew take longer
+    evaluations: float = 0.0
+    breaks: Sequence[float] = ()  # (n,) s, at which the numbers may jump
+    integrator: str = ""  # of the earlier analysis, where this run repeats its motion; else empty
 
 
 class Drives(NamedTuple):

@@ -33,10 +33,10 @@ from ..posture.start import rank_of_redundant_loops
 from ..scene.analysis import IntegratedAnalysis
 from .diagnosis import find_cause
 from .integrator_choice import choose_integrator
-from .integrators import Choice, beyond_round_off, integration_controls, with_steps_of
+from .integrators import EXPLICIT, Choice, beyond_round_off, integration_controls, with_steps_of
 from .record import Continuation, Run, Statistics
 from .samples import LOOKS, about_highest, in_order, new_samples, reached_samples, some_of, telling
-from .stops import stops
+from .stops import ENDS, stops
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -114,8 +114,8 @@ class _Integration:
 
     def begin(self, start: State, earlier: Run | None, *, is_recorded: bool) -> None:
         """Choose the integrator, go on from an `earlier` run, and have the core watch limits and postures."""
-        is_sampled, outputs = self.control is not None, len(self.times)
-        choose = partial(choose_integrator, self.system, self.analysis, start, outputs, is_sampled=is_sampled)
+        is_sampled = self.control is not None
+        choose = partial(choose_integrator, self.system, self.analysis, start, self.times, is_sampled=is_sampled)
         self.integrator = with_steps_of(self.analysis, float(self.times[-1]), choose)
         continuation = None
         if earlier is not None:  # with the same candidates, and what they have become since
@@ -138,7 +138,18 @@ class _Integration:
         paths = scene.trajectory if self.is_followed or is_replay else ()
         at_points = (size for drive in self.drives.at_points for size in drive.components.values())
         is_driven, is_replay = self.is_rigid and self.is_followed, self.is_rigid and is_replay
-        return stops(self.times, paths, (*scene.load_functions, *at_points), is_driven=is_driven, is_replay=is_replay)
+        ends = stops(self.times, paths, (*scene.load_functions, *at_points), is_driven=is_driven, is_replay=is_replay)
+        return ends if self.integrator.name not in EXPLICIT else np.union1d(ends, self.jumps)
+
+    @property
+    def jumps(self) -> Array:
+        """Times (n,), s, before and behind jumps of replayed forces, over which implicit methods step better."""
+        if self.drives.replayed is None:
+            return self.times[:0]
+        breaks, (begin, end) = np.array(self.drives.replayed.breaks), self.times[[0, -1]]
+        instant = ENDS.shortest * (end - begin)
+        inside = breaks[(breaks > begin + 2 * instant) & (breaks < end - 2 * instant)]
+        return np.concatenate([inside - instant, inside + instant])
 
     def run(self, start: State, progress: Progress) -> _core.TreeRun:
         """Integrate in the core from `start`, or from where an earlier run has stopped."""

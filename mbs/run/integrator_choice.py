@@ -16,12 +16,7 @@ from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
 from ..scene.analysis import IntegratedAnalysis
-from .integrators import ASKED_FOR, EXPLICIT, Choice, faster_of
-
-# Steps of DOP853 in the time of one of Radau IIA: 0.7 to 1.5 in cases/arm_3r, cases/slider_crank_3d and a stiff arm of
-# three links. Twice as much here: once at work, Radau is given time to damp vibrations away
-# (core/integrate/faster_method.cpp), which has to be worth it.
-COST_OF_RADAU = 3.0
+from .integrators import ASKED_FOR, EXPLICIT, RULE, Choice, faster_of, without_choosing
 
 TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few of its times long, are too many
 
@@ -38,20 +33,20 @@ def integrator_of(model: Model, name: str) -> str:
 
 
 def choose_integrator(
-    system: MultibodySystem, analysis: IntegratedAnalysis, start: State, outputs: int, *, is_sampled: bool
+    system: MultibodySystem, analysis: IntegratedAnalysis, start: State, times: Array, *, is_sampled: bool
 ) -> Choice:
-    """The integrator for an analysis from `start` with that many outputs.
+    """The integrator for an analysis from `start` with outputs at `times` (T,), s.
 
     Where a controller `is_sampled`, every sample starts anew and nothing takes over.
     """
     model = system.model
     if analysis.integrator != "auto":
         return Choice(analysis.integrator, ASKED_FOR)
-    if outputs == 1:
+    if len(times) == 1:
         return Choice("dop853", "nothing to integrate")
     if _sticks(model):
         return Choice("radau", "dry friction is a stiff damper to the light ends of links")
-    if (rate := fastest_friction(system, start)[0]) * analysis.end > TOO_STIFF:
+    if (rate := fastest_friction(system, start)[0]) * float(np.ptp(times)) > TOO_STIFF:
         return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
     if not any(node.body.n_modes for node in model.tree.nodes):
         return Choice("dop853", "nothing vibrates")
@@ -60,11 +55,18 @@ def choose_integrator(
     replayed = system.replayed
     if replayed is not None and replayed.integrator in (*EXPLICIT, "radau"):
         return Choice(replayed.integrator, "integrator of the run whose forces act")
+    replay = 0.0 if replayed is None else replayed.evaluations
+    cost = RULE.cost_of_radau(model.tree.n_v, replay)
+    choice = None if model.tree.gears else without_choosing(_of_links(model), float(np.ptp(times)), replay, cost)
+    if choice is not None:
+        return choice if replayed is None else choice._replace(candidates=())
     vibrations = vibrations_of(model, without_rows(model), 0.0, start.q)
     if not len(vibrations.frequency):
         return Choice("dop853", "nothing vibrates")
     excited = _excitation(system, start, vibrations)
-    choice = faster_of(vibrations.frequency, vibrations.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
+    starts = 1 + (0 if replayed is None else len(replayed.breaks))
+    of = vibrations.frequency, vibrations.damping_ratio, excited
+    choice = faster_of(*of, analysis.tolerance, times, starts, cost)
     # Under a replay the length of steps says less of what they cost: no integrator takes over.
     return choice if replayed is None else choice._replace(candidates=())
 
@@ -91,6 +93,14 @@ def _sticks(model: Model) -> bool:
     joints = (*(node.joint for node in nodes), *model.tree.loops)
     has_friction = any(friction.coulomb > 0 for joint in joints for friction in joint.frictions)
     return has_friction and any(node.body.n_modes for node in nodes)
+
+
+def _of_links(model: Model) -> float:
+    """The highest frequency of links alone, rad/s; damped more than critically it falls faster than it would swing."""
+    bodies = [node.body for node in model.tree.nodes if node.body.n_modes]
+    omega = [np.sqrt(body.stiffness) for body in bodies]
+    rates = [np.diagonal(body.damping) for body in bodies]
+    return float(np.maximum(np.concatenate(omega), np.concatenate(rates)).max())
 
 
 def _excitation(system: MultibodySystem, start: State, vibrations: Vibrations) -> Array:

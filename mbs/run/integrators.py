@@ -20,15 +20,40 @@ METHODS = {
     "generalized-alpha": _core.MethodKind.generalized_alpha,
 }
 
-# What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
-# at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; parts of the tolerance below
-# which both need not resolve a vibration, Radau since it damps it away; steps that Radau takes before they have found
-# their size. DOPRI5 never wins by more than clocks scatter: undamped, its steps
-# have to be five times as short as those of DOP853 (it is stable up to 1.0), damped nearly three.
-STABLE = 4.8
-RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.30
-STEPS_TO_START = 100
-NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
+
+class Rule(NamedTuple):
+    """What steps of DOP853 and Radau IIA reach and cost, measured in runs of tests/campaigns/choice.py.
+
+    DOPRI5 is never faster by more than clocks scatter: undamped, its steps have to be five times as short as those of
+    DOP853 (it is stable up to 1.0), damped nearly three.
+    """
+
+    # step size times frequency at which DOP853 is stable (Hairer, Nørsett and Wanner 1993, II.10), and at which both
+    # resolve a vibration to a tolerance of 1e-4
+    stable: float = 4.8
+    resolved_dop853: float = 1.25
+    resolved_radau: float = 0.30
+    # parts of the tolerance below which both need not resolve a vibration, Radau since it damps it away
+    negligible_dop853: float = 0.1
+    negligible_radau: float = 1.0
+    steps_to_start: int = 100  # of Radau, before they have found their size
+    # evaluations of a step: twelve stages and the end; three stages in three iterations
+    of_dop853: float = 13.0
+    of_radau: float = 9.0
+    # evaluations in the time of a step's linear algebra, for each coordinate: 1.0 to 1.6 of arms of 8 to 31
+    of_algebra: float = 1.5
+    short: float = 4000.0  # evaluations of a run: the choice itself takes the time of half of them
+    # times as slow as stable steps: what is expected of the other in a short run, which takes over if that is wrong by
+    # more than vibrations that are resolved explain
+    last_resort: float = 100.0
+
+    def cost_of_radau(self, coordinates: int, replay: float) -> float:
+        """A step of Radau in those of DOP853; `replay`: further evaluations at each time, of an earlier motion."""
+        one = 1.0 + replay
+        return (self.of_radau * one + self.of_algebra * coordinates) / (self.of_dop853 * one)
+
+
+RULE = Rule()
 
 ASKED_FOR = "requested"
 REPEATED = "steps taken again"
@@ -58,11 +83,6 @@ class Choice(NamedTuple):
     name: str
     reason: str
     candidates: tuple[Contender, ...] = ()
-
-    @property
-    def at_end(self) -> str:
-        """The method at the end of the run."""
-        return self.name.partition(AFTER)[0]
 
     @property
     def in_words(self) -> str:
@@ -96,26 +116,44 @@ class Choice(NamedTuple):
 NOT_INTEGRATED = Choice("none", "nothing to integrate")
 
 
+def without_choosing(frequency: float, duration: float, replay: float, cost: float) -> Choice | None:
+    """DOP853 for a run so short that choosing takes a notable part of it; None for others.
+
+    `frequency` rad/s, about the highest; `duration` s; `replay` as in `Rule.cost_of_radau`, whose result is `cost`.
+    """
+    steps = max(duration * frequency / RULE.stable, 1.0)
+    if steps * RULE.of_dop853 * (1.0 + replay) > RULE.short:
+        return None
+    pace = duration / steps
+    candidates = Contender("dop853", 1.0, pace), Contender("radau", cost, pace / RULE.last_resort)
+    return Choice("dop853", f"{steps:.3g} steps are stable at {frequency:.3g} rad/s: a short run", candidates)
+
+
 def faster_of(
-    frequency: Array, damping_ratio: Array, excited: Array, analysis: IntegratedAnalysis, outputs: int, cost: float
+    frequency: Array, damping_ratio: Array, excited: Array, tolerance: float, times: Array, starts: int, cost: float
 ) -> Choice:
     """DOP853 or Radau IIA, whichever is expected to be faster, with the other to take over where it is not.
 
     `frequency` (n,) rad/s, ascending, and `damping_ratio` (n,) of what vibrates; `excited` (n,) the relative size with
-    which each rings from the start on. No step goes beyond one of the `outputs`; `cost` of a step of Radau, in
-    DOP853's.
+    which each rings from the start on. No step goes beyond one of the outputs at `times` (T,), s. Radau has to find its
+    step `starts` times; `cost` of a step of it, in DOP853's.
     """
     # damped more than critically a vibration falls faster than it would swing
-    top, scale = (frequency * np.maximum(1.0, 2 * damping_ratio)).max(), analysis.tolerance / 1e-4
-    phase = partial(_ringing_phase, frequency, damping_ratio, excited, analysis.end)
-    explicit = phase(NEGLIGIBLE_DOP853 * analysis.tolerance) / (RESOLVED_DOP853 * scale ** (1 / 8))
-    implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
-    explicit, implicit = max(analysis.end * top / STABLE, explicit), max(outputs, implicit) + STEPS_TO_START
-    rings = excited > analysis.tolerance
+    duration, top, scale = (
+        float(np.ptp(times)),
+        (frequency * np.maximum(1.0, 2 * damping_ratio)).max(),
+        tolerance / 1e-4,
+    )
+    phase = partial(_ringing_phase, frequency, damping_ratio, excited, duration)
+    explicit = phase(RULE.negligible_dop853 * tolerance) / (RULE.resolved_dop853 * scale ** (1 / 8))
+    implicit = phase(RULE.negligible_radau * tolerance) / (RULE.resolved_radau * scale ** (1 / 5))
+    explicit = max(duration * top / RULE.stable, explicit)
+    implicit = max(len(times), implicit) + RULE.steps_to_start * starts
+    rings = excited > tolerance
     felt = f"{frequency[rings].max():.3g} rad/s" if rings.any() else "none"
     reason = f"highest natural frequency {top:.3g} rad/s, highest excited frequency {felt}"
-    dop853 = Contender("dop853", 1.0, analysis.end / explicit)
-    radau = Contender("radau", cost, analysis.end / (cost * implicit))
+    dop853 = Contender("dop853", 1.0, duration / explicit)
+    radau = Contender("radau", cost, duration / (cost * implicit))
     first, second = (radau, dop853) if radau.pace > dop853.pace else (dop853, radau)
     return Choice(first.name, reason, (first, second))
 

@@ -117,6 +117,7 @@ class Prescription(NamedTuple):
     shape: Sequence[Sequence[TimeFunction]]  # p(t) of each body
     near: Array  # (n_q,) a posture near the first
     voltages: Mapping[str, PPoly] = MappingProxyType({})  # V(t) (k,) by body, where the analysis itself finds them
+    breaks: Sequence[float] = ()  # s, between pieces of p(t), where p̈ jumps
 
 
 @struct

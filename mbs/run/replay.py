@@ -161,7 +161,7 @@ def _found(run: Run, reader: Reader, system: MultibodySystem | None = None) -> _
         of_run = driven_mechanism(run.model, has_motors=False) if system is None else integrated_mechanism(system)
         return _core.recorded_forces(of_run, run.recording, reader(of_run))
     assert run.prescribed is not None
-    equations, shape, near, _ = run.prescribed
+    equations, shape, near, *_ = run.prescribed
     motion = equations()
     return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
 

@@ -11,6 +11,7 @@ from oracle_runs import evaluated, run
 from scipy.linalg import eigh, null_space
 
 import ffrobot
+from ffrobot.mbs.inversion.motors_only import MotorsOnly
 from ffrobot.mbs.linear.vibration import vibrations_of, without_rows
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.mbs.quantities.motion import constraint_rows
@@ -53,9 +54,19 @@ def test_vibrations_show_in_the_motion():
 
 
 def test_what_rings_is_resolved_explicitly():
-    choice = chosen(arm(), tolerance=1e-6)
+    links = arm_links(EI=300.0, modes=12, extra=2)
+    choice = chosen(arm(links), tolerance=1e-6, end=0.1, output_step=0.01)
     assert choice.name == "dop853"
     assert "highest excited frequency" in choice.reason
+
+
+def test_short_runs_are_not_worth_a_choice():
+    """Explicit steps are stable up to 4.8 radians of the stiffest link's highest mode."""
+    model = arm()
+    choice = chosen(model, tolerance=1e-6)
+    omega = max(np.sqrt(node.body.stiffness.max()) for node in model.model.tree.nodes if node.body.n_modes)
+    assert choice.name == "dop853"
+    assert choice.reason == f"{omega / 4.8:.3g} steps are stable at {omega:.3g} rad/s: a short run"
 
 
 def test_stiff_links_that_do_not_ring_are_integrated_implicitly():
@@ -95,6 +106,17 @@ def test_motors_without_the_modal_forces_that_went_with_them_let_links_ring(at_r
     outcome = run(model, analysis, inverse)
     assert inverse.statistics.integrator.name == "radau"
     assert outcome.statistics.integrator.name == "dop853"
+
+
+@pytest.mark.parametrize(("tolerance", "integrator"), [(1e-2, "radau"), (1e-6, "dop853")])
+def test_replays_of_motions_solved_anew(tolerance, integrator):
+    """Each evaluation solves for a posture, so few of them count more than algebra; jumps of p̈ end explicit steps."""
+    model = arm(arm_links(damping_ratio=0.02), initial=AT_REST, motors="section")
+    source = run(model, MotorsOnly(name="inverse", kind="motors-only", end=1.0, output_step=0.01))
+    keys = {"actuation": "inverse", "apply": "joints"}
+    statistics = run(model, forward(tolerance=tolerance, **keys), source).statistics
+    assert statistics.integrator.name == integrator
+    assert statistics.rejected < 0.05 * statistics.steps
 
 
 def test_a_choice_that_turns_out_badly_is_changed():
