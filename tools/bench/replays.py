@@ -18,7 +18,6 @@ from .hand_written import ratios
 
 INTEGRATORS = ("dop853", "auto")
 TOLERANCE, TIGHTER, END, OUTPUT_STEP = 1e-4, 1e-6, 1.0, 0.001
-AIM = 2.0  # times the seconds of PCID
 
 
 def measure_replays(scenes: Iterable[Scene], repeat: int, display: Watcher) -> list[Row]:
@@ -55,7 +54,6 @@ def _row(scene: Scene, apply: str, integrator: str, tolerance: float, repeat: in
         "seconds": median(seconds),
         "of_pcid": of_minima,
         "of_pcid_median": of_neighbours,
-        "aim": AIM,
         "steps": forward.statistics.steps,
         "steps_of_pcid": pcid.statistics.steps,
         # largest deviation of a coordinate at the outputs, of the longest way of any
