@@ -128,7 +128,7 @@ class BeamModel(Record):
     """Beam theory: without shear, or with shear and rotary inertia of the sections."""
 
 
-class ReferenceCondition(Record):
+class Reference(Record):
     """Reference conditions of the link's frame (docs/theory.md, Reference conditions).
 
     Sections of beams stay plane, so that both kinds of `coupling` are the same there.
@@ -201,7 +201,7 @@ class StressRecovery(Record):
 class _Link(Record):
     name: Title
     """Name of the link; in a scene by default that of its body."""
-    reference: ReferenceCondition
+    reference: Reference
     """Reference condition of the link's frame."""
     modes: Modes = Modes.model_construct()
     """Modes of the link; by default six of each bending family, one axial, one of torsion."""
