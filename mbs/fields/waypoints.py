@@ -203,8 +203,8 @@ def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Cal
         raise InputError(f"{where}: expected times that increase", f"t = {after:g} after {before:g}")
     if len(times) < 2:
         raise InputError("expected at least 2 waypoints", len(times))
-    remarks += [*_gaps(times, np.any(np.diff(values, axis=0), axis=1)), *_moving_ends(times, values)]
-    return Waypoints(tuple(columns), times, values, (*remarks, *_jumps(columns, times, values)))
+    remarks += [*_jumps(columns, times, values), *_gaps(times, np.any(np.diff(values, axis=0), axis=1))]
+    return Waypoints(tuple(columns), times, values, (*remarks, *_moving_ends(times, values)))
 
 
 def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:
