@@ -73,7 +73,9 @@ def own_changes(tables):
     def output(t):
         return np.array([eval(text, {"t": min(max(t, 0.0), end)}) for text in texts])
 
-    chain = Chain(sections, count // (1 + is_3d), mass, output, is_3d=is_3d, gravity=9.81 * is_3d)
+    last = tables["joint"][-1]
+    rotor = (last["rotor_inertia"], last["gear_ratio"]) if "rotor_inertia" in last and len(sections) == 2 else None
+    chain = Chain(sections, count // (1 + is_3d), mass, output, is_3d=is_3d, gravity=9.81 * is_3d, rotor=rotor)
     return changes(chain, np.array(angles if is_3d else np.diff(angles, prepend=0.0)), end)
 
 

@@ -28,8 +28,9 @@ class Modes:
 class Chain:
     """Links (length, height, width) one behind the other in the plane, or a rod on waist and shoulder in 3D."""
 
-    def __init__(self, links, count, payload, output, *, is_3d=False, gravity=0.0, E=70e9, rho=2700.0):
-        self.links, self.output, self.is_3d, self.gravity = links, output, is_3d, gravity
+    def __init__(self, links, count, payload, output, *, is_3d=False, gravity=0.0, E=70e9, rho=2700.0, rotor=None):
+        """`rotor`: inertia (kg·m²) and gear ratio at the joint of the second of two links, on the tip of the first."""
+        self.links, self.output, self.is_3d, self.gravity, self.rotor = links, output, is_3d, gravity, rotor
         self.modes, self.count = Modes(count, np.append(POINTS, 1.0)), count
         planes = 2 if is_3d else 1
         self.joints = len(output(0.0))
@@ -82,6 +83,16 @@ class Chain:
                 return q
             q = q + np.linalg.solve(self.jacobian(q, p, len(q))[-1, rows], off)
 
+    def of_rotor(self, p, inertia, ratio):
+        """What a rotor adds to M: its moment on the link that carries it; the motor takes that on its own joint."""
+        length, first = self.links[0][0], np.s_[: self.count]
+        slopes = self.sizes[first] * self.modes.slopes / length
+        carrier = np.zeros(2 + len(p))
+        carrier[0] = 1.0
+        carrier[2 : 2 + self.count] = slopes / (1 + (slopes @ p[first]) ** 2)
+        spin = carrier + ratio * (np.arange(len(carrier)) == 1)
+        return inertia * np.outer(carrier, spin)
+
     def inertia(self, t, q, h=1e-3):
         """det M_i at time t where links carry what the path asks of them at rest relative to it, and q there."""
         p, before = np.zeros(len(self.omega)), np.inf
@@ -94,6 +105,8 @@ class Chain:
             J = self.jacobian(q, p)
             p = -np.einsum("i,ijp,ij->p", self.masses, J[:, :, len(q) :], acceleration) / self.omega**2
         M = np.einsum("i,ija,ijb->ab", self.masses, J, J)
+        if self.rotor is not None:
+            M += self.of_rotor(p, *self.rotor)
         n, rows = len(q), slice(J.shape[1] - len(q), None)
         of_tip = J[-1, rows]
         return np.linalg.det(M[n:, n:] - M[n:, :n] @ np.linalg.solve(of_tip[:, :n], of_tip[:, n:])), q

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from patch_sets import amplifiers
 from test_tracking import arm, strip_scene
-from tracked_arms import random_arm
+from tracked_arms import own_changes, random_arm
 
 import ffrobot
 from ffrobot.mbs.inversion.motors_only import outcome_along
 from ffrobot.mbs.inversion.servo import make_servo
-from ffrobot.mbs.inversion.zero_dynamics import equilibrium
+from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.known_motion import required_forces
 from ffrobot.mbs.model.model import modal_directions
@@ -221,3 +221,14 @@ def test_finer_intervals_that_have_no_solution():
         wanted, found = (results[f"{name}/points/fore.tip/position"] for name in ("carried", "replay"))
         assert results.attributes("carried/tracking")["unmet"] < 1e-12
     assert np.abs(found - wanted).max() < 1e-7
+
+
+@pytest.mark.parametrize(("tolerance", "expected"), [(0.0, [0.184, 0.878]), (1e-4, [])])
+def test_zeros_that_a_rotor_takes_to_infinity(tolerance, expected):
+    """det M_i of two links changes its sign by the rotor on the first one alone, as by modes in closed form."""
+    _, tables = random_arm(np.random.default_rng([62, 7]), tolerance)
+    solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
+    end = solution.scene.analysis[0].end
+    linear = linearise(with_gears(make_servo(solution.model, end, "arm", lambda: True, 1.0)), end)
+    np.testing.assert_allclose(own_changes(tables), expected, atol=1e-3)
+    np.testing.assert_allclose(linear.times[list(linear.singular_after)], expected, atol=linear.times[1])
