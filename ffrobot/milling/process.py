@@ -17,6 +17,7 @@ from .stability import Cutter, StabilityLimits, Tip, limit_depth, stability_limi
 
 BELOW, ABOVE = 10.0, 1000.0  # the depth without lobes: where those of lobes are sought
 ALONG = 1e-6  # of a direction, across the axis: none
+MOST_SPEEDS = 1000
 FEEDS = 12  # directions of feed within half a turn, beyond which forces are the same
 
 
@@ -26,9 +27,11 @@ def spread(given: object) -> object:
         return tuple(given) if isinstance(given, list) else given
     try:
         first, last, count = given.split(":")
-        return tuple(np.linspace(float(first), float(last), int(count)).tolist())
+        if 1 <= int(count) <= MOST_SPEEDS:
+            return tuple(np.linspace(float(first), float(last), int(count)).tolist())
     except ValueError:
-        raise ValueError(f'expected a list, or "FIRST:LAST:COUNT", found "{given}"') from None
+        pass
+    raise ValueError(f'expected a list, or "FIRST:LAST:COUNT" of at most {MOST_SPEEDS}, found "{given}"')
 
 
 class Milling(Record):
@@ -50,7 +53,7 @@ class Milling(Record):
     """Direction of the feed of the tool in global axes; its part across the axis counts. Default: the worst one."""
     highest: Positive = 1000.0
     """Highest natural frequency, Hz, of modes that vibrate; modes above it are rigid."""
-    speeds: Annotated[tuple[Positive, ...], BeforeValidator(spread), Field(max_length=1000)] = ()
+    speeds: Annotated[tuple[Positive, ...], BeforeValidator(spread), Field(max_length=MOST_SPEEDS)] = ()
     """Spindle speeds, rev/min, at which the stable depth is computed: a list, or "FIRST:LAST:COUNT"."""
     method: Literal["averaged", "semi-discretization"] = "averaged"
     """Method at these speeds: with averaged cutting forces, or with the forces of each angle, which takes longer."""

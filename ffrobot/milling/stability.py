@@ -19,8 +19,8 @@ from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.structs import struct
 
-SPREAD = np.concatenate([-np.geomspace(40.0, 0.03, 200), np.geomspace(0.03, 40.0, 200)])  # half-bandwidths off a mode
-
+NEAREST, FARTHEST = 0.03, 10.0  # frequencies off a mode: half-bandwidths and its frequency, between them
+NEAR, FAR = 100, 250  # as many frequencies on each side, within a half-bandwidth and beyond it
 LEAST = 1e-9  # damping ratio: without any, no depth is stable
 FINE = 0.5  # rad, of the fastest mode in a step of semi-discretization
 STEPS = (80, 400)  # of a tooth period, at least and at most
@@ -72,9 +72,12 @@ class Tip(NamedTuple):
         poles, V = np.linalg.eig(A)
         left = np.linalg.inv(V)[:, m:] @ self.J.T
         right = self.J @ V[:m]
-        size = np.abs(poles[poles.imag >= 0.0])  # real ones, too: strong damping leaves depths a limit
-        bandwidth = np.maximum(np.abs(poles.real[poles.imag >= 0.0]), LEAST * size)
-        omega = (size[:, None] + bandwidth[:, None] * SPREAD).ravel()
+        some = poles[(poles.imag >= 0.0) & (poles != 0.0)]  # real ones, too: strong damping leaves depths a limit
+        size = np.abs(some)
+        bandwidth = np.maximum(np.abs(some.real), LEAST * size)
+        near = np.geomspace(NEAREST * bandwidth, bandwidth, NEAR)
+        off = np.concatenate([near, np.geomspace(bandwidth, FARTHEST * size, FAR)])
+        omega = np.concatenate([size - off, size + off]).ravel()
         omega = np.unique(omega[omega > 0.0])
         residues = right.T[:, :, None] * left[:, None, :]
         return as_floats(omega), np.tensordot(1.0 / (1j * omega[:, None] - poles), residues, axes=1)
@@ -100,10 +103,13 @@ class StabilityLimits(NamedTuple):
         found = np.full(len(speed), np.inf)
         turned = 2 * np.pi * self.omega / (teeth * speed[:, None])  # ωτ
         for depth, phase in zip(np.where(np.isfinite(self.depth), self.depth, 0.0).T, self.phase.T, strict=True):
-            off = (turned - phase + np.pi) % (2 * np.pi) - np.pi
-            crossed = (depth[:-1] * depth[1:] > 0.0) & (off[:, :-1] * off[:, 1:] <= 0.0)
-            crossed &= np.abs(off[:, 1:] - off[:, :-1]) < np.pi
-            share = off[:, :-1] / np.where(crossed, off[:, :-1] - off[:, 1:], 1.0)
+            first = (turned[:, :-1] - phase[:-1]) / (2 * np.pi)  # whole where a lobe is
+            rise = (np.diff(turned) - ((np.diff(phase) + np.pi) % (2 * np.pi) - np.pi)) / (2 * np.pi)
+            low, high = np.minimum(first, first + rise), np.maximum(first, first + rise)
+            crossed = (depth[:-1] * depth[1:] > 0.0) & (np.ceil(low) <= high)
+            least_first = (rise > 0.0) == (np.diff(depth) > 0.0)  # of several lobes between two frequencies
+            lobe = np.where(least_first, np.ceil(low), np.floor(high))
+            share = (lobe - first) / np.where(crossed & (rise != 0.0), rise, 1.0)
             between = depth[:-1] + share * np.diff(depth)
             found = np.minimum(found, np.where(crossed, between, np.inf).min(axis=1, initial=np.inf))
         return found

@@ -53,6 +53,16 @@ def test_lobes_of_turning_have_the_closed_form():
     np.testing.assert_allclose(lowest[0], limits.depth[at, 0], rtol=1e-6)
 
 
+@pytest.mark.parametrize("zeta", [1e-4, 1e-2])
+def test_lobes_between_and_far_beyond_modes(zeta):
+    """The first lobe has the least depth at speeds above ω₀; many waves in a turn leave the depth at any speed."""
+    G = 1.0 / (MASS * OMEGA**2 * (1.0 - (x := np.array([1.01, 1.1, 1.7, 5.0])) ** 2 + 2j * zeta * x))
+    limits = stability_limits(np.array([[-K_T]]), *Tip(ONE.K, ONE.D * zeta / ZETA, ONE.J).response())
+    phase = (3 * np.pi + 2 * np.angle(G)) % (2 * np.pi)
+    np.testing.assert_allclose(limits.lobes(1, 2 * np.pi * OMEGA * x / phase), -1 / (2 * K_T * G.real), rtol=1e-3)
+    np.testing.assert_allclose(limits.lobes(1, np.array([0.02, 0.005]) * zeta * OMEGA), limits.least, rtol=2e-3)
+
+
 def test_averaged_forces_are_those_of_many_angles():
     angles = (np.arange(20_000) + 0.5) / 20_000 * 2 * np.pi
     cuts = (angles >= HALF_DOWN.entry) & (angles <= HALF_DOWN.exit)
@@ -224,7 +234,9 @@ def test_a_feed_is_in_global_axes(tmp_path):
         ({"exit": "45*deg"}, r"cutter\.toml: expected 0 ≤ entry < exit ≤ π"),
         ({"teeth": 0}, "teeth"),
         ({"axis": [0.0, 0.0, 0.0]}, "an axis with a direction"),
-        ({"speeds": "fast"}, 'expected a list, or "FIRST:LAST:COUNT", found "fast"'),
+        ({"speeds": "fast"}, 'expected a list, or "FIRST:LAST:COUNT" of at most 1000, found "fast"'),
+        ({"speeds": "100:200:0"}, 'found "100:200:0"'),
+        ({"speeds": "100:200:9999999999999"}, 'found "100:200:9999999999999"'),
         ({"tangential": -1.0}, "tangential"),
     ],
 )
