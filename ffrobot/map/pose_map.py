@@ -226,6 +226,8 @@ def make_map(plan: MapPlan, batch: Batch, watcher: Watcher) -> PoseMap:
     parts = [numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART)]
     named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
     judged = _judged(of, postures, named, batch, watcher)
+    if not any(columns["stands"].any() for columns in judged.values()):
+        raise SolveError(f"{plan.scene}: no pose of the grid has a stable equilibrium")
     return _assembled(plan, solution, evaluator, postures, [(part, judged[name]) for name, part in named.items()])
 
 

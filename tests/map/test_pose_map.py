@@ -389,6 +389,20 @@ def test_a_slide_behind_a_spring_needs_a_force(tmp_path, scene):
     assert titles["milling_compliant"] == ("stable depth of cut, compliant gears (mm)", "unlimited")
 
 
+def test_a_map_of_poses_that_all_fall_says_so(tmp_path):
+    """An upright pendulum of weight m g l = 10 N·m/rad falls on a spring of 9, and stands on one of 11."""
+    for stiffness in (9.0, 11.0):
+        joint = f'type = "revolute"\nbetween = ["ground", "box.o"]\naxis = [0, 1, 0]\nstiffness = {stiffness}'
+        text = SLIDE.partition("[[joint]]")[0].replace("center = [0, 0, 0]", "center = [0, 0, 0.5]")
+        (tmp_path / "up.toml").write_text(f'{text}[[joint]]\nname = "lift"\nrotor_inertia = 1e-3\n{joint}\n')
+        if stiffness < 10.0:
+            with pytest.raises(SolveError, match="no pose of the grid has a stable equilibrium"):
+                mapped(tmp_path / "up.toml", tmp_path / "map", "lift=0.0")
+    found = mapped(tmp_path / "up.toml", tmp_path / "map", "lift=0.0")
+    hertz = np.sqrt((11.0 - 10.0) / (0.1 + 2.0 * 0.5**2)) / (2 * np.pi)
+    assert found.values["joints_compliant/frequency"][0, 0] == pytest.approx(hertz)
+
+
 def test_force_that_a_slide_without_motor_leaves(tmp_path):
     (tmp_path / "slide.toml").write_text(SLIDE)
     with pytest.raises(SolveError, match=r'20 N are left at joint "lift"'):
