@@ -28,6 +28,8 @@ from .least_squares import Parameters
 DEPTH, DEVIATION = "milling_depth", "milling_deviation"
 ROUND_OFF = 1e-9  # of correlations, below which an eigenvalue is 0
 
+INEXACT = 1e-3  # of correlations: round-off of a fit with keys that hardly differ, or few digits
+
 
 class Covariance(Record):
     """Errors of fitted parameters, relative to them."""
@@ -44,6 +46,9 @@ class Covariance(Record):
         sizes = {len(self.deviation), len(self.correlation), *map(len, self.correlation)}
         if sizes != {len(self.keys)}:
             raise ValueError(f"expected a deviation and a list of correlations for each of {len(self.keys)} keys")
+        R = np.array(self.correlation)
+        if np.abs(np.append(R - R.T, R.diagonal() - 1.0)).max() > INEXACT:
+            raise ValueError("correlation: expected a symmetric matrix with 1 on its diagonal, found another")
         return self
 
     @property

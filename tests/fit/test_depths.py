@@ -11,6 +11,7 @@ from rich.console import Console
 from rigid_chain import ARM, TOOL, frames, receptance, scene
 from scipy.spatial.transform import Rotation
 
+from ffrobot.batch.batch import batch_of
 from ffrobot.common.errors import InputError
 from ffrobot.fit.covariance import read_covariance, with_deviations
 from ffrobot.map.map_file import print_map, write_map
@@ -34,7 +35,8 @@ def mapped(tmp_path_factory):
     (folder / "cutter.toml").write_text(tomli_w.dumps(PROCESS))
     over = ("tilt_x=0", "tilt_y=0", "turn=-40*deg:40*deg:5")
     plan = plan_map(folder / "arm.toml", over, folder / "map", milling=read_milling(folder / "cutter.toml"))
-    return make_map(plan, 1, Watcher())
+    with batch_of(1) as batch:
+        return make_map(plan, batch, Watcher())
 
 
 def depth(pose, milling, chain=ARM, lines=8_000):
@@ -85,8 +87,15 @@ def test_deviation_of_the_depth_is_that_of_samples(mapped, tmp_path):
         depths.append(depth(pose, mapped.plan.milling, chain, 1_500))
     assert found[2] == pytest.approx(np.std(depths), rel=0.3)
     (tmp_path / "bad.toml").write_text(tomli_w.dumps(table | {"correlation": [[1.0, 2.0], [2.0, 1.0]]}))
-    for name, wrong in (("bad.toml", "without negative eigenvalues"), ("short.toml", "for each of 2 keys")):
-        (tmp_path / "short.toml").write_text(tomli_w.dumps(table | {"deviation": [0.1]}))
+    (tmp_path / "short.toml").write_text(tomli_w.dumps(table | {"deviation": [0.1]}))
+    (tmp_path / "half.toml").write_text(tomli_w.dumps(table | {"correlation": [[1.0, 0.6], [0.0, 1.0]]}))
+    (tmp_path / "covariance.toml").write_text(tomli_w.dumps(table | {"correlation": [[4.0, 0.6], [0.6, 9.0]]}))
+    for name, wrong in (
+        ("bad.toml", "without negative eigenvalues"),
+        ("short.toml", "for each of 2 keys"),
+        ("half.toml", "a symmetric matrix with 1 on its diagonal"),
+        ("covariance.toml", "a symmetric matrix with 1 on its diagonal"),
+    ):
         with pytest.raises(InputError, match=wrong):
             with_deviations(mapped, read_covariance(tmp_path / name))
 
@@ -104,9 +113,9 @@ def test_the_axis_of_a_tool_frame_is_in_its_own_axes(mapped, tmp_path):
     (tmp_path / "arm.toml").write_text(tomli_w.dumps(of_tool))
     (tmp_path / "cutter.toml").write_text(tomli_w.dumps(PROCESS | {"axis": [0.0, 0.0, 1.0]}))
     over, milling = ("tilt_x=0", "tilt_y=0", "turn=0:40*deg:2"), read_milling(tmp_path / "cutter.toml")
-    found = make_map(
-        plan_map(tmp_path / "arm.toml", over, tmp_path / "map", "body7.cutter", milling=milling), 1, Watcher()
-    )
+    plan = plan_map(tmp_path / "arm.toml", over, tmp_path / "map", "body7.cutter", milling=milling)
+    with batch_of(1) as batch:
+        found = make_map(plan, batch, Watcher())
     np.testing.assert_allclose(found.q, mapped.q[[2, 4]], atol=1e-7)
     for name in ("milling_best_depth", "milling_depth"):
         expected = mapped.values[f"joints_compliant/{name}"][[2, 4]]
