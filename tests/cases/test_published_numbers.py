@@ -192,7 +192,6 @@ def test_four_bar_with_a_tilted_hinge():
     with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
         names = ("points/coupler.tip/position", "joints/A/reaction", "trajectories/turn/force")
         place, force, (moment,) = (results[f"turned/{name}"][-1] for name in names)
-        assert results["turned/joints/A/moment"][-1] == pytest.approx(moment, rel=1e-9)
     for n, close in ((1, 1e-5), (4, 2e-3)):
         bars, h = TiltedFourBar(n), 5e-3
         _, at, on_root = bars.solved(START + TURN)

@@ -3,13 +3,11 @@
 #include "core/check_index.h"
 #include "core/linear/products.h"
 
-#include <cmath>
 #include <stdexcept>
 
 namespace ffrobot::recursion {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 template <class Space>
@@ -42,13 +40,6 @@ Motors<Space>::Motors(DrivenMechanism<Space> driven)
       cuts_.push_back(static_cast<int>(r));
   lambda_c_ = VectorXd::Zero(cuts_.size());
   columns_.resize(driven_.mechanism.n_v, lambda_c_.size() + tau_.size());
-  is_open_ =
-      !cuts_.empty() && !driven_.of_modes.empty() && columns_.cols() != static_cast<Index>(driven_.of_joints.size());
-  weights_.resize(driven_.of_modes.size());
-  Index mode = 0;
-  for (const auto &node : driven_.mechanism.nodes)
-    for (int k = 0; k < node.n(); ++k)
-      weights_[mode++] = 1 / std::sqrt(node.body.K[k]);
 }
 
 template <class Space> std::vector<bool> Motors<Space>::are_moments() const {
@@ -118,12 +109,12 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
   Q_ += beside_;
 }
 
-template <class Space> MatrixXd Motors<Space>::shares_of(const MatrixXd &dQ) const {
+template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::MatrixXd &dQ) const {
   const Index modes = driven_.of_modes.size();
-  MatrixXd found(modes + tau_.size(), dQ.cols());
+  Eigen::MatrixXd found(modes + tau_.size(), dQ.cols());
   found.topRows(modes) = dQ(driven_.of_modes, Eigen::all);
   if (!cuts_.empty()) {
-    const MatrixXd solved = in_loops(dQ);
+    const Eigen::MatrixXd solved = factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
     found.topRows(modes) -= matrix_product(columns_(driven_.of_modes, Eigen::all), solved);
     found.bottomRows(tau_.size()) = solved.bottomRows(tau_.size());
   } else
@@ -154,27 +145,10 @@ template <class Space> void Motors<Space>::close_loops(const double *q, const Tr
     const Motor &motor = driven_.motors[k];
     columns_(motor.coordinate, cuts + k) = motor.sign;
   }
-  const MatrixXd along_joints = columns_(driven_.of_joints, Eigen::all);
-  factors_.compute(along_joints);
-  if (is_open_) {
-    const MatrixXd on_modes = weights_.asDiagonal() * columns_(driven_.of_modes, Eigen::all);
-    const MatrixXd alone = on_modes - matrix_product(on_modes, factors_.solve(along_joints));
-    const double round_off = 1e-10 * on_modes.cwiseAbs().maxCoeff();
-    open_.compute((alone.array().abs() > round_off).select(alone, 0), true);
-  }
-  const VectorXd found = in_loops(Q_);
+  factors_.compute(columns_(driven_.of_joints, Eigen::all));
+  const VectorXd found = factors_.solve(VectorXd(Q_(driven_.of_joints)));
   lambda_c_ = found.head(cuts), tau_ = found.tail(tau_.size());
   Q_ -= columns_ * found;
-}
-
-template <class Space> MatrixXd Motors<Space>::in_loops(const MatrixXd &Q) const {
-  MatrixXd found = factors_.solve(Q(driven_.of_joints, Eigen::all).eval());
-  if (is_open_) {
-    MatrixXd left = Q(driven_.of_modes, Eigen::all);
-    left -= matrix_product(columns_(driven_.of_modes, Eigen::all), found);
-    found += open_.solve(MatrixXd(weights_.asDiagonal() * left));
-  }
-  return found;
 }
 
 template struct DrivenMechanism<Planar>;

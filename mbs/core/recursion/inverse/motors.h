@@ -33,8 +33,7 @@ template <class Space> struct DrivenMechanism {
 //     Q = -C_c^T lambda_c + T^T tau + (0, F_p)
 //
 // with constraint equations C_c of loops and motors' T: the equations along joints yield lambda_c and tau, those of
-// modes F_p. Where loops have more equations than they need, lambda_c and tau are those that leave the least strain
-// energy 1/2 F_p^T K^-1 F_p: so motors do what they can, as where a mechanism moves only because its links bend.
+// modes F_p. Where loops have more equations than they need, lambda_c is the smallest.
 template <class Space> class Motors final : public MotorForces<Space> {
 public:
   using TreeWorkspace = Workspace<Space, double>;
@@ -66,7 +65,6 @@ private:
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q); // of lambda_
   void split(const double *q, const TreeWorkspace &w);                                  // Q_
   void close_loops(const double *q, const TreeWorkspace &w);
-  Eigen::MatrixXd in_loops(const Eigen::MatrixXd &Q) const; // (cuts, then motors; …) of Q (n_v, …)
   void turn_frames(int coordinate, double moment, const TreeWorkspace &w);
 
   const DrivenMechanism<Space> driven_;
@@ -75,9 +73,6 @@ private:
   Eigen::VectorXd lambda_, tau_, Q_, beside_, lambda_c_;
   Eigen::MatrixXd columns_; // (n_v, cuts, then motors) -C_c^T, T^T
   LeastNorm factors_;       // of joint coordinates by cuts, then motors
-  bool is_open_ = false;    // whether these have more columns than joints determine
-  LeastNorm open_;          // of weighted modes by what acts on them alone
-  Eigen::VectorXd weights_; // (modes) 1 / angular frequency
 };
 
 extern template struct DrivenMechanism<Planar>;
