@@ -29,7 +29,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
 
     "auto" has tried Radau before: what it found, and steps by two methods to be replayed, go on as well.
     """
-    scene, after, end = arm(**{"tolerance = 1e-7": "tolerance = 1e-2", "end = 1.0": "end = 0.2"}), 0.15, 0.2
+    scene, after, end = arm(**{"tolerance = 1e-7": "tolerance = 1e-2", "end = 1.0": "end = 0.2"}), 0.1, 0.2
     expected = ffrobot.solve(scene)
     assert expected.attributes("inverse")["integrator"] == "dop853 after radau"
     message = stop(scene, stopped, after)
