@@ -130,7 +130,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def check_known(word: str, known: Collection[str], expected: str) -> None:
     """Raise `InputError` with the text `expected`, and the word as found, unless `word` is one of `known`."""
     if word not in known:
-        raise InputError(f"{expected}", f'"{shown(word)}"{did_you_mean(word, known)}')
+        raise InputError(expected, f'"{shown(word)}"{did_you_mean(word, known)}')
 
 
 def quoted(words: Iterable[str]) -> str:
