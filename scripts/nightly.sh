@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What a push leaves out: all seeds of random inputs, tests marked nightly or long, faults that tests have to catch,
+# What a push leaves out: all seeds of random inputs, tests of tests/nightly.txt and those marked nightly or long, faults,
 # the installation by pip.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

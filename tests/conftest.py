@@ -24,6 +24,7 @@ from ffrobot.mesh import form_cache
 
 pytest_plugins = ["costs"]
 MANY_SEEDS = 6
+NIGHTLY = Path(__file__).with_name("nightly.txt")
 TOGETHER = {"cases": ("tests/references/test_references", "tests/results/test_summary")}
 CASES = Path(__file__).parent.parent / "cases"
 STUDIES = ("sweep", "sensitivity", "uncertainty", "optimise")
@@ -86,7 +87,12 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of many seeds of a test every fifth, and none marked nightly, unless all are asked for (scripts/nightly.sh)."""
+    """Of many seeds of a test every fifth, and none of the night, unless all are asked for (scripts/nightly.sh).
+
+    Of the night are tests with that mark and those of nightly.txt.
+    """
+    of_night = {f"tests/{line.partition(' | ')[0]}" for line in NIGHTLY.read_text(encoding="utf-8").splitlines()[4:]}
+    config.unknown_nights = of_night - {item.nodeid for item in items} - {_function(item) for item in items}
     if config.getoption("--nightly"):
         return
     seeds = defaultdict(set)
@@ -94,6 +100,7 @@ def pytest_collection_modifyitems(config, items):
         seeds[_function(item)].add(_seed(item))
     many = {name for name, of_name in seeds.items() if len(of_name) >= MANY_SEEDS}
     left_out = [item for item in items if item.get_closest_marker("nightly")
+                or of_night & {item.nodeid, _function(item)}
                 or (_function(item) in many and (_seed(item) or 0) % 5)]  # fmt: skip
     if left_out:
         config.hook.pytest_deselected(items=left_out)

@@ -7,6 +7,7 @@ its end, `peak`, the most so far, and `grown`, by how much that is more than bef
 import ctypes
 import gc
 import resource
+from functools import cache
 
 import pytest
 from forked_commands import Commands
@@ -15,6 +16,7 @@ LIBC = ctypes.CDLL(None)
 MEMORY_MAP_THRESHOLD, LARGE = -3, 1 << 20
 if hasattr(LIBC, "mallopt"):  # the GNU C library: arrays of that many bytes go back to the system when they are deleted
     LIBC.mallopt(MEMORY_MAP_THRESHOLD, LARGE)
+MUCH = 100  # MB
 BEGAN = pytest.StashKey[tuple[float, float]]()
 
 
@@ -34,10 +36,8 @@ def pytest_runtest_teardown(item, nextitem):
     try:
         return (yield)
     finally:
-        if nextitem is None or nextitem.path != item.path:
-            gc.collect()
-            if hasattr(LIBC, "malloc_trim"):
-                LIBC.malloc_trim(0)
+        if nextitem is None or nextitem.path != item.path or memory() > least_memory() + MUCH:
+            give_back()
         began, before = item.stash.get(BEGAN, (processor_time(), peak()))
         item.user_properties += [
             ("seconds", f"{processor_time() - began:.2f}"),
@@ -45,6 +45,21 @@ def pytest_runtest_teardown(item, nextitem):
             ("peak", f"{peak():.0f}"),
             ("grown", f"{peak() - before:.0f}"),
         ]
+
+
+def give_back():
+    """Memory that nothing uses goes back to the system."""
+    gc.collect()
+    if hasattr(LIBC, "malloc_trim"):
+        LIBC.malloc_trim(0)
+    least_memory.cache_clear()
+    least_memory()
+
+
+@cache
+def least_memory():
+    """Megabytes that were left when memory was given back last."""
+    return memory()
 
 
 def processor_time():

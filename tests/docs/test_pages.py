@@ -19,8 +19,8 @@ from palette import SAME, WIDEST, difference, pictures, reduced  # noqa: E402
 
 # What their commands do has tests of its own: studies, solids, resumed runs, paths, tracking, controllers, pictures.
 LONG = {
-    "compare", "control", "design", "drive", "long_runs", "machine_paths", "measured", "modes", "motor_sizing", "solid",
-    "space", "speed", "stiffness", "sweep", "tracking", "tutorial_urdf", "view",
+    "compare", "control", "design", "drive", "hammer", "long_runs", "machine_paths", "measured", "modes",
+    "motor_sizing", "solid", "space", "speed", "stiffness", "sweep", "tracking", "tutorial_urdf", "vibration", "view",
 }  # fmt: skip
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 
