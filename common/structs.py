@@ -30,9 +30,12 @@ def kept(function: Callable[[T], R]) -> Callable[[T], R]:
     @wraps(function)
     def once(of: T) -> R:
         known = vars(of)
-        if name not in known:
-            known[name] = function(of)
-        result: R = known[name]
+        if name in known:
+            result: R = known[name]
+            return result
+        result = function(of)
+        if result is not of:  # which would not be deleted until cycles are searched for
+            known[name] = result
         return result
 
     return once

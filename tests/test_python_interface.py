@@ -1,5 +1,6 @@
 """`import ffrobot`: what the command line does, in a few lines of Python."""
 
+import gc
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from beam_links import beam_link, tube
 
 import ffrobot
 from ffrobot.cli import cli
+from ffrobot.mbs.run.record import Run
 from ffrobot.present import console
 from ffrobot.run.watcher import Watcher
 
@@ -55,6 +57,19 @@ def test_scene_made_in_python_is_the_scene_of_a_file(folder, results):
     assert results.columns("inverse").keys() >= KEYS
     for name, values in from_file.columns("inverse").items():
         np.testing.assert_array_equal(values, results.columns("inverse")[name])
+
+
+def test_nothing_of_a_run_stays_beside_its_results(folder):
+    """States between outputs are many: they go at once, not when Python searches for cycles of objects."""
+    gc.collect()
+    gc.disable()
+    try:
+        before = {id(one) for one in gc.get_objects() if isinstance(one, Run)}
+        results = ffrobot.solve(swing(folder))
+        assert not [one for one in gc.get_objects() if isinstance(one, Run) and id(one) not in before]
+    finally:
+        gc.enable()
+    assert len(results.time("inverse")) == 21
 
 
 def test_several_solves_at_once(folder):
