@@ -48,7 +48,7 @@ UNSUPPORTED = (
         "kinematic loops with a motor without `rotor_inertia`, or a compliant gear, in each joint (rotors,"
         " trajectories, friction, loads and limits of positions may be in all)",
         "a rotor in front of a rigid gear in one of them, or no motor there: ffrobot cuts the loop there",
-        "ffrobot.mbs.model.model",
+        "ffrobot.mbs.model.build",
     ),
     (
         "sensors and controllers on spherical and free joints, which have no coordinates, and on all joints of a"

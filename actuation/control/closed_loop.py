@@ -20,8 +20,7 @@ from ...mbs.model.amplifiers import joined
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
-from ...mbs.model.model import Model, without_paths
-from ...mbs.posture.posture import robot_size
+from ...mbs.model.model import Model
 from ...mbs.quantities.settling import commanded_rest
 from ...mbs.run.context import place_of
 from ...mbs.run.drive import Control, drive_robot
@@ -82,7 +81,7 @@ class ClosedLoop(SampledAnalysis):
         """
         assert self.actuation is not None
         source = context.outcomes[self.actuation]
-        plant = with_compliance(without_paths(context.model))
+        plant = with_compliance(context.model.without_paths())
         moved, robot, whole = with_motor_coordinates(source, plant), whole_robot(context, source), context.whole
         read, estimated = self._signals(context, plant, robot)
         sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
@@ -325,7 +324,7 @@ def _followed(
     error = _position(model, run.q, tip) - place_at(run.time)
     completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
     motion = run.time, error, place_at, rates, held(run.time)
-    return LoopMotion(*motion, completed, is_disturbed, quiet, robot_size(model))
+    return LoopMotion(*motion, completed, is_disturbed, quiet, model.size)
 
 
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:

@@ -13,7 +13,7 @@ from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, f
 from ...mbs.fields.field_types import PointReference, Reference, under
 from ...mbs.linear.joint_conditions import JointCondition, RobotModes, joint_conditions
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism
-from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.model import Model
 from ...mbs.run.record import Details, Run
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
@@ -141,7 +141,7 @@ def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, 
     """Return, by "pzt/LAYOUT/k", the generalized force (f,) along s per volt, on modes of the link or its pieces."""
     found: dict[str, Array] = {}
     for of_link in patches.values():
-        along_s = modal_directions(model, of_link.per_volt) @ mechanism.transformation
+        along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation
         for layout in of_link.arrays:
             found |= {f"pzt/{layout}/{k}": row for k, row in enumerate(along_s[of_link.columns(layout)], 1)}
     return found

@@ -15,12 +15,13 @@ from ...common.errors import InputError, SolveError, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
 from ...mbs.model.body import Body
+from ...mbs.model.build import build_model
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
 from ...mbs.model.kinematics import ZERO
-from ...mbs.model.model import Model, build_model, constraint_values, without_paths
+from ...mbs.model.model import MET, Model
 from ...mbs.model.nodes import rows_of_joint
 from ...mbs.model.system import MultibodySystem
-from ...mbs.posture.posture import MET, mobility, posture_search
+from ...mbs.posture.posture import mobility
 from ...mbs.posture.start import undeformed_posture
 from ...mbs.run.gears import with_motor_coordinates
 from ...mbs.run.record import Run
@@ -63,7 +64,7 @@ class RigidArm:
         ]
         self._model = replace(free, rows=(*free.rows, *motors))
         self._motors = np.arange(len(free.rows), len(free.rows) + len(motors))
-        self._search = posture_search(self._model)
+        self._search = self._model.posture_search
         self._system = MultibodySystem(self._model)
         self._q: Array = np.zeros(free.tree.n_q)
         for own, node in zip(free.tree.nodes, model.tree.nodes, strict=True):
@@ -71,7 +72,7 @@ class RigidArm:
 
     def angles(self) -> Array:
         """Return current motor coordinates (motors,), rad or m."""
-        return constraint_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
+        return self._model.constraint_values(self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Coordinates q (n_q,) and C_v at motor angles gamma, from the last place.
@@ -88,7 +89,7 @@ class RigidArm:
                 " or a loop that stays nearer to it",
             )
         self._q = q[0]
-        return self._q, constraint_values(self._model, q, now)[1][0]
+        return self._q, self._model.constraint_values(q, now)[1][0]
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
         """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""
@@ -224,8 +225,8 @@ class ControlledRobot:
 def whole_robot(context: ActuatedContext, source: Run) -> ControlledRobot:
     """Return the robot of an analysis about the motion `source`, with whole links also where the plant has pieces."""
     if context.whole is None:
-        return ControlledRobot(without_paths(context.model), context.patches, source)
-    return ControlledRobot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
+        return ControlledRobot(context.model.without_paths(), context.patches, source)
+    return ControlledRobot(context.whole.model.without_paths(), context.patches, context.whole.as_links(source))
 
 
 def input_names(robot: ControlledRobot) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearMechanism, labelled
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.known_motion import KnownStates, motion_forces
-from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.model import Model
 from ...mbs.model.nodes import Section
 from ...mbs.model.system import MultibodySystem
 from ...mbs.model.tree import KinematicTree
@@ -156,7 +156,7 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
     elif sensor.pzt is not None:
         body = next(body for body, of_link in context.patches.items() if sensor.pzt in of_link.arrays)
         volts = volts_on_file(context.patches[body], sensor.pzt, sensor.capacitance)
-        for k, along in enumerate(modal_directions(model, {name: of.T for name, of in volts.items()}), 1):
+        for k, along in enumerate(model.modal_directions({name: of.T for name, of in volts.items()}), 1):
             yield Signal(f"pzt/{sensor.pzt}/{k}", sensor, along=along)
     elif sensor.modal is not None:
         for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):

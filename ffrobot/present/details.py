@@ -19,7 +19,6 @@ from ..mbs.inversion.motors_only import AroundPath, describe_zeros, is_minimum_p
 from ..mbs.inversion.zero_dynamics import is_unstable
 from ..mbs.linear.joint_conditions import translational_stiffness
 from ..mbs.model.body import Body
-from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
 from ..mbs.run.record import Details, Run
 from ..results.file import Results
@@ -98,7 +97,7 @@ def _inversion(run: Run, around: AroundPath) -> str:
     inversion = around.inversion
     assert inversion is not None
     linear, factor = inversion.linearisation, inversion.servo.factor
-    error = max(float(np.abs(off).max(initial=0.0)) for off in path_errors(around.held, run.time, run.q).values())
+    error = max(float(np.abs(off).max(initial=0.0)) for off in around.held.path_errors(run.time, run.q).values())
     left = f"largest error of the path {error:.2g}"
     if is_minimum_phase(linear):
         output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"

@@ -12,7 +12,6 @@ import numpy as np
 from ..common.arrays import Array, Indices
 from ..common.hdf5 import fields_in
 from ..common.meanings import write_record
-from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.motion import body_motion, joint_motion, plane_angle, point_motion, reported_points
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
@@ -111,7 +110,7 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
     """Write trajectories/ of an analysis: prescribed or followed paths, constant before and after their duration."""
     run, details = result.run, result.run.details
     inside = np.clip(run.time, 0.0, run.analysis.last_time)
-    errors = {} if details.held is None else path_errors(details.held, run.time, run.q)
+    errors = {} if details.held is None else details.held.path_errors(run.time, run.q)
     for trajectory in run.model.scene.trajectory if errors else followed_trajectories(run):
         entry = group.create_group(f"trajectories/{trajectory.name}")
         if errors:

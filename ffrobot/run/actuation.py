@@ -16,7 +16,7 @@ from ..common.structs import struct
 from ..mbs._core import TimeFunction
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.drives import Drive
-from ..mbs.model.model import Model, modal_directions
+from ..mbs.model.model import Model
 from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis
@@ -90,7 +90,7 @@ def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches
     for number, load in enumerate(scene.load, 1):
         if load.pzt is not None:
             of_link = patches[bodies[load.pzt]]
-            directions = modal_directions(model, of_link.per_volt)[of_link.columns(load.pzt)]
+            directions = model.modal_directions(of_link.per_volt)[of_link.columns(load.pzt)]
             voltage, amplifiers = load.voltage or (), of_link.arrays[load.pzt].amplifiers
             if amplifiers.hysteresis.acts:
                 times, wanted = _straight(f"{scene.path}: load no. {number}: voltage", scene.analysis, voltage)

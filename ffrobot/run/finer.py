@@ -19,7 +19,7 @@ from ..mbs.analysis.operating_points import locked_motors, open_loop_growth
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.drives import Drives, Replayed
 from ..mbs.model.known_motion import State
-from ..mbs.model.model import Model, without_paths
+from ..mbs.model.model import Model
 from ..mbs.posture.redundancy import resolved
 from ..mbs.posture.start import undeformed_posture
 from ..mbs.quantities.motion import section_motion
@@ -142,7 +142,7 @@ def _replayed(source: Run, finer: Model, drives: Drives, watcher: Watcher) -> Ru
         return watcher.advance(t, end)
 
     times = replay_times(source, analysis)[: len(source.time)]
-    return drive_robot(without_paths(finer), analysis, _start(source, finer), progress, drives=drives, times=times)
+    return drive_robot(finer.without_paths(), analysis, _start(source, finer), progress, drives=drives, times=times)
 
 
 def _start(source: Run, finer: Model) -> State:
@@ -154,7 +154,7 @@ def _start(source: Run, finer: Model) -> State:
     if follows:
         model = resolved(finer, source.analysis.last_time)
     else:
-        alone = without_paths(finer)
+        alone = finer.without_paths()
         model = replace(alone, rows=(*alone.rows, *locked_motors(alone, _as_in(source, alone))))
     start = undeformed_posture(model)
     is_bent = any(source.q[0, node.p_q].any() for node in source.model.tree.nodes)

@@ -10,7 +10,8 @@ from ..actuation.points import PointSet, with_points
 from ..common.errors import InputError
 from ..mbs.linear.vibration import with_robot_damping
 from ..mbs.model.body import Body
-from ..mbs.model.model import Model, build_model
+from ..mbs.model.build import build_model
+from ..mbs.model.model import Model
 from ..mbs.posture.branches import chosen_start
 from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene

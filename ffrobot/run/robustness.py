@@ -24,9 +24,10 @@ from ..mbs.joints.moving_joint import GearedJoint
 from ..mbs.joints.twist_spring import stiffer
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
+from ..mbs.model.build import build_model
 from ..mbs.model.gears import elastic_joints, with_compliance
 from ..mbs.model.known_motion import State, mass_matrices
-from ..mbs.model.model import Model, build_model, without_paths
+from ..mbs.model.model import Model
 from ..mbs.run.context import place_of
 from ..mbs.run.gears import with_motor_coordinates
 from ..mbs.run.record import Run
@@ -140,7 +141,7 @@ class _Runs:
     def _controller(self) -> dict[str, Any]:
         """Critically damped with rigid links and gears; slow enough for its samples where they give way to motors."""
         model, T = self.context.model, self.asked.sample_time
-        arm = ControlledRobot(without_paths(model), self.context.patches, self.source).rigid()
+        arm = ControlledRobot(model.without_paths(), self.context.patches, self.source).rigid()
         angles = arm.angles()
         rigid = np.diag(np.linalg.inv(arm.terms(angles, np.zeros_like(angles))[0]))
         mobility = model.by_motor(rigid)
@@ -184,7 +185,7 @@ class _Runs:
 
     def _geared(self, model: Model) -> tuple[Model, State]:
         """The robot alone with its compliant gears, and in its coordinates where the source begins."""
-        alone = with_compliance(without_paths(model))
+        alone = with_compliance(model.without_paths())
         moved = with_motor_coordinates(self.source, alone)
         return alone, State(moved.q[0], moved.v[0])
 

@@ -15,7 +15,6 @@ from ..mbs.fields.paths import Piecewise
 from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, free_coordinates
 from ..mbs.linear.linearisation import LinearEquations
 from ..mbs.model.gears import with_compliance
-from ..mbs.model.model import without_paths
 from ..mbs.quantities.motion import joint_motion, section_motion
 from ..mbs.quantities.settling import Settling, commanded_rest, settling
 from ..mbs.quantities.supply import gear_motions, motor_moments
@@ -101,7 +100,7 @@ class Robot:
         self._prepared = prepare_scene(self._scene, watcher)
         self.point = point or default_point(scene)
         check_point(self._prepared, self.point)
-        self._gears = with_compliance(without_paths(self._prepared.model))
+        self._gears = with_compliance(self._prepared.model.without_paths())
         self.has_gears, self._still = bool(self._gears.tree.gears), np.zeros(self._gears.tree.n_v)
         self.bends = any(node.p_v.stop > node.p_v.start for node in self._gears.tree.nodes)
         self._frequency: float | None = None

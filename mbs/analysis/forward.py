@@ -19,7 +19,7 @@ from ..model.amplifiers import joined
 from ..model.drives import Command, Drives, Replayed
 from ..model.gears import with_compliance
 from ..model.known_motion import State
-from ..model.model import Model, modal_directions, without_paths
+from ..model.model import Model
 from ..model.motors import motor_commands
 from ..posture.posture import mobility
 from ..posture.start import displaced_joints
@@ -71,7 +71,7 @@ class Forward(ActuatedAnalysis):
         Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no
         equilibrium to start from.
         """
-        model, progress = with_compliance(without_paths(context.model)), context.progress
+        model, progress = with_compliance(context.model.without_paths()), context.progress
         if self.actuation is None:
             start = initial_state(model)
             texts = (*displaced_joints(model), *hanging_joints(model, start))
@@ -140,7 +140,7 @@ def _replayed(context: Context, model: Model, source: Run, analysis: Forward) ->
 
 def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
     """Return the effect of a unit command of motors, on sections or frames, and of patches, on link modes."""
-    of_volts = (row for of_link in patches.values() for row in modal_directions(model, of_link.per_volt))
+    of_volts = (row for of_link in patches.values() for row in model.modal_directions(of_link.per_volt))
     return (*motor_commands(model), *map(Command, of_volts))
 
 
@@ -188,7 +188,7 @@ def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
 
 def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
     """Return (k, n_v), the current Φ_Vᵀ ṗ of all patches by v, A."""
-    rows = [modal_directions(model, of_link.per_volt) for of_link in patches.values()]
+    rows = [model.modal_directions(of_link.per_volt) for of_link in patches.values()]
     return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
 
 

@@ -20,7 +20,7 @@ from ..linear.joint_conditions import JointCondition, joint_conditions, robot_mo
 from ..linear.linearisation import LinearEquations, LinearMechanism
 from ..linear.statics import Statics
 from ..model.gears import with_compliance, with_prescribed_motors
-from ..model.model import Model, without_paths
+from ..model.model import Model
 from ..model.nodes import ConstraintRow, rows_of_joint
 from ..posture.redundancy import resolved
 from ..posture.start import undeformed_posture
@@ -124,7 +124,7 @@ def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[
 
 def linear_states(model: Model, source: Run, rows: Sequence[int]) -> OperatingPoints:
     """States at outputs `rows` of an earlier motion, for a robot without trajectories and with compliant gears."""
-    model = with_compliance(without_paths(model))
+    model = with_compliance(model.without_paths())
     q, v, a = with_motor_coordinates(source, model)[:3]
     at = list(rows)
     return OperatingPoints(model, source.time[at], q[at], v[at], a[at])

@@ -26,8 +26,7 @@ from ..fields.field_types import NotNegative
 from ..fields.functions import check_domain
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
-from ..model.model import Model, path_errors, without_paths
-from ..posture.posture import robot_size
+from ..model.model import Model
 from ..run.context import Context
 from ..run.integrators import Choice
 from ..run.record import ADVICE, Details, Prescription, Run, Statistics
@@ -245,7 +244,7 @@ def outcome_along(
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
     return Run(
         analysis=analysis,
-        model=without_paths(model),
+        model=model.without_paths(),
         time=times,
         q=states.q,
         v=states.v,
@@ -262,11 +261,11 @@ def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
     if run.failed or inversion.servo.factor == 1:
         return ()
     held = inversion.servo.model
-    errors = {name: float(np.abs(off).max(initial=0.0)) for name, off in path_errors(held, run.time, run.q).items()}
+    errors = {name: float(np.abs(off).max(initial=0.0)) for name, off in held.path_errors(run.time, run.q).items()}
     farthest = max(held.scene.trajectory, key=lambda path: errors[path.name])
     joint = next((one for one in held.scene.joint if one.name == farthest.joint), None)
     turns = farthest.angle is not None if joint is None else joint.units == ("rad",)
-    if errors[farthest.name] <= PATH_TOLERANCE * (1.0 if turns else robot_size(held)):
+    if errors[farthest.name] <= PATH_TOLERANCE * (1.0 if turns else held.size):
         return ()
     unit, scale = ("m or rad", 1) if farthest.orientation is not None else ("rad", 1) if turns else ("mm", 1e3)
     return (

@@ -19,7 +19,7 @@ from ..linear.statics import modal_sizes
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.nodes import ConstraintRow
-from ..posture.posture import check_smooth, describe_posture, mobility, solve_posture, worst_posture
+from ..posture.posture import check_smooth, describe_posture, mobility, worst_posture
 from ..posture.prescribed import PrescribedMotion, following_motors, left_slopes
 from ..posture.reach import out_of_reach
 from ..posture.start import undeformed_posture
@@ -202,7 +202,7 @@ def make_servo(
     rest = np.zeros_like(modes)
     near: Array = replace(servo, factor=1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q
     for k in np.flatnonzero(~np.isfinite(near).all(axis=1)):  # where rates have no limits, as in singular postures
-        q = solve_posture(held, float(times[k]), near[k - 1] if k else start)
+        q = held.posture(float(times[k]), near[k - 1] if k else start)
         if q is None:
             far = out_of_reach(held, times)
             raise InputError(

@@ -29,7 +29,6 @@ from ..model.motors import FrameShare, frame_share, turning_motors
 from ..model.nodes import Node
 from ..model.system import MultibodySystem
 from ..model.tree import CompliantGear
-from ..posture.posture import natural_gradients, natural_sizes, row_sizes
 from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
@@ -141,8 +140,8 @@ class LinearEquations:
         H = np.zeros((n_v, len(s)))
         H[s, np.arange(len(s))] = 1.0
         others = np.setdiff1d(np.arange(n_v), s)
-        rows, sizes = row_sizes(self.model), natural_sizes(self.model)
-        (C_v,) = natural_gradients(self.model, state.q, np.array([t]), sizes)
+        rows, sizes = self.model.row_sizes, self.model.natural_sizes
+        (C_v,) = self.model.natural_gradients(state.q, np.array([t]), sizes)
         if not len(others):
             return H, np.zeros((0, len(C_v)))
         values = np.linalg.svd(C_v[:, others], compute_uv=False)
@@ -248,7 +247,7 @@ def _independent(model: Model, q: Array) -> Indices:
     modes = np.flatnonzero(~model.tree.joint_columns)
     motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
-    (left,) = natural_gradients(model, q[None], np.zeros(1), natural_sizes(model))
+    (left,) = model.natural_gradients(q[None], np.zeros(1), model.natural_sizes)
     size, free = np.abs(left).max(initial=0.0), []
     for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
         rank, order = 0, np.arange(len(group))

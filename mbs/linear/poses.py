@@ -10,7 +10,7 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..model.gears import with_compliance
 from ..model.known_motion import State
-from ..model.model import Model, without_paths
+from ..model.model import Model
 from ..model.nodes import Section
 from ..posture.start import relaxed_gears
 from ..scene.space import SPACES
@@ -58,7 +58,7 @@ class PoseEvaluator:
         `others`: further points of `linear_equations`. `judge` makes further findings of each condition.
         """
         self._judge = judge
-        self.model = with_compliance(without_paths(model))
+        self.model = with_compliance(model.without_paths())
         self.space, self.point, self._count, self._omega = SPACES[model.scene.space], point, count, omega
         self._linear, self._statics = LinearEquations(self.model, self._all(q), [point, *others]), Statics(self.model)
         shafts = [name for name in self._linear.names if name.startswith("motor/")]

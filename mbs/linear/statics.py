@@ -24,7 +24,7 @@ from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.posture import joint_scales, natural_sizes, robot_size, row_sizes, with_rates
+from ..posture.posture import with_rates
 from ..posture.start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
@@ -63,7 +63,7 @@ def hanging_joints(model: Model, start: State) -> Iterator[str]:
     """
     if model.scene.initial.state != "static":
         return
-    away, scales, moved = np.abs(start.q - undeformed_posture(model).q), joint_scales(model), []
+    away, scales, moved = np.abs(start.q - undeformed_posture(model).q), model.joint_sizes, []
     for node in model.tree.nodes:
         sizes = np.append(scales[node.v], np.ones(node.joint.q_count - node.joint.freedoms))
         if (away[node.q] / sizes).max(initial=0.0) > AWAY:
@@ -133,7 +133,7 @@ class Statics:
 
     def __init__(self, model: Model, t: float = 0.0) -> None:
         self.model, self.t, self.system = model, t, MultibodySystem(model)
-        self.sizes, self.row_sizes, self.length = natural_sizes(model), row_sizes(model), robot_size(model)
+        self.sizes, self.row_sizes, self.length = model.natural_sizes, model.row_sizes, model.size
 
     def equilibrium(self, q: Array, locked: Indices | None = None) -> Array:
         """The equilibrium (n_q,) that Newton's method reaches from q (n_q,), with the coordinates v[`locked`] kept.

@@ -16,9 +16,8 @@ from ...common.structs import struct
 from ..model.body import Body
 from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
-from ..model.model import Model, without_paths
+from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.posture import natural_gradients, natural_sizes, solve_posture
 from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
@@ -49,10 +48,10 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     M⁻¹ is what the core says that forces do to accelerations where `unconstrained`. K are the stiffnesses of links and
     gears, D their damping and viscous friction; neither gravity nor dry friction.
     """
-    still, sizes = np.zeros(model.tree.n_v), natural_sizes(model)
+    still, sizes = np.zeros(model.tree.n_v), model.natural_sizes
     both = np.outer(sizes, sizes)
     M = np.linalg.inv(unconstrained.derivatives(t, q, still, still).a_f / both)
-    (C_v,), (K, D) = natural_gradients(model, q[None], np.array([t]), sizes), _springs(model, q)
+    (C_v,), (K, D) = model.natural_gradients(q[None], np.array([t]), sizes), _springs(model, q)
     squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
     omega, shape = np.sqrt(squares), sizes[:, None] * shape
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
@@ -112,7 +111,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     unconstrained = without_rows(model)
     state, spectra = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
-        q = solve_posture(model, float(t), state.q)
+        q = model.posture(float(t), state.q)
         if q is None:
             raise InputError(
                 f"{model.scene.path}: trajectory: expected paths within reach",
@@ -146,7 +145,7 @@ def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
     if not ratios:
         return model
     start, tree = undeformed_posture(model), model.tree
-    modes = vibrations_of(without_paths(model), without_rows(model), 0.0, start.q)
+    modes = vibrations_of(model.without_paths(), without_rows(model), 0.0, start.q)
     wanted = unit_damping(modes.frequency, modes.shape[~tree.joint_columns])
     bodies = _damped([node.body for node in tree.nodes], wanted, ratios)
     return replace(model, tree=tree.with_bodies(bodies))

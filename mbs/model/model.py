@@ -1,38 +1,25 @@
-"""From a scene and its bodies to a tree, and to the rows of constraints that close loops or follow paths.
-
-Coordinates of revolute joints between frames of bodies, not sections, for `motors = "frame"`.
-
-They are coordinates of a joint where modes turn its sections about its axis alone. Where they tilt the axis there are
-none: a moment between frames has virtual work there, but no angle that goes with it.
-"""
+"""A robot as analyses share it: tree and constraint rows, their values and natural sizes, postures that meet them."""
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ...common.arrays import Array, Booleans
-from ...common.errors import InputError, did_you_mean, quoted
-from ...common.rotations import smallest_turn
 from ...common.structs import struct
-from .._core import TimeFunction
-from ..fields.field_types import GROUND
-from ..joints.free import FreeJoint
-from ..joints.joint import JointRecord
-from ..joints.planar_joint import PlanarJoint
+from .. import _core
 from ..scene.mechanism import MechanismScene
-from ..scene.topology import Edge, spanning_forest
-from ..scene.trajectories import Trajectory
-from .body import Body
 from .drives import Drive
-from .kinematics import Kinematics
-from .masses import welded_payloads
-from .nodes import ConstraintRow, Node, Section, coordinate_row
-from .tree import AlongCut, CutCoordinate, KinematicTree, cut_coordinates, cut_row, with_auxiliary_rotors
+from .kinematics import Kinematics, PostureSearch
+from .nodes import ConstraintRow, Node
+from .tree import AlongCut, CutCoordinate, KinematicTree
+
+TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
+MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
+LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
 
 
 @struct
@@ -117,200 +104,132 @@ class Model:
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
+    def without_paths(self) -> Model:
+        """The robot alone: joints hold, nothing is followed."""
+        return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
-def without_paths(model: Model) -> Model:
-    """The robot alone: joints hold, nothing is followed."""
-    return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))
+    def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
+        """Along v of the tree (k, n_v): k forces (n, k) on the modes of the files of bodies, as far as these are in it.
 
+        Gradients of what depends on modal coordinates are alike.
+        """
+        (count,) = {forces.shape[1] for forces in on_modes.values()}
+        directions = np.zeros((count, self.tree.n_v))
+        for node in self.tree.nodes:
+            if node.body.name in on_modes:
+                directions[:, node.p_v] = on_modes[node.body.name].T @ node.body.modal_transform
+        return directions
 
-def modal_directions(model: Model, on_modes: Mapping[str, Array]) -> Array:
-    """Along v of the tree (k, n_v): k forces (n, k) on the modes of the files of bodies, as far as these are in it.
+    @cached_property
+    def size(self) -> float:
+        """A length (m) of the robot: the largest distance of two named points of a body, or 1 m without any."""
+        sizes = [
+            float(np.linalg.norm(at.position - other.position))
+            for node in self.tree.nodes
+            for at in node.body.points.values()
+            for other in node.body.points.values()
+        ]
+        return max(sizes, default=0.0) or 1.0
 
-    Gradients of what depends on modal coordinates are alike.
-    """
-    (count,) = {forces.shape[1] for forces in on_modes.values()}
-    directions = np.zeros((count, model.tree.n_v))
-    for node in model.tree.nodes:
-        if node.body.name in on_modes:
-            directions[:, node.p_v] = on_modes[node.body.name].T @ node.body.modal_transform
-    return directions
+    @cached_property
+    def row_sizes(self) -> Array:
+        """Natural sizes (rows,) of C: 1 rad, or the robot's size, m."""
+        return np.array([self.size if self.measures_way(row) else 1.0 for row in self.rows])
+
+    @cached_property
+    def joint_sizes(self) -> Array:
+        """Natural sizes (n_v,) of joint coordinates: 1 rad or the robot's size, m; 0 for modes, which stay."""
+        all_sizes = np.zeros(self.tree.n_v)
+        for node in self.tree.nodes:
+            units = node.joint.units or node.joint.guess_units
+            sizes = np.array([1.0 if unit == "rad" else self.size for unit in units])
+            all_sizes[node.v] = node.joint.state(sizes) if node.joint.units else sizes
+        return all_sizes
+
+    @cached_property
+    def natural_sizes(self) -> Array:
+        """Natural sizes (n_v,): 1 rad or the robot's size for joints, √J for modes."""
+        sizes = self.joint_sizes.copy()
+        for node in self.tree.nodes:
+            sizes[node.p_v] = np.sqrt(node.body.largest_moment)
+        return sizes
+
+    def constraint_values(self, q: Array, times: Array) -> tuple[Array, Array]:
+        """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
+        if not self.rows:
+            return np.zeros((len(q), 0)), np.zeros((len(q), 0, self.tree.n_v))
+        return self.constraints.constraints(q, times)
+
+    def constraint_rates(self, q: Array, v: Array, times: Array) -> Array:
+        """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
+        return self.constraints.constraint_rates(q, v, times) if self.rows else np.zeros((len(q), 0))
+
+    def natural_gradients(self, q: Array, times: Array, sizes: Array) -> Array:
+        """Return C_v (T, rows, n_v) at q (T, n_q) and `times` (T,), rows in natural sizes and coordinates in `sizes`.
+
+        Its rank does not depend on units.
+        """
+        return self.constraint_values(q, times)[1] * sizes / self.row_sizes[:, None]
+
+    def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
+        """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
+
+        Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
+        """
+        owners, senses = self.senses
+        if not owners:
+            return {}
+        against = senses.constraints(q, times)[0] < 0.0
+        return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
+
+    def path_errors(self, times: Array, q: Array) -> dict[str, Array]:
+        """Return path errors (T, m), m or rad, by trajectory, at `times` (T,), s, and q (T, n_q)."""
+        C, owners = self.constraint_values(q, times)[0], [row.owner if row.is_trajectory else "" for row in self.rows]
+        return {path.name: C[:, [owner == path.name for owner in owners]] for path in self.scene.trajectory}
+
+    @property
+    def posture_search(self) -> PostureSearch:
+        """A search by joint coordinates; modal coordinates stay constant."""
+        # Coordinates by themselves have no branches
+        farthest = np.inf if all(row.kind == "coordinate" for row in self.rows) else LARGEST_TURN
+        return PostureSearch(self.joint_sizes, self.row_sizes, farthest)
+
+    def posture(self, t: float, q: Array, locked: Booleans | None = None) -> Array | None:
+        """Move q (n_q,) onto C(q, t) = 0 by least steps of joints not `locked` (n_v,); None without convergence."""
+        solved, is_met = self.postures(np.array([t]), q[None], locked)
+        return solved[0] if is_met[0] else None
+
+    def postures(self, times: Array, q: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
+        """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s, as `posture`; with flags (T,) of convergence.
+
+        Where C = 0 with a joint or a tool turned over it did not.
+        """
+        if not self.rows:
+            return np.array(q), np.ones(len(q), dtype=bool)
+        search = self.posture_search
+        if locked is not None:
+            search = search._replace(scales=np.where(locked, 0.0, search.scales))
+        moved, left = self.constraints.postures(q, times, search)
+        is_met = left <= MET
+        for is_turned_over in self.turned_over(moved, times).values():
+            is_met &= ~is_turned_over
+        return moved, is_met
+
+    def mobilities(self, times: Array, q: Array, loop_rank: int = -1) -> list[_core.Mobility]:
+        """Return the mobility with rigid links and gears at `times` (T,), s, and q (T, n_q).
+
+        Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
+        `loop_rank` is their rank with straight ones.
+        """
+        is_path = [row.is_trajectory for row in self.rows]
+        return self.constraints.mobilities(q, times, is_path, self.size, loop_rank)
+
+    def row_ratios(self, times: Array, q: Array, rank: int) -> Array:
+        """Return smallest over largest nonzero singular value (T,) of all rows, by their `rank`, as in `mobilities`."""
+        motions = self.constraints.mobilities(q, times, [False] * len(self.rows), self.size, rank)
+        return np.array([at.loop_ratio for at in motions])
 
 
 def _in_order(node: Node) -> Array:
     ordered = node.joint.coordinates(np.arange(node.v.start, node.v.stop))[: len(node.joint.units)]
     return ordered[::-1] if node.backwards and node.joint.type == "universal" else ordered
-
-
-def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
-    """Lay out tree and constraint rows of a scene. Raises `InputError` for missing points or inconsistent rows."""
-    _check_points(scene, {body.name: body for body in bodies})
-    carried = list(welded_payloads(scene))
-    joints = (*scene.joint, *(weld for _, weld in carried))
-    names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
-    topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
-    floating = PlanarJoint if scene.is_planar else FreeJoint
-    tree = KinematicTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
-    _check_cut_joints(scene, tree)
-    tree = with_coordinates_of_frames(tree) if scene.motors == "frame" else tree
-    tree, rows = with_auxiliary_rotors(tree)
-    rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
-    rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
-    return Model(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
-
-
-def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
-    """Raise `InputError` for a motor without a rotor, or a compliant gear, in the joint at which a loop is cut."""
-    for joint in tree.loops:
-        if key := joint.asks_for_coordinate:
-            raise InputError(
-                f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
-                " rotor_inertia nor a compliant gear, to be cut",
-                f"{quoted(key)} here and one of them in each of the others. Such loops are not available in 3D",
-            )
-
-
-def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
-    if joint.loop_equations is None:
-        raise InputError(
-            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes",
-            f"a {joint.type} joint: list it before the other joints of its loop",
-        )
-    first, second = joint.triads()
-    a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
-    unit = np.eye(3)
-    for equation in joint.loop_equations:
-        if equation.kind == "point":
-            yield from (ConstraintRow(joint.name, "point", a, b, e, e, is_trajectory=False) for e in unit)
-        else:
-            yield ConstraintRow(
-                joint.name, equation.kind, a, b, unit[equation.f], unit[equation.g], is_trajectory=False
-            )
-
-
-def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:
-    unit, ground = np.eye(3), tree.section(GROUND)
-    if path.coordinate_of is not None:
-        yield _coordinate_row(scene, tree, path, path.coordinate_of)
-        return
-    if path.angle is not None:
-        section, triad = tree.section(path.angle), smallest_turn(np.array(path.turning_axis))
-        target = path.components["value"]
-        yield ConstraintRow(path.name, "turn", ground, section, triad[:, 2], triad[:, 0], target=target)
-        return
-    assert path.point is not None
-    section = tree.section(path.point)
-    for component, target in path.components.items():
-        e = unit["xyz".index(component)]
-        yield ConstraintRow(path.name, "point", ground, section, e, e, target=target)
-    if path.orientation is None:
-        return
-    if path.tool_axis is None:
-        yield from (ConstraintRow(path.name, "rotation", ground, section, e, e, law=path.orientation) for e in unit)
-    else:
-        tool = section._replace(triad=section.triad @ np.array(path.tool_triad))
-        for f in unit[:2]:
-            yield ConstraintRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
-
-
-def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory, name: str) -> ConstraintRow:
-    joint = next(each for each in scene.joint if each.name == name)
-    label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
-    if len(joint.units) != 1:
-        raise InputError(
-            f"{label}: expected a joint with one coordinate", f'"{joint.name}", {len(joint.units)} coordinates'
-        )
-    if path.motor is not None and joint not in scene.motor_joints:
-        raise InputError(f"{label}: expected a joint with a motor", f'"{joint.name}", which has none')
-    return row_of_joint(tree, joint, path.name, path.components["value"])
-
-
-def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
-    """Return the row by which a joint with one coordinate, cut or not, follows `target`."""
-    if joint.name not in tree.carried:
-        return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
-    node = tree.nodes[tree.carried[joint.name]]
-    return coordinate_row(owner, node, target, sign=node.sign)
-
-
-def constraint_values(model: Model, q: Array, times: Array) -> tuple[Array, Array]:
-    """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
-    if not model.rows:
-        return np.zeros((len(q), 0)), np.zeros((len(q), 0, model.tree.n_v))
-    return model.constraints.constraints(q, times)
-
-
-def constraint_rates(model: Model, q: Array, v: Array, times: Array) -> Array:
-    """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
-    return model.constraints.constraint_rates(q, v, times) if model.rows else np.zeros((len(q), 0))
-
-
-def turned_over(model: Model, q: Array, times: Array) -> dict[str, Booleans]:
-    """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
-
-    Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
-    """
-    owners, senses = model.senses
-    if not owners:
-        return {}
-    against = senses.constraints(q, times)[0] < 0.0
-    return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
-
-
-def path_errors(model: Model, times: Array, q: Array) -> dict[str, Array]:
-    """Return path errors (T, m), m or rad, by trajectory of `model`, at `times` (T,), s, and q (T, n_q)."""
-    C, owners = constraint_values(model, q, times)[0], [row.owner if row.is_trajectory else "" for row in model.rows]
-    return {path.name: C[:, [owner == path.name for owner in owners]] for path in model.scene.trajectory}
-
-
-def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
-    """Raise `InputError` for a reference to a point that its body has not."""
-    for reference in scene.references():
-        if reference.kind != "body" or reference.body_and_point is None:
-            continue
-        body, point = reference.body_and_point
-        if point not in bodies[body].points:
-            known = bodies[body].points
-            raise InputError(
-                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)})',
-                f'"{reference.name}"{did_you_mean(point, known)}',
-            )
-        stiffening = bodies[body].stiffening
-        if stiffening is not None and point not in stiffening.K_points:
-            raise InputError(
-                f"{scene.path}: {reference.key}: expected, with geometric_stiffening, a point whose loads' geometric"
-                f" stiffness is in the modal body file ({quoted(stiffening.K_points)})",
-                f'"{reference.name}"',
-            )
-
-
-ALONG = 1e-12  # of the largest rotation of modes: what is left of them across an axis about which they all turn
-
-
-def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
-    """The tree with such coordinates of all joints that have them."""
-    changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
-    changed.on_frames = frozenset(
-        joint.name
-        for joint in joints
-        if joint.type == "revolute"
-        and all(_turns_about_z(tree, tree.section(*side)) for side in zip(joint.between, joint.triads(), strict=True))
-    )
-    changed.nodes = tuple(
-        replace(node, inner=node.inner._replace(still=True), outer=node.outer._replace(still=True))
-        if node.joint.name in changed.on_frames
-        else node
-        for node in tree.nodes
-    )
-    return changed
-
-
-def _turns_about_z(tree: KinematicTree, section: Section) -> bool:
-    """Whether modes turn a section about z of its triad alone."""
-    if section.body < 0 or not section.point:
-        return True
-    body = tree.nodes[section.body].body
-    rotation = body.points[section.point].rotation
-    if body.stiffening is not None:
-        rotation = np.hstack([rotation, body.stiffening.at(section.point)[3:].reshape(3, -1)])
-    across = section._replace(still=True).turned(rotation)
-    return bool(np.abs(across).max(initial=0.0) <= ALONG * np.abs(rotation).max(initial=0.0))

@@ -27,7 +27,7 @@ from ..model.model import Model
 from ..model.nodes import Node, Section
 from ..scene.mechanism import Word
 from ..scene.space import SPACES
-from .posture import mobility, robot_size
+from .posture import mobility
 from .reach import as_guess, random_angles, regular_postures, turning_joints
 from .start import undeformed_posture
 
@@ -203,7 +203,7 @@ def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> A
         P = np.eye(3) - np.einsum("ki,kj->kij", axes[3:], axes[3:])
         meeting = np.linalg.lstsq(P.reshape(9, 3), np.einsum("kij,kj->ki", P, places[3:]).ravel(), rcond=None)[0]
         missed = np.einsum("kij,kj->ki", P, meeting - places[3:])
-        if np.abs(missed).max() < MEETING * robot_size(model):
+        if np.abs(missed).max() < MEETING * model.size:
             return as_floats(meeting)
     if len(places) > k + 2:
         return as_floats(places[k + 2])
@@ -221,7 +221,7 @@ def _cut_point(model: Model, body: str) -> str | None:
 
 def _above(model: Model, q: Array, node: Node) -> bool:
     """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
-    tree, places, near = model.tree, model.tree.places(q[None]), NEAR * robot_size(model)
+    tree, places, near = model.tree, model.tree.places(q[None]), NEAR * model.size
 
     def place(section: Section) -> Array:
         return places.at(section).r[0]

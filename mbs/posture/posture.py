@@ -1,4 +1,4 @@
-"""Postures of a robot: Newton on the rows, how it can move there, what to say of singular ones and of jumps."""
+"""Postures of a robot: how it can move there, what to say of singular ones and of jumps."""
 
 from __future__ import annotations
 
@@ -11,106 +11,28 @@ import numpy as np
 from ...common.arrays import Array, Booleans, as_floats
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from .. import _core
 from .._core import TimeFunction
-from ..model.kinematics import PostureSearch
 from ..model.known_motion import State
-from ..model.model import Model, constraint_rates, constraint_values, turned_over, without_paths
+from ..model.model import Model
 
-TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
-MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
 SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
 BRANCHING = 0.05  # ratio below which bent links may take redundant loops from one branch to another
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
 BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where equations of loops are distinguished
-LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
-
-
-def robot_size(model: Model) -> float:
-    """A length (m): the largest distance of two named points of a body, or the reach of trajectories' places."""
-    sizes = [
-        float(np.linalg.norm(at.position - other.position))
-        for node in model.tree.nodes
-        for at in node.body.points.values()
-        for other in node.body.points.values()
-    ]
-    return max(sizes, default=0.0) or 1.0
-
-
-def row_sizes(model: Model) -> Array:
-    """Return natural sizes (rows,) of C: 1 rad, or the robot's size, m."""
-    length = robot_size(model)
-    return np.array([length if model.measures_way(row) else 1.0 for row in model.rows])
-
-
-def solve_posture(model: Model, t: float, q: Array, locked: Booleans | None = None) -> Array | None:
-    """Move q (n_q,) onto C(q, t) = 0 by least steps of joints not `locked` (n_v,); None without convergence."""
-    solved, is_met = solve_postures(model, np.array([t]), q[None], locked)
-    return solved[0] if is_met[0] else None
-
-
-def posture_search(model: Model) -> PostureSearch:
-    """Return a search by joint coordinates; modal coordinates stay constant."""
-    # Coordinates by themselves have no branches
-    farthest = np.inf if all(row.kind == "coordinate" for row in model.rows) else LARGEST_TURN
-    return PostureSearch(joint_scales(model), row_sizes(model), farthest)
-
-
-def solve_postures(model: Model, times: Array, q: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
-    """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s, as `solve_posture`; with flags (T,) of convergence.
-
-    Where C = 0 with a joint or a tool turned over it did not.
-    """
-    if not model.rows:
-        return np.array(q), np.ones(len(q), dtype=bool)
-    search = posture_search(model)
-    if locked is not None:
-        search.scales[locked] = 0.0
-    moved, left = model.constraints.postures(q, times, search)
-    is_met = left <= MET
-    for is_turned_over in turned_over(model, moved, times).values():
-        is_met &= ~is_turned_over
-    return moved, is_met
 
 
 def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, locked: Booleans | None = None) -> State:
     """The state at q, rates of joints not `locked` (n_v,) moved onto Ċ = 0 at time t by the least change, ṗ kept."""
     if not model.rows:
         return State(q, v)
-    scales, now = joint_scales(model), np.array([t])
+    scales, now = model.joint_sizes, np.array([t])
     if locked is not None:
-        scales[locked] = 0.0
-    (C_v,) = natural_gradients(model, q[None], now, scales)
-    left = -constraint_rates(model, q[None], v[None], now)[0] / row_sizes(model)
+        scales = np.where(locked, 0.0, scales)
+    (C_v,) = model.natural_gradients(q[None], now, scales)
+    left = -model.constraint_rates(q[None], v[None], now)[0] / model.row_sizes
     return State(q, v + scales * np.linalg.lstsq(C_v, left, rcond=1e-10)[0])
-
-
-def joint_scales(model: Model) -> Array:
-    """Return natural sizes (n_v,) of joint coordinates: 1 rad or the robot's size, m; 0 for modes, which stay."""
-    scales, length = np.zeros(model.tree.n_v), robot_size(model)
-    for node in model.tree.nodes:
-        units = node.joint.units or node.joint.guess_units
-        sizes = np.array([1.0 if unit == "rad" else length for unit in units])
-        scales[node.v] = node.joint.state(sizes) if node.joint.units else sizes
-    return scales
-
-
-def natural_sizes(model: Model) -> Array:
-    """Return natural sizes (n_v,): 1 rad or the robot's size for joints, √J for modes."""
-    sizes = joint_scales(model)
-    for node in model.tree.nodes:
-        sizes[node.p_v] = np.sqrt(node.body.largest_moment)
-    return sizes
-
-
-def natural_gradients(model: Model, q: Array, times: Array, sizes: Array) -> Array:
-    """Return C_v (T, rows, n_v) at q (T, n_q) and `times` (T,), rows in natural sizes and coordinates in `sizes`.
-
-    Its rank does not depend on units.
-    """
-    return constraint_values(model, q, times)[1] * sizes / row_sizes(model)[:, None]
 
 
 @struct
@@ -125,26 +47,9 @@ class Mobility:
     loop_rank: int  # how many rows of the loops are independent with rigid links
 
 
-def mobilities(model: Model, times: Array, q: Array, loop_rank: int = -1) -> list[_core.Mobility]:
-    """Return the mobility with rigid links and gears at `times` (T,), s, and q (T, n_q).
-
-    Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
-    `loop_rank` is their rank with straight ones.
-    """
-    is_path = [row.is_trajectory for row in model.rows]
-    return model.constraints.mobilities(q, times, is_path, robot_size(model), loop_rank)
-
-
-def row_ratios(model: Model, times: Array, q: Array, rank: int) -> Array:
-    """Return smallest over largest nonzero singular value (T,) of all rows, by their `rank`, as in `mobilities`."""
-    is_path = [False] * len(model.rows)
-    motions = model.constraints.mobilities(q, times, is_path, robot_size(model), rank)
-    return np.array([at.loop_ratio for at in motions])
-
-
 def mobility(model: Model, q: Array) -> Mobility:
     """Return the mobility with rigid links and gears at q (n_q,)."""
-    at = mobilities(model, np.zeros(1), q[None])[0]
+    at = model.mobilities(np.zeros(1), q[None])[0]
     freedom, left = at.free.shape[1] - len(model.tree.gears), _joints(model, _largest(at.left) > MOVES)
     return Mobility(freedom, at.followed, at.ratio, left, at.loop_rank)
 
@@ -168,8 +73,8 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
     is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
         return 0, ()
-    (C_v,) = natural_gradients(model, q[None], now, joint_scales(model))
-    moving = _largest(mobilities(model, now, q[None])[0].free) > MOVES
+    (C_v,) = model.natural_gradients(q[None], now, model.joint_sizes)
+    moving = _largest(model.mobilities(now, q[None])[0].free) > MOVES
     rows = C_v[~is_loop][:, model.tree.joint_columns]
     is_locked = (_largest(rows[:, moving]) <= MOVES) & (_largest(rows) > MOVES)
     return int(np.count_nonzero(is_locked)), _joints(model, ~moving)
@@ -177,7 +82,7 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
 
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
     """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and its time; `loop_rank` as in `mobilities`."""
-    ratios = [at.ratio for at in mobilities(model, times, q, loop_rank)]
+    ratios = [at.ratio for at in model.mobilities(times, q, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
 
 
@@ -188,7 +93,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
-    least = np.abs(mobilities(model, np.array([t]), q[None], loop_rank)[0].hardest)
+    least = np.abs(model.mobilities(np.array([t]), q[None], loop_rank)[0].hardest)
     moving = quoted(_joints(model, least > MOVING * least.max()))
     how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
@@ -199,7 +104,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
     `loop_rank` as in `mobilities`.
     """
-    ratios = np.array([at.loop_ratio for at in mobilities(model, times, q, loop_rank)])
+    ratios = np.array([at.loop_ratio for at in model.mobilities(times, q, loop_rank)])
     worst = int(ratios.argmin())
     if not ratios[worst] < BRANCHING or worst in (0, len(times) - 1):
         return ""
@@ -215,12 +120,12 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
 
     "" where they do, or did not before.
     """
-    loops = without_paths(model)
-    before = solve_posture(loops, 0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
+    loops = model.without_paths()
+    before = loops.posture(0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
     if not loops.rows or before is None:
         return ""
     freedom = mobility(model, before)
-    ratio = row_ratios(loops, np.array([t]), q[None], freedom.loop_rank)[0]
+    ratio = loops.row_ratios(np.array([t]), q[None], freedom.loop_rank)[0]
     if ratio < NEARLY_SINGULAR:
         return (
             f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
@@ -228,7 +133,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
             " and coupler in a line. No finite force determines the further motion. Avoid this posture or drive a joint"
             " instead"
         )
-    ratio = row_ratios(model, np.array([t]), q[None], freedom.loop_rank + freedom.followed)[0]
+    ratio = model.row_ratios(np.array([t]), q[None], freedom.loop_rank + freedom.followed)[0]
     if ratio < NEARLY_SINGULAR:
         paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
         return (

@@ -16,7 +16,6 @@ from ..model.nodes import Node
 from ..scene.mechanism import MechanismKeys
 from ..scene.space import SPACES
 from ..scene.trajectories import Trajectory
-from .posture import row_ratios, solve_postures
 
 TURNING = ("revolute", "universal", "spherical", "weld")
 TRIES = 60
@@ -126,7 +125,7 @@ def _angles(node: Node) -> list[int]:
 
 def regular_postures(model: Model, q: Array) -> Array:
     """Return postures (…, n_q) near q (T, n_q) that satisfy all rows at t = 0 and are regular."""
-    postures, is_met = solve_postures(model, np.zeros(len(q)), q)
+    postures, is_met = model.postures(np.zeros(len(q)), q)
     postures = postures[is_met]
     return postures[are_regular(model, postures, np.zeros(len(postures)))]
 
@@ -134,7 +133,7 @@ def regular_postures(model: Model, q: Array) -> Array:
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
     """Return (T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q)."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
-    return np.asarray(row_ratios(model, times, q, rank) > REGULAR)
+    return np.asarray(model.row_ratios(times, q, rank) > REGULAR)
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -18,10 +18,10 @@ from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from .. import _core
 from ..fields.waypoints import spline
-from ..model.model import Model, constraint_rates
+from ..model.model import Model
 from ..model.motors import driven_mechanism
 from ..model.nodes import Node, coordinate_row, rows_of_joint
-from .posture import Mobility, joint_scales, mobility, natural_gradients, row_sizes, solve_postures
+from .posture import Mobility, mobility
 from .prescribed import joint_places, prescribed_motion
 from .start import undeformed_posture
 
@@ -109,7 +109,7 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
     """Q (T, n_q) from q (n_q,) on, with the least v at every time (D. Whitney, IEEE Trans. MMS-10, 1969)."""
     if len(times) == 1:
         return q[None]
-    scales, places, rest = joint_scales(model), joint_places(model), np.zeros((1, model.tree.n_v))
+    scales, places, rest = model.joint_sizes, joint_places(model), np.zeros((1, model.tree.n_v))
 
     def ends_at(t: float) -> SolveError:
         return SolveError(
@@ -119,8 +119,8 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
 
     def rates(t: float, way: Array) -> Array:
         at, now, q_dot = (q + way)[None], np.array([t]), np.zeros_like(q)
-        C_v = natural_gradients(model, at, now, scales)[0][:, model.tree.joint_columns]
-        left = constraint_rates(model, at, rest, now)[0] / row_sizes(model)
+        C_v = model.natural_gradients(at, now, scales)[0][:, model.tree.joint_columns]
+        left = model.constraint_rates(at, rest, now)[0] / model.row_sizes
         least = -np.linalg.pinv(C_v, rcond=RANK) @ left
         if np.abs(C_v @ least + left).max() > RANK * np.abs(left).max():
             raise ends_at(t)
@@ -162,10 +162,10 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float]:
     end, count, of_joints = float(times[-1]), INTERVALS + 3, model.tree.joint_columns
     knots = np.concatenate([np.zeros(5), np.linspace(0.0, end, INTERVALS + 1), np.full(5, end)])
     basis = scipy.interpolate.BSpline.design_matrix(times, knots, 5).toarray()[:, 2:]
-    places, scales, seen = joint_places(model), joint_scales(model), slice(None, None, STRIDE)
+    places, scales, seen = joint_places(model), model.joint_sizes, slice(None, None, STRIDE)
     weights = np.sqrt(scipy.integrate.simpson(np.eye(len(times[seen])), x=times[seen]))[:, None] * scales
     still = np.zeros((3, len(weights), int(np.count_nonzero(~of_joints))))
-    free = [null_space(C_v[:, of_joints], RANK) for C_v in natural_gradients(model, q, times, scales)]
+    free = [null_space(C_v[:, of_joints], RANK) for C_v in model.natural_gradients(q, times, scales)]
     for k in range(1, len(free)):  # the least turned from one time to the next
         U, _, V = np.linalg.svd(free[k].T @ free[k - 1])
         free[k] = free[k] @ U @ V
@@ -174,7 +174,7 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float]:
     def moved(shares: Array, at: slice) -> tuple[Array, Booleans]:
         best = q[at].copy()
         best[:, places] += np.einsum("tjk,tk->tj", ways[at], basis[at] @ shares.reshape(count, -1))
-        return solve_postures(model, times[at], best)
+        return model.postures(times[at], best)
 
     def moments(c: Array) -> Array:
         best, is_met = moved(c - 1.0, seen)
@@ -197,9 +197,9 @@ def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[
 
     Raises `SolveError` where no such joints tell it all along the path.
     """
-    scales = joint_scales(model)
+    scales = model.joint_sizes
     joints = np.eye(len(scales))[:, scales > 0]
-    free = [joints @ null_space(C_v @ joints, RANK) for C_v in natural_gradients(model, q, times, scales)]
+    free = [joints @ null_space(C_v @ joints, RANK) for C_v in model.natural_gradients(q, times, scales)]
     single = [node for node in model.tree.nodes if len(node.joint.units) == 1]
     best: tuple[float, tuple[Node, ...]] = (0.0, ())
     for nodes in combinations(single, count):

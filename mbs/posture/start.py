@@ -10,19 +10,9 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State, mass_matrices
-from ..model.model import Model, constraint_values, turned_over
+from ..model.model import MET, Model
 from ..scene.bodies import ROUND_OFF, tensor
-from .posture import (
-    MET,
-    joint_scales,
-    mobility,
-    natural_sizes,
-    paths_by_bending,
-    row_sizes,
-    solve_posture,
-    solve_postures,
-    with_rates,
-)
+from .posture import mobility, paths_by_bending, with_rates
 from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
 
 LEAST = 1e-13  # of inertia, relative
@@ -39,14 +29,14 @@ def undeformed_posture(model: Model) -> State:
     tree = model.tree
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
     named = _named(model, "joints")
-    q = solve_posture(model, 0.0, guess, named) if named.any() else None
-    q = solve_posture(model, 0.0, guess) if q is None else q
+    q = model.posture(0.0, guess, named) if named.any() else None
+    q = model.posture(0.0, guess) if q is None else q
     if q is None:
         check_reach(model, 0.0)
         works, scene = working_start(model, guess), model.scene
         follows = any(path.point is not None for path in scene.trajectory)  # a note then says from where
         if works is not None and follows and not scene.initial.named("joints"):
-            q = solve_posture(model, 0.0, works)
+            q = model.posture(0.0, works)
     if q is None:
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), list(turned_guesses(model.scene))
         advice += _turned_over(model, guess)
@@ -85,7 +75,7 @@ def check_turning(model: Model) -> None:
     slim = [name for name, J in rigid if np.linalg.eigvalsh(J)[0] <= ROUND_OFF * np.abs(J).max()]
     if not slim:
         return
-    natural = natural_sizes(model)
+    natural = model.natural_sizes
     M = mass_matrices(model, undeformed_posture(model).q[None])[0] * np.outer(natural, natural)
     sizes, least = np.diag(M), LEAST * np.abs(np.trace(M))
     for node in model.tree.nodes:
@@ -106,9 +96,9 @@ def check_turning(model: Model) -> None:
 def _turned_over(model: Model, guess: Array) -> Iterator[str]:
     """What is turned by π in the posture next to the guess that would meet all rows but for that."""
     times = np.zeros(1)
-    q = solve_postures(model, times, guess[None])[0]
-    if np.abs(constraint_values(model, q, times)[0] / row_sizes(model)).max() <= MET:
-        for owner, is_so in turned_over(model, q, times).items():
+    q = model.postures(times, guess[None])[0]
+    if np.abs(model.constraint_values(q, times)[0] / model.row_sizes).max() <= MET:
+        for owner, is_so in model.turned_over(q, times).items():
             if is_so[0]:
                 yield f'next to it "{owner}" is turned over: axes that it aligns point against each other'
 
@@ -150,7 +140,7 @@ def displaced_joints(model: Model) -> Iterator[str]:
     """A warning where loops cannot be closed with all values of [initial], and joints start elsewhere."""
     if not model.loop_rows.any():
         return
-    initial, start, scales = model.scene.initial, undeformed_posture(model), joint_scales(model)
+    initial, start, scales = model.scene.initial, undeformed_posture(model), model.joint_sizes
     guess, moved = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model)), []
     fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
     for node in (node for node in model.tree.nodes if node.joint.units):
@@ -175,7 +165,7 @@ def _with_slides(model: Model, q: Array) -> Array:
     slides = [node for node in model.tree.nodes if node.joint.type == "prismatic" and node.joint.name not in guesses]
     if not (slides and model.scene.is_planar and is_loop.any()):
         return q
-    values, gradients = constraint_values(model, q[None], np.zeros(1))
+    values, gradients = model.constraint_values(q[None], np.zeros(1))
     dv, along = np.zeros(model.tree.n_v), [node.v.start for node in slides]
     dv[along] = np.linalg.lstsq(gradients[0, is_loop][:, along], -values[0, is_loop], rcond=1e-10)[0]
     return model.tree.integrate(q, dv)

@@ -15,10 +15,10 @@ from ...common.structs import struct
 from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
 from ..fields.waypoints import spline
-from ..model.model import Model, constraint_values, row_of_joint, without_paths
+from ..model.build import row_of_joint
+from ..model.model import Model
 from ..model.nodes import ConstraintRow
 from .limits import limited_coordinates
-from .posture import solve_postures
 from .reach import are_regular, random_angles, turning_joints
 from .start import undeformed_posture
 
@@ -68,7 +68,7 @@ def grid_postures(
     measured = np.zeros(len(axes))
     is_row = np.array([axis.name != TURN for axis in axes])
     along = replace(model, rows=tuple(rows))
-    measured[is_row] = constraint_values(along, start[None], np.zeros(1))[0][0] + values[0, is_row]
+    measured[is_row] = along.constraint_values(start[None], np.zeros(1))[0][0] + values[0, is_row]
     if turned_about is not None:
         kept = set("xyz") - {axis.name for axis in axes}
         place = model.tree.places(start[None]).at(model.tree.section(point)).r[0]
@@ -77,7 +77,7 @@ def grid_postures(
         rows += _orientation(
             model, point, start, turn[:, None] * (np.zeros(3) if turned_about is None else turned_about)
         )
-    robot = without_paths(model)
+    robot = model.without_paths()
     robot = replace(robot, rows=(*robot.rows, *rows))
     seed = tuple(int(np.abs(axis.values - now).argmin()) for axis, now in zip(axes, measured, strict=True))
     q, reached = _flooded(robot, start, shape, int(np.ravel_multi_index(seed, shape)))
@@ -142,7 +142,7 @@ def _elsewhere(
 
 def _solved(model: Model, numbers: Indices, guess: Array) -> tuple[Array, Booleans]:
     parts = [slice(k, k + TOGETHER) for k in range(0, len(numbers), TOGETHER)]
-    solved = [solve_postures(model, numbers[part].astype(float), guess[part]) for part in parts]
+    solved = [model.postures(numbers[part].astype(float), guess[part]) for part in parts]
     return np.concatenate([q for q, _ in solved]), np.concatenate([met for _, met in solved])
 
 

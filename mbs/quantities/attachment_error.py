@@ -23,7 +23,6 @@ from ..linear.vibration import elastic_shapes
 from ..model.body import Body, bent_section
 from ..model.kinematics import Motion
 from ..model.known_motion import mass_matrices
-from ..posture.posture import natural_sizes, row_sizes
 from ..run.record import Run
 from .motion import constraint_rows
 
@@ -150,13 +149,13 @@ def start_of_motion(run: Run) -> Start:
         energy += run.q[:, node.p_q] ** 2 @ node.body.stiffness
         if node.body.attachment_modes and node.body.n_eigenmodes:
             late[node.p_v] = _late(node.body)
-    (M,), sizes = mass_matrices(run.model, run.q[:1], float(run.time[0])), natural_sizes(run.model)
+    (M,), sizes = mass_matrices(run.model, run.q[:1], float(run.time[0])), run.model.natural_sizes
     both = np.outer(sizes, sizes)
     duration = float(run.time[-1] - run.time[0])
     largest = float(energy.max(initial=0.0))
     return Start(
         M=M * both,
-        C_q=constraint_rows(run)[1][0] * sizes / row_sizes(run.model)[:, None],
+        C_q=constraint_rows(run)[1][0] * sizes / run.model.row_sizes[:, None],
         a=run.a[0] / sizes,
         stiffness=stiffness * sizes**2,
         damping=damping * both,

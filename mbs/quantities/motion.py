@@ -15,7 +15,6 @@ from ..model.drives import Drives, PointDrive
 from ..model.kinematics import Motion, Places
 from ..model.known_motion import MotionForces, motion_forces, row_accelerations
 from ..model.masses import turns_as_a_body
-from ..model.model import constraint_rates, constraint_values
 from ..model.nodes import Node, Section
 from ..model.system import MultibodySystem
 from ..model.tree import CutCoordinate, CutMotion
@@ -46,7 +45,7 @@ def acting_forces(run: Run) -> MotionForces:
 @kept
 def constraint_rows(run: Run) -> tuple[Array, Array]:
     """C (T, rows) and C_v (T, rows, n_v)."""
-    return constraint_values(run.model, run.q, run.time)
+    return run.model.constraint_values(run.q, run.time)
 
 
 @kept
@@ -60,7 +59,7 @@ def constraint_violation(run: Run) -> Array:
     """Return (T, 3) of C, Ċ, C̈: largest row over 1 + that of q, v, a; of an equilibrium, C alone."""
     levels = [(constraint_rows(run)[0], run.q)]
     if not run.is_at_rest:
-        C_dot = constraint_rates(run.model, run.q, run.v, run.time)
+        C_dot = run.model.constraint_rates(run.q, run.v, run.time)
         levels += [(C_dot, run.v), (row_accelerations(system_of(run), run, run.time), run.a)]
     off = np.zeros((len(run.time), 3))
     for k, (values, size) in enumerate(levels):

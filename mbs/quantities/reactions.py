@@ -17,7 +17,7 @@ from ...common.arrays import Array, Integers
 from ...common.structs import struct
 from ..model.known_motion import MotionForces, Wrench, multiplier_forces
 from ..model.nodes import Node
-from ..posture.posture import SINGULAR, natural_sizes, robot_size, row_sizes
+from ..posture.posture import SINGULAR
 from ..run.record import Run
 from ..scene.loads import OF_POINT
 from .motion import acting_forces, constraint_rows, places, system_of
@@ -95,12 +95,8 @@ def shared_evenly(run: Run) -> tuple[Run, Sharing | None]:
     if not is_loop.any() or not len(run.time):
         return run, None
     B, measured = _multipliers_of_loops(run)
-    row_scales = row_sizes(run.model)[measured]
-    J = (
-        np.einsum("rm,tri->tmi", B, constraint_rows(run)[1][:, is_loop])
-        * natural_sizes(run.model)
-        / row_scales[:, None]
-    )
+    row_scales = run.model.row_sizes[measured]
+    J = np.einsum("rm,tri->tmi", B, constraint_rows(run)[1][:, is_loop]) * run.model.natural_sizes / row_scales[:, None]
     some = np.unique(np.linspace(0, len(J) - 1, SAMPLES).astype(int))
     values = np.linalg.svd(J[some], compute_uv=False)
     redundant = J.shape[1] - int(np.max(np.sum(values > SINGULAR * np.maximum(values[:, :1], 1.0), axis=1)))
@@ -132,7 +128,7 @@ def _multipliers_of_loops(run: Run) -> tuple[Array, Integers]:
 
 def _side_by_side(run: Run, wrenches: Mapping[str, Wrench]) -> Array:
     """(T, 6 joints) force and moment of the scene's joints, N, moments over the size of the robot."""
-    length = robot_size(run.model)
+    length = run.model.size
     parts = (wrenches[joint.name] for joint in run.model.scene.joint)
     return np.hstack([values for acting in parts for values in (acting.force, acting.moment / length)])
 

@@ -20,14 +20,7 @@ from ..model.model import Model
 from ..model.motors import integrated_mechanism
 from ..model.system import MultibodySystem, zero_order_hold
 from ..posture.limits import left_ranges, watch_limits
-from ..posture.posture import (
-    NEARLY_SINGULAR,
-    SINGULAR,
-    describe_branches,
-    describe_posture,
-    robot_size,
-    worst_posture,
-)
+from ..posture.posture import NEARLY_SINGULAR, SINGULAR, describe_branches, describe_posture, worst_posture
 from ..posture.reach import out_of_reach
 from ..posture.start import rank_of_redundant_loops
 from ..scene.analysis import IntegratedAnalysis
@@ -128,7 +121,7 @@ class _Integration:
         is_watched = self.is_rigid or not self.is_followed
         self.continuation, self.loop_rank = continuation, None if is_watched else rank_of_redundant_loops(model, rows)
         if self.loop_rank is None:
-            scene.watch_posture([model.rows[k].is_trajectory for k in rows], robot_size(model))
+            scene.watch_posture([model.rows[k].is_trajectory for k in rows], model.size)
         watch_limits(scene, model.tree)
 
     @cached_property

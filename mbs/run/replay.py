@@ -15,7 +15,7 @@ from ...common.arrays import Array
 from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
-from ..model.model import Model, constraint_values
+from ..model.model import Model
 from ..model.motors import (
     MotorForces,
     driven_mechanism,
@@ -27,7 +27,6 @@ from ..model.motors import (
 )
 from ..model.nodes import ConstraintRow
 from ..model.system import MultibodySystem
-from ..posture.posture import row_sizes
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
 from .context import PatchedLink, PointsOfBody
@@ -184,7 +183,7 @@ def left_paths(source: Run, run: Run) -> Iterator[str]:
     model, times, q = source.model, run.time[now], run.q[now]
     if not len(times):
         return
-    share = np.abs(constraint_values(model, q, times)[0]) / row_sizes(model)
+    share = np.abs(model.constraint_values(q, times)[0]) / model.row_sizes
     for path in dict.fromkeys(row.owner for row in model.rows if row.is_trajectory):
         off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
         if off.max() > OFF_PATH:

@@ -12,7 +12,6 @@ from ...common.arrays import Array, Indices
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..inversion.servo import PIECES, Servo, through
-from ..posture.posture import robot_size
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -69,7 +68,7 @@ def forces_off_path(servo: Servo, times: Array, motion: Sequence[Array], off: Ar
     By differences, which are exact for ë and off by about `NEAR` for e and ė.
     """
     now = np.hstack(displaced_at(servo, times, off).forces(times, *motion))
-    slopes, size = np.zeros((3, *now.shape, off.shape[2])), NEAR * robot_size(servo.model)
+    slopes, size = np.zeros((3, *now.shape, off.shape[2])), NEAR * servo.model.size
     for order, step in enumerate((size, size / servo.end, size / servo.end**2)):
         for k in range(off.shape[2]):
             moved = off.copy()

@@ -26,7 +26,7 @@ from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
 from ..inversion.zero_dynamics import equilibrium, linearise
 from ..model.amplifiers import joined
-from ..model.model import Model, modal_directions, path_errors
+from ..model.model import Model
 from ..run.context import Context, PatchedLink
 from ..run.integrators import Choice
 from ..run.record import Run, Statistics
@@ -194,7 +194,7 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     servo = with_gears(make_servo(model, end, place, progress, 1.0, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
     gears = servo.gears if isinstance(servo, GearedServo) else None
-    per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in patches.values()]
+    per_volt = [servo.model.modal_directions(of_link.per_volt) for of_link in patches.values()]
     Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
     limits = Limits(joined(patches.values()), largest_moments(model, limits=True))
     if not np.any(Phi_V):
@@ -285,7 +285,7 @@ def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> Trac
     if replay.failed:
         return around
     of_links = replay.q[:, : around.held.tree.n_q]  # motors behind gears come after them
-    off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, of_links).values())
+    off = max(float(np.abs(of).max(initial=0.0)) for of in around.held.path_errors(replay.time, of_links).values())
     inside = run.time[(run.time >= 0.0) & (run.time <= analysis.end)]
     way = max(float(np.ptp(target.sample(inside)[0])) for row in around.held.rows if (target := row.target))
     permitted = max(analysis.tolerance * way, ALLOWED * (around.path_tolerance or 0.0))

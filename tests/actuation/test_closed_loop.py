@@ -15,7 +15,6 @@ from ffrobot.actuation.control.robot import RigidArm, volts_on_file
 from ffrobot.actuation.control.sampling import sampled
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed
-from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.quantities.motion import joint_motion, node_of
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.pictures.figures.standard import standard_figures
@@ -189,7 +188,7 @@ def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     gamma = np.column_stack([0.4 + 0.9 * np.sin(2 * t), -1.1 + 0.7 * np.cos(3 * t)])
     rate = np.column_stack([1.8 * np.cos(2 * t), -2.1 * np.sin(3 * t)])
     acceleration = np.column_stack([-3.6 * np.sin(2 * t), -6.3 * np.cos(3 * t)])
-    arm = RigidArm(without_paths(solution.model), inverse.q[0])
+    arm = RigidArm(solution.model.without_paths(), inverse.q[0])
     moments = np.array([arm.moments(*state) for state in zip(gamma, rate, acceleration, strict=True)])
     found = motor_moments(solution.analyses["inverse"].run)
     tau = np.column_stack([found[joint] for joint in "OA"])
@@ -266,7 +265,7 @@ def test_the_rigid_arm_says_where_its_links_do_not_reach():
         analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.1}],
     )  # fmt: skip
     solution = solve_scene(scene)
-    arm = RigidArm(without_paths(solution.model), solution.outcomes["inverse"].q[0])
+    arm = RigidArm(solution.model.without_paths(), solution.outcomes["inverse"].q[0])
     q, crank = arm.place(np.array([0.36]))[0], (0.36**2 + 0.1**2 - 0.3**2) / (2 * 0.36 * 0.1)  # law of cosines
     assert np.abs(np.cos(q) - crank).min() < 1e-9
     with pytest.raises(SolveError, match="expected joint angles that the rigid links can have, found"):

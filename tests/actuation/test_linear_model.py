@@ -19,7 +19,6 @@ from ffrobot.actuation.control.zeros import zeros
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.masses import with_payload
-from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.posture.start import undeformed_posture
 
 EI, MASS, LENGTH = 30.0, 1.5, 0.8
@@ -28,7 +27,7 @@ CLAMPED = np.array([1.8751040687, 4.6940911330, 7.8547574382])  # of cos λ cosh
 
 
 def at_rest(robot, points=("link2.tip",)):
-    model = without_paths(robot.model)
+    model = robot.model.without_paths()
     state = undeformed_posture(model)
     rest = np.zeros(len(state.v))
     return state_space(LinearEquations(model, state.q, points).at(0.0, state.q, rest, rest), {})

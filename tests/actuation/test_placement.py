@@ -12,7 +12,7 @@ from ffrobot.actuation.control.placement import PatchableLink, locked_modes, pla
 from ffrobot.actuation.control.placement_records import Placement
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
-from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.build import build_model
 from ffrobot.scene.load import make_scene
 
 

@@ -10,8 +10,8 @@ from tables_3d import ORIGIN, joint, rigid, scene
 import ffrobot
 from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs.analysis.forward import Forward
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.known_motion import State
-from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.quantities.motion import body_motion
 from ffrobot.mbs.quantities.supply import totals
 from ffrobot.mbs.run.drive import drive_robot

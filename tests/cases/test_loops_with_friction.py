@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 import ffrobot
 from ffrobot.actuation.control.robot import RigidArm
-from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
 

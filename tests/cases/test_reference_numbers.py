@@ -6,8 +6,8 @@ from beam_links import beam_link, circle, rectangle, tube
 from tables_3d import ORIGIN, Y, joint, revolute, rigid, scene
 
 import ffrobot
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.known_motion import KnownStates, required_forces
-from ffrobot.mbs.model.model import build_model
 from ffrobot.run.bodies import load_bodies
 
 ALL_BENDING = ["in-plane-bending", "out-of-plane-bending"]

@@ -15,7 +15,6 @@ from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.fields.steps import Steps
-from ffrobot.mbs.model.model import modal_directions, without_paths
 from ffrobot.mbs.model.motors import motor_commands
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.run.context import Context
@@ -163,9 +162,9 @@ def test_saturated_actuators_do_what_their_limits_leave(integrator):
             limit = np.array([0.02, 0.05, 0.5])
             V = lsq_linear(of_link.Phi_V, wanted, (-limit, limit), method="bvls", tol=1e-14).x
             saturated += np.count_nonzero(np.abs(V) >= limit)
-            acting[k] += modal_directions(model, {name: of_link.Phi_V @ V[:, None]})[0]
+            acting[k] += model.modal_directions({name: of_link.Phi_V @ V[:, None]})[0]
     assert saturated > 10
-    system = MultibodySystem(without_paths(model))
+    system = MultibodySystem(model.without_paths())
     required = system.core.required_forces(system.scene, list(back.time), back.q, back.v, back.a)
     np.testing.assert_allclose(required, acting, rtol=0, atol=1e-6 * np.abs(acting).max())
     np.testing.assert_allclose(np.hstack(list(back.commanded.values())), clipped, rtol=0, atol=1e-7)

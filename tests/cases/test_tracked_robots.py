@@ -13,7 +13,6 @@ from ffrobot.mbs.inversion.motors_only import decay_times
 from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.stable_inversion import invert
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
-from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.tracking.geared import with_gears
 from ffrobot.mbs.tracking.problem import track
 from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
@@ -290,7 +289,7 @@ def test_without_voltage_motors_alone_carry(robot, tolerance):
     solution = prepare_scene(ffrobot.make_scene(**ROBOTS[robot]()), Watcher())
     end = solution.scene.analysis[0].end
     servo = make_servo(solution.model, end, robot, lambda: True, 1.0)
-    per_volt = [modal_directions(servo.model, of.per_volt) for of in solution.patches.values()]
+    per_volt = [servo.model.modal_directions(of.per_volt) for of in solution.patches.values()]
     Phi_V, linear = np.concatenate(per_volt)[:, servo.of_modes].T, linearise(servo, end)
     inverted = invert(servo, linear, *decay_times(linear, end, needs_future=True), tolerance, lambda _: True)
     assert inverted.status == "completed"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rigid_robots import ROBOTS, random_urdf
 
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.known_motion import KnownStates, required_forces
-from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.run.bodies import load_bodies
 from ffrobot.scene.load import load_scene

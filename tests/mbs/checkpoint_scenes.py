@@ -11,8 +11,8 @@ from random_mechanisms import Tree
 from rotations import logarithm
 
 from ffrobot.mbs import _core
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.drives import Command, Drives, Replayed
-from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.scene.mechanism import MechanismScene
 from ffrobot.scene.load import validated_scene
 

@@ -8,8 +8,9 @@ import numpy as np
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.drives import Drive
-from ffrobot.mbs.model.model import Model, build_model
+from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.projection import projected
 from ffrobot.scene.load import make_scene
 

@@ -17,7 +17,6 @@ from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
 from ffrobot.mbs.linear.joint_conditions import joint_conditions
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.gears import with_compliance
-from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.quantities.supply import gear_moment, gear_motions, motor_motion
 from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
 from ffrobot.run.solve import solve_scene
@@ -51,7 +50,7 @@ def geared_arm(first, second=None, **keys):
 
 def linearised(robot, q, v, a):
     """With compliant gears."""
-    return LinearEquations(with_compliance(without_paths(robot.model)), q).at(0.0, q, v, a)
+    return LinearEquations(with_compliance(robot.model.without_paths()), q).at(0.0, q, v, a)
 
 
 @pytest.mark.parametrize(("keys", "link"), [({}, LINK), (SLIDES, M)])
@@ -158,7 +157,7 @@ def test_equilibrium_winds_the_gears():
     held = [{"name": name, "joint": name, "value": value} for name, value in (("O", "0.4"), ("A", "0.9"))]
     model = geared_arm(GEARED, trajectory=held)
     about = run(model, Static(name="static", kind="static"))
-    q = with_motor_coordinates(about.outcome, with_compliance(without_paths(model.model))).q[0]
+    q = with_motor_coordinates(about.outcome, with_compliance(model.model.without_paths())).q[0]
     mechanism = linearised(model, q, *np.zeros((2, len(q))))
     along = [mechanism.names.index(f"motor/{joint}") for joint in "OA"]
     assert mechanism.force[along].min() > 1.0
@@ -263,7 +262,7 @@ def test_the_linear_model_has_the_slope_of_its_torque(torque, slope):
     twist = np.copysign(min(abs(torque), KNEE) / K1 + max(abs(torque) - KNEE, 0.0) / K2, torque)
     assert spring.twist(np.array(torque)) == pytest.approx(twist, rel=1e-14)
     assert spring.moment(np.array(twist)) == pytest.approx(torque, rel=1e-14)
-    model = with_compliance(without_paths(pendulum(stiffness=STEPS).model))
+    model = with_compliance((pendulum(stiffness=STEPS).model).without_paths())
     q = np.zeros(model.tree.n_q)
     (gear,) = model.tree.gears
     q[gear.motor.q.start] = twist

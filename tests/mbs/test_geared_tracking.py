@@ -17,7 +17,6 @@ from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.known_motion import required_forces
-from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.run.gears import with_motor_coordinates
 from ffrobot.mbs.tracking.gear_motion import behind_gears
@@ -90,7 +89,7 @@ def test_closed_form_of_one_mode(f, J, V):
 def strip(modes, T, f):
     solution = prepare_scene(strip_scene(modes, T, of_hub=gear(f)), Watcher())
     servo = with_gears(make_servo(solution.model, T, "strip", lambda: True, 1.0))
-    return servo, modal_directions(servo.model, solution.patches["arm"].per_volt)[:, servo.of_modes].T
+    return servo, servo.model.modal_directions(solution.patches["arm"].per_volt)[:, servo.of_modes].T
 
 
 def asked(servo, Phi_V, span, V_max, tau_max=np.inf, tau_ref=1.0):

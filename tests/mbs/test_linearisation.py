@@ -9,7 +9,6 @@ from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs.linear.linearisation import LinearEquations
-from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.posture.start import undeformed_posture
 
 
@@ -17,7 +16,7 @@ from ffrobot.mbs.posture.start import undeformed_posture
 def test_outputs_and_inputs_are_dual(stiffened):
     """A force at a point works on the point's motion: one gradient serves both."""
     found = run(arm(arm_links(damping_ratio=0.02, stiffening=stiffened)), pcid(end=0.2, output_step=0.1))
-    one, model = found.outcome, without_paths(found.robot.model)
+    one, model = found.outcome, found.robot.model.without_paths()
     linear = LinearEquations(model, one.q[-1], ("link2.tip",)).at(one.time[-1], one.q[-1], one.v[-1], one.a[-1])
     for axis in "xy":
         np.testing.assert_array_equal(

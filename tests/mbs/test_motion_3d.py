@@ -6,7 +6,7 @@ from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
 from moving_trees import state_of
 
-from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.quantities.supply import actuator_forces
 from ffrobot.run.bodies import load_bodies
 

@@ -9,7 +9,7 @@ from material_points import random_cloud
 from random_mechanisms import random_solid, stiffened
 
 from ffrobot.mbs.model.body import from_modal_body
-from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.projection import projected
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.run.solve import solve_scene

@@ -10,8 +10,8 @@ from random_mechanisms import Tree
 from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs.model.body import rigid_body
-from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.posture.posture import check_path, mobility, solve_posture
+from ffrobot.mbs.model.build import build_model
+from ffrobot.mbs.posture.posture import check_path, mobility
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
 
@@ -25,7 +25,7 @@ def model_of(name):
 def test_rates_of_rows_are_those_of_their_values(name):
     """What C_v v has to be, against differences of C in time at the posture of t = 0.01 s."""
     model, h, t = model_of(name), 1e-6, 0.01
-    q = solve_posture(model, t, undeformed_posture(model).q)
+    q = model.posture(t, undeformed_posture(model).q)
     values = row_values(model, np.array([q, q]), np.array([t - h, t + h]))[0]
     rates = target_rates(model, q[None], np.array([t]))[0]
     assert np.abs(row_values(model, q[None], np.array([t]))[0]).max() < 1e-12
@@ -78,4 +78,4 @@ def test_a_search_that_leaves_all_bounds_ends_in_silence():
     q[model.tree.nodes[model.tree.carried["q2"]].q] = 3e10
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert solve_posture(model, 0.0, q) is None
+        assert model.posture(0.0, q) is None

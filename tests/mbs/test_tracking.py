@@ -21,7 +21,6 @@ from ffrobot.mbs.analysis.fcid import sampled
 from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.stable_inversion import invert
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise, shape_along
-from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.tracking.advice import bounds_of_zeros, price_of_tolerance
 from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
@@ -54,7 +53,7 @@ def strip_scene(modes, T, pairs=4, of_hub=None, **of_analysis):
 def strip(modes, T, pairs=4):
     solution = prepare_scene(strip_scene(modes, T, pairs), Watcher())
     servo = make_servo(solution.model, T, "strip", lambda: True, 1.0)
-    directions = modal_directions(servo.model, solution.patches["arm"].per_volt)
+    directions = servo.model.modal_directions(solution.patches["arm"].per_volt)
     return servo, directions[:, servo.of_modes].T
 
 
@@ -121,7 +120,7 @@ def arm(modes, patches, T, of_joints=()):
     tables["analysis"] = [tables["analysis"][0] | {"end": T}]
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
     servo = make_servo(solution.model, T, "arm", lambda: True, 1.0)
-    per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in solution.patches.values()]
+    per_volt = [servo.model.modal_directions(of_link.per_volt) for of_link in solution.patches.values()]
     return servo, np.concatenate(per_volt)[:, servo.of_modes].T
 
 

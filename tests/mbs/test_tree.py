@@ -14,10 +14,8 @@ from trees_in_a_plane import planar_model
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.orientations import OrientationLaw
-from ffrobot.mbs.model.model import constraint_rates, constraint_values
 from ffrobot.mbs.model.nodes import ConstraintRow, Section, coordinate_row
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.posture.posture import joint_scales, mobilities, row_sizes, solve_postures
 
 CLOSE = 1e-12
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -148,11 +146,11 @@ def assert_core_is_the_oracle(rng, model):
     moved = tree_oracle.integrate(tree, q, 0.3 * v)
     np.testing.assert_allclose(tree.integrate(q, 0.3 * v), moved, rtol=0, atol=CLOSE * np.abs(moved).max())
     model, times = replace(model, rows=(*model.rows, *every_row(rng, model))), np.array([0.0, 0.2, 0.5])
-    C, C_v = constraint_values(model, q, times)
+    C, C_v = model.constraint_values(q, times)
     for ours, numpys in zip((C, C_v), row_values(model, q, times), strict=True):
         np.testing.assert_allclose(ours, numpys, rtol=0, atol=CLOSE * np.abs(numpys).max())
     rates = np.einsum("tij,tj->ti", C_v, v) - target_rates(model, q, times)
-    np.testing.assert_allclose(constraint_rates(model, q, v, times), rates, rtol=0, atol=CLOSE * np.abs(rates).max())
+    np.testing.assert_allclose(model.constraint_rates(q, v, times), rates, rtol=0, atol=CLOSE * np.abs(rates).max())
     assert_joints_carry_what_does_no_work(rng, model, q, frames)
 
 
@@ -177,7 +175,7 @@ def test_postures_keep_to_loops(types):
     model = tree_model(plain, tables)
     q = np.tile(model.tree.at_rest(coordinates(model, plain, turned=False)), (5, 1))
     q = tree_oracle.integrate(model.tree, q, 0.1 * rng.standard_normal((5, model.tree.n_v)))
-    found, is_met = solve_postures(model, np.zeros(5), q)
+    found, is_met = model.postures(np.zeros(5), q)
     assert is_met.any()
     np.testing.assert_allclose(row_values(model, found[is_met], np.zeros(5)[is_met])[0], 0.0, atol=1e-11)
     for node in model.tree.nodes:
@@ -197,8 +195,8 @@ def test_mobility_is_that_of_numpys_gradients(seed):
                           target=_core.TimeFunction.polynomial(np.array([-1.0, 1.0]), rng.standard_normal((1, 4))))
             for e in np.eye(3)[:2]]  # fmt: skip
     model, (q, _), times = replace(model, rows=(*model.rows, *path)), states_of(rng, model), np.array([0.0, 0.2, 0.5])
-    scaled = row_values(model, q, times)[1] * joint_scales(model) / row_sizes(model)[:, None]
-    for J, at in zip(scaled[:, :, model.tree.joint_columns], mobilities(model, times, q), strict=True):
+    scaled = row_values(model, q, times)[1] * model.joint_sizes / model.row_sizes[:, None]
+    for J, at in zip(scaled[:, :, model.tree.joint_columns], model.mobilities(times, q), strict=True):
         _, of_loops, V = np.linalg.svd(J[model.loop_rows])
         rank = np.count_nonzero(of_loops > 1e-6 * max(of_loops[0], 1.0))
         free, followed = V[rank:].T, J[~model.loop_rows]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ffrobot.bench.precision import Row
-from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.run.bodies import load_bodies
 from ffrobot.run.solve import prepare_scene

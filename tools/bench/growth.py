@@ -14,7 +14,8 @@ import numpy as np
 
 from ffrobot.bench.precision import Row
 from ffrobot.mbs.model.body import Body, BodyPoint
-from ffrobot.mbs.model.model import Model, build_model
+from ffrobot.mbs.model.build import build_model
+from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.projection import projected
 from ffrobot.mbs.run.context import Context
 from ffrobot.run.watcher import Watcher

@@ -15,7 +15,7 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.model.body import Body
 from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.posture.posture import solve_posture, with_rates
+from ffrobot.mbs.posture.posture import with_rates
 from ffrobot.mbs.posture.start import undeformed_posture
 
 State = tuple[MultibodySystem, Array, Array]
@@ -106,7 +106,7 @@ def general_state(model: Model) -> State:
     bend = iter(1e-4 / (1 + np.arange(model.tree.n_v)))
     for node in model.tree.nodes:
         q[node.p_q] = [next(bend) for _ in range(node.body.n_modes)]
-    found = solve_posture(model, TIME, q)
+    found = model.posture(TIME, q)
     assert found is not None
     start = with_rates(model, found, v, TIME)
     return MultibodySystem(model), start.q, start.v

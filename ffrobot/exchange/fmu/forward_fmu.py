@@ -14,7 +14,7 @@ from ...mbs.analysis.forward import Forward
 from ...mbs.linear.statics import hanging_joints
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
-from ...mbs.model.model import Model, without_paths
+from ...mbs.model.model import Model
 from ...run.mode_choice import mode_levels
 from ...run.prepare import with_bodies
 from ...run.solve import prepare_scene
@@ -66,7 +66,7 @@ class _Logged(Watcher):
 def _unit(scene: Scene, analysis: Forward) -> tuple[Model, ForwardUnit]:
     prepared = prepare_scene(scene, _Logged())
     bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
-    model = with_compliance(without_paths(with_bodies(prepared, bodies).model))
+    model = with_compliance((with_bodies(prepared, bodies).model).without_paths())
     voltages = voltages_of_patches(model, prepared.patches)
     return model, forward_unit(model, voltages, prepared.links, analysis, AXES[:2] if scene.is_planar else AXES)
 

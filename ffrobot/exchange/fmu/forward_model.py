@@ -18,7 +18,7 @@ from ...mbs.analysis.forward import Forward
 from ...mbs.joints.free import FreeJoint
 from ...mbs.joints.joints import JOINT_TYPES
 from ...mbs.linear.statics import initial_state
-from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.model import Model
 from ...mbs.model.nodes import Node
 from ...mbs.model.system import MultibodySystem
 from ...mbs.run.integrator_choice import integrator_of
@@ -201,7 +201,7 @@ def _motors(model: Model) -> Iterator[Input]:
 def voltages_of_patches(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
     """Yield the inputs of all patches that voltages drive: variable, and direction (n_v,) of a unit voltage."""
     for of_link in patches.values():
-        directions = modal_directions(model, of_link.per_volt)
+        directions = model.modal_directions(of_link.per_volt)
         for layout, array in of_link.arrays.items():
             rows = directions[of_link.columns(layout)] if array.layout.is_driven else ()
             yield from ((voltage(layout, k), row) for k, row in enumerate(rows, 1))

@@ -17,10 +17,9 @@ from ...mbs.fields.field_types import GROUND
 from ...mbs.joints.joint import JointRecord
 from ...mbs.joints.moving_joint import MovingJoint
 from ...mbs.joints.screw import ScrewJoint
-from ...mbs.model.model import build_model
+from ...mbs.model.build import build_model
 from ...mbs.model.nodes import Node
 from ...mbs.model.tree import KinematicTree
-from ...mbs.posture.posture import robot_size
 from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_robot
 from ...scene.scene import Scene
@@ -164,7 +163,7 @@ class UrdfOfScene:
         self._scene, self._loaded = scene, loaded
         without = scene.model_copy(update={"payload": ()})  # they are part of their links
         model = build_model(without, [loaded[body.name].carrying for body in scene.body])
-        self.tree, self.size = model.tree, robot_size(model)
+        self.tree, self.size = model.tree, model.size
         self._link_names = Names((GROUND, *(body.name for body in scene.body)))
         self._joint_names = Names(joint.name for joint in scene.joint)
         self.root, self._joints = Element("robot", name=scene.name), list[Element]()

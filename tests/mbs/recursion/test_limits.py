@@ -8,7 +8,7 @@ from scipy.special import ellipk, ellipkinc
 import ffrobot
 from ffrobot.mbs import _core
 from ffrobot.mbs.linear.statics import initial_state
-from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.limits import watch_limits, watched
 from ffrobot.run.bodies import load_bodies

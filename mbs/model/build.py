@@ -1,0 +1,176 @@
+"""From a scene and its bodies to a model: the tree, and rows of constraints that close loops or follow paths.
+
+Coordinates of revolute joints between frames of bodies, not sections, for `motors = "frame"`.
+
+They are coordinates of a joint where modes turn its sections about its axis alone. Where they tilt the axis there are
+none: a moment between frames has virtual work there, but no angle that goes with it.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.errors import InputError, did_you_mean, quoted
+from ...common.rotations import smallest_turn
+from .._core import TimeFunction
+from ..fields.field_types import GROUND
+from ..joints.free import FreeJoint
+from ..joints.joint import JointRecord
+from ..joints.planar_joint import PlanarJoint
+from ..scene.mechanism import MechanismScene
+from ..scene.topology import Edge, spanning_forest
+from ..scene.trajectories import Trajectory
+from .body import Body
+from .masses import welded_payloads
+from .model import Model
+from .nodes import ConstraintRow, Section, coordinate_row
+from .tree import KinematicTree, cut_coordinates, cut_row, with_auxiliary_rotors
+
+
+def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
+    """Lay out tree and constraint rows of a scene. Raises `InputError` for missing points or inconsistent rows."""
+    _check_points(scene, {body.name: body for body in bodies})
+    carried = list(welded_payloads(scene))
+    joints = (*scene.joint, *(weld for _, weld in carried))
+    names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
+    topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
+    floating = PlanarJoint if scene.is_planar else FreeJoint
+    tree = KinematicTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
+    _check_cut_joints(scene, tree)
+    tree = with_coordinates_of_frames(tree) if scene.motors == "frame" else tree
+    tree, rows = with_auxiliary_rotors(tree)
+    rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
+    rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
+    return Model(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
+
+
+def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
+    """Raise `InputError` for a motor without a rotor, or a compliant gear, in the joint at which a loop is cut."""
+    for joint in tree.loops:
+        if key := joint.asks_for_coordinate:
+            raise InputError(
+                f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
+                " rotor_inertia nor a compliant gear, to be cut",
+                f"{quoted(key)} here and one of them in each of the others. Such loops are not available in 3D",
+            )
+
+
+def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
+    if joint.loop_equations is None:
+        raise InputError(
+            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes",
+            f"a {joint.type} joint: list it before the other joints of its loop",
+        )
+    first, second = joint.triads()
+    a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
+    unit = np.eye(3)
+    for equation in joint.loop_equations:
+        if equation.kind == "point":
+            yield from (ConstraintRow(joint.name, "point", a, b, e, e, is_trajectory=False) for e in unit)
+        else:
+            yield ConstraintRow(
+                joint.name, equation.kind, a, b, unit[equation.f], unit[equation.g], is_trajectory=False
+            )
+
+
+def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:
+    unit, ground = np.eye(3), tree.section(GROUND)
+    if path.coordinate_of is not None:
+        yield _coordinate_row(scene, tree, path, path.coordinate_of)
+        return
+    if path.angle is not None:
+        section, triad = tree.section(path.angle), smallest_turn(np.array(path.turning_axis))
+        target = path.components["value"]
+        yield ConstraintRow(path.name, "turn", ground, section, triad[:, 2], triad[:, 0], target=target)
+        return
+    assert path.point is not None
+    section = tree.section(path.point)
+    for component, target in path.components.items():
+        e = unit["xyz".index(component)]
+        yield ConstraintRow(path.name, "point", ground, section, e, e, target=target)
+    if path.orientation is None:
+        return
+    if path.tool_axis is None:
+        yield from (ConstraintRow(path.name, "rotation", ground, section, e, e, law=path.orientation) for e in unit)
+    else:
+        tool = section._replace(triad=section.triad @ np.array(path.tool_triad))
+        for f in unit[:2]:
+            yield ConstraintRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
+
+
+def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory, name: str) -> ConstraintRow:
+    joint = next(each for each in scene.joint if each.name == name)
+    label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
+    if len(joint.units) != 1:
+        raise InputError(
+            f"{label}: expected a joint with one coordinate", f'"{joint.name}", {len(joint.units)} coordinates'
+        )
+    if path.motor is not None and joint not in scene.motor_joints:
+        raise InputError(f"{label}: expected a joint with a motor", f'"{joint.name}", which has none')
+    return row_of_joint(tree, joint, path.name, path.components["value"])
+
+
+def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
+    """Return the row by which a joint with one coordinate, cut or not, follows `target`."""
+    if joint.name not in tree.carried:
+        return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
+    node = tree.nodes[tree.carried[joint.name]]
+    return coordinate_row(owner, node, target, sign=node.sign)
+
+
+def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
+    """Raise `InputError` for a reference to a point that its body has not."""
+    for reference in scene.references():
+        if reference.kind != "body" or reference.body_and_point is None:
+            continue
+        body, point = reference.body_and_point
+        if point not in bodies[body].points:
+            known = bodies[body].points
+            raise InputError(
+                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)})',
+                f'"{reference.name}"{did_you_mean(point, known)}',
+            )
+        stiffening = bodies[body].stiffening
+        if stiffening is not None and point not in stiffening.K_points:
+            raise InputError(
+                f"{scene.path}: {reference.key}: expected, with geometric_stiffening, a point whose loads' geometric"
+                f" stiffness is in the modal body file ({quoted(stiffening.K_points)})",
+                f'"{reference.name}"',
+            )
+
+
+ALONG = 1e-12  # of the largest rotation of modes: what is left of them across an axis about which they all turn
+
+
+def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
+    """The tree with such coordinates of all joints that have them."""
+    changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
+    changed.on_frames = frozenset(
+        joint.name
+        for joint in joints
+        if joint.type == "revolute"
+        and all(_turns_about_z(tree, tree.section(*side)) for side in zip(joint.between, joint.triads(), strict=True))
+    )
+    changed.nodes = tuple(
+        replace(node, inner=node.inner._replace(still=True), outer=node.outer._replace(still=True))
+        if node.joint.name in changed.on_frames
+        else node
+        for node in tree.nodes
+    )
+    return changed
+
+
+def _turns_about_z(tree: KinematicTree, section: Section) -> bool:
+    """Whether modes turn a section about z of its triad alone."""
+    if section.body < 0 or not section.point:
+        return True
+    body = tree.nodes[section.body].body
+    rotation = body.points[section.point].rotation
+    if body.stiffening is not None:
+        rotation = np.hstack([rotation, body.stiffening.at(section.point)[3:].reshape(3, -1)])
+    across = section._replace(still=True).turned(rotation)
+    return bool(np.abs(across).max(initial=0.0) <= ALONG * np.abs(rotation).max(initial=0.0))
