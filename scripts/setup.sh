@@ -157,20 +157,12 @@ install_test_packages() {
   .venv/bin/python -m pip install -r .venv/test_requirements.txt -c .venv/constraints.txt
 }
 
-# Where ccache is in use, what was compiled before is taken from its folder, of this kind of processor alone.
-reuse_objects() {
-  [[ ! ${CMAKE_CXX_COMPILER_LAUNCHER:-} && -d ${CCACHE_DIR:-$HOME/.ccache} ]] && type -P ccache >/dev/null || return 0
-  export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1 CCACHE_NAMESPACE
-  CCACHE_NAMESPACE=$("${CXX:-c++}" -march=native -Q --help=target | digest)
-}
-
 # Python files are seen as they are edited; C++ sources and new files are taken in here.
-build_package() (
+build_package() {
   local site
-  reuse_objects
   site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
   PATH="$PWD/.venv/bin:$PATH" CMAKE_PREFIX_PATH=$site .venv/bin/python -m pip install --no-deps --no-build-isolation -e .
-)
+}
 
 # Forms that links need, so that none of them waits for a compiler.
 compile_forms() { .venv/bin/python -m ffrobot.fe_models.forms; }
