@@ -124,7 +124,7 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
         return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
     if analysis.shape == "given":
         return given_shape(path, bodies, analysis)
-    if analysis.shape == "static":
+    if analysis.shape == "static" and any(body.n_modes for body in bodies):
         return _static(model, bodies, analysis, motion, posture)
     return [[ZERO] * body.n_modes for body in bodies]
 
