@@ -93,13 +93,16 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
     middles = 0.5 * (breaks[1:] + breaks[:-1])
     order = max(motion.coefficients.shape[1] for motion in motions)
     total = np.zeros((len(middles), order, motions[0].coefficients.shape[2]))
+    changes = np.zeros((len(breaks), total.shape[2]))  # of what motions at rest add up to
     for motion, weight in zip(motions, weights or [1.0] * len(motions), strict=True):
-        total[middles < motion.begin, -1] += weight * motion.first
-        total[middles > motion.end, -1] += weight * motion.last
-        own = order - motion.coefficients.shape[1]
-        k = np.flatnonzero((middles > motion.begin) & (middles < motion.end))
-        piece = np.searchsorted(motion.breaks, middles[k]) - 1
-        total[k, own:] += weight * shifted(motion.coefficients[piece], breaks[k] - motion.breaks[piece])
+        begin, end = np.searchsorted(middles, (motion.begin, motion.end))
+        changes[0] += weight * motion.first
+        changes[begin] -= weight * motion.first
+        changes[end] += weight * motion.last
+        own, during = order - motion.coefficients.shape[1], slice(begin, end)
+        piece = np.searchsorted(motion.breaks, middles[during]) - 1
+        total[during, own:] += weight * shifted(motion.coefficients[piece], breaks[during] - motion.breaks[piece])
+    total[:, -1] += np.cumsum(changes[:-1], axis=0)
     return Piecewise(breaks, total)
 
 

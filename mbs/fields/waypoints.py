@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...common.libraries import scipy
 from ...common.tables import LARGEST, parse_csv, shown
 from ...common.toml_files import read_text
 from .._core import TimeFunction
-from .paths import Piecewise, superposed
+from .paths import Piecewise
 
 TIME = re.compile(r"_*(t|time|times?tamp|stamp|sec(?:ond)?s?)[ _.]*[(\[]?(s|sec|ms|us|µs|ns)?[)\]]?", re.IGNORECASE)
 """Names of the column of times, as programs write them, with or without a unit: t, time, time [ms], timestamp_ns."""
@@ -70,6 +71,7 @@ class Waypoints:
         k = column_of(self.columns, joint)
         return self if k is None else replace(self, columns=("value",), values=self.values[:, [k]])
 
+    @cached_property
     def spline(self) -> Piecewise:
         """The quintic spline (four continuous derivatives) through the rows, from rest to rest.
 
@@ -80,9 +82,10 @@ class Waypoints:
         if not len(begins):
             return Piecewise(self.times[[0, -1]], self.values[None, :1])
         parts = [interpolated(self.times[a : b + 1], self.values[a : b + 1]) for a, b in zip(begins, ends, strict=True)]
-        rest = Piecewise(parts[0].breaks[:2], self.values[None, :1])
-        ways = [Piecewise(part.breaks, _from_zero(part, self.values[a])) for part, a in zip(parts, begins, strict=True)]
-        return superposed([rest, *ways])
+        rests = np.zeros((len(parts), 1, *parts[0].coefficients.shape[1:]))
+        rests[:, 0, -1] = self.values[ends]
+        pieces = [piece for part, rest in zip(parts, rests, strict=True) for piece in (part.coefficients, rest)]
+        return Piecewise(np.concatenate([part.breaks for part in parts]), np.concatenate(pieces[:-1]))
 
     @property
     def _ways(self) -> tuple[Indices, Indices]:
@@ -99,13 +102,12 @@ class Waypoints:
         begins, ends = self._ways
         if len(self.times) < MANY or len(begins) < 2 or (ends - begins).max() < SAMPLES:
             return ""
-        of_rows, curve = _accelerations(self.times, self.values).max(axis=0), self.spline()
+        of_rows, steps = _accelerations(self.times, self.values).max(axis=0), np.diff(self.times)
         of_rows = np.where(of_rows > 0.0, of_rows, np.inf)
-        holds = []
-        for last, first in zip(ends[:-1], begins[1:], strict=True):
-            rows = self.times[max(last - 2, 0) : first + 3]
-            times = (rows[:-1, None] + np.linspace(0.0, 1.0, DENSE) * np.diff(rows)[:, None]).ravel()
-            holds.append(float((np.abs(curve.sample(times, 2)).max(axis=0) / of_rows).max()))
+        beside = np.stack([ends[:-1] - 2, ends[:-1] - 1, begins[1:], begins[1:] + 1], axis=1).clip(0, len(steps) - 1)
+        times = self.times[beside, None] + np.linspace(0.0, 1.0, DENSE) * steps[beside, None]
+        needed = np.abs(self.spline.sample(times.ravel(), 2)) / of_rows
+        holds = needed.reshape(len(beside), -1).max(axis=1)
         k = int(np.argmax(holds))
         if holds[k] < STOPPING:
             return ""
@@ -295,13 +297,6 @@ def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
     return (times[1:] + times[:-1]) / 2, np.diff(values, axis=0) / np.diff(times)[:, None]
 
 
-def _from_zero(part: Piecewise, first: Array) -> Array:
-    """Coefficients of a part that begins at zero."""
-    coefficients = part.coefficients.copy()
-    coefficients[:, -1] -= first
-    return coefficients
-
-
 def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
     """Column names, numbers (rows, columns) and lines (rows,) of the CSV table at `path`."""
     try:
@@ -316,7 +311,12 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value", f"{','.join(header)!r}")
     if len(rows) < 2:
         raise InputError(f"{path}: expected at least 2 waypoints", len(rows))
-    table = np.array([numbers_of(path, line, row, len(header)) for line, row in rows])
+    try:
+        table = np.array([row for _, row in rows], dtype=float)
+    except ValueError:
+        table = np.empty(0)
+    if table.shape != (len(rows), len(header)) or not (np.abs(table) <= LARGEST).all():  # named by its line
+        table = np.array([numbers_of(path, line, row, len(header)) for line, row in rows])
     return header, table, np.array([line for line, _ in rows])
 
 
@@ -344,7 +344,7 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
     rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
     curve = scipy.interpolate.make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
     breaks = np.unique(curve.t)
-    powers = [curve.derivative(m)(breaks[:-1]) / math.factorial(m) for m in range(degree, -1, -1)]
+    powers = [curve(breaks[:-1], m) / math.factorial(m) for m in range(degree, -1, -1)]
     return Piecewise(breaks, np.array(powers).transpose(1, 0, 2))
 
 

@@ -147,7 +147,7 @@ class MotionKeys(Referring):
     def along_table(self, waypoints: Waypoints) -> Piecewise:
         """The motion of all columns of a table."""
         if self.profile in (None, "spline"):
-            return self._shaped(waypoints.spline())
+            return self._shaped(waypoints.spline)
         return self._shaped(path_of(self._legs_of_table(waypoints)))
 
     def through(self, places: Array) -> Piecewise:

@@ -189,10 +189,10 @@ def test_records_that_turn_between_two_rows(tmp_path):
     rows = [(t, round(8.0 * (t * (1.0 - t / 2.0)) ** 3, 6)) for t in time]
     told = load_waypoints(write(tmp_path / "path.csv", "t,value", rows))
     assert "rows from t = 0.987342 to 1.01266 s are alike: the path rests there" in told.abrupt_hold
-    assert told.spline().sample(np.array([1.0]), 2)[0, 0] == 0.0
+    assert told.spline.sample(np.array([1.0]), 2)[0, 0] == 0.0
     fine = load_waypoints(write(tmp_path / "path.csv", "t,value", [*rows[:39], *rows[40:]]))
     assert fine.abrupt_hold == ""
-    assert fine.spline().sample(np.array([1.0]), 2)[0, 0] == pytest.approx(-6.0, rel=5e-3)
+    assert fine.spline.sample(np.array([1.0]), 2)[0, 0] == pytest.approx(-6.0, rel=5e-3)
 
 
 @pytest.mark.parametrize("digits", [4, 9])
@@ -382,7 +382,7 @@ def test_many_waypoints_take_time_in_proportion(tmp_path):
         times = np.linspace(0.0, 10.0, count)
         table = Waypoints(("value",), times, np.sin(times)[:, None] ** 3)
         began = time.process_time()
-        path = table.spline()
+        path = table.spline
         seconds.append(time.process_time() - began)
         np.testing.assert_allclose(path.sample(times), table.values, rtol=0, atol=1e-11)
     assert seconds[1] < 8 * seconds[0]

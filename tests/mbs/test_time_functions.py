@@ -196,7 +196,7 @@ def test_waypoints_reproduce_a_quintic_at_rest_at_both_ends(tmp_path):
     rows = "".join(f"{t!r},{t**3 * (10 - 15 * t + 6 * t * t)!r},2\n" for t in times.tolist())
     table = load_waypoints(write(tmp_path / "path.csv", "t,x,y\n" + rows))
     assert table.columns == ("x", "y")
-    x, y = table.spline().functions()
+    x, y = table.spline.functions()
     t = np.linspace(0, 1, 101)
     exact = [t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)]
     np.testing.assert_allclose(x.sample(t), exact, atol=1e-9)
@@ -207,7 +207,7 @@ def test_waypoints_reproduce_a_quintic_at_rest_at_both_ends(tmp_path):
 def test_rows_that_repeat_are_a_hold(tmp_path):
     """Nothing overshoots: a move between two holds, and one that goes on through a row."""
     rows = "t,value\n0,0\n0.5,0\n1.5,1\n2,1\n2.5,0.6\n3,0.5\n4,0.5\n"
-    (function,) = load_waypoints(write(tmp_path / "path.csv", rows)).spline().functions()
+    (function,) = load_waypoints(write(tmp_path / "path.csv", rows)).spline.functions()
     value = function.sample(np.linspace(-1, 5, 6001))[0]
     assert value.min() > -1e-14
     assert value.max() == pytest.approx(1.0, abs=1e-14)
@@ -217,6 +217,18 @@ def test_rows_that_repeat_are_a_hold(tmp_path):
     t = np.linspace(0.5, 1.5, 11)
     s = t - 0.5
     np.testing.assert_allclose(function.sample(t)[0], s**3 * (10 - 15 * s + 6 * s**2), atol=1e-12)
+
+
+def test_stairs_of_many_holds(tmp_path):
+    """As encoders of few bits write them: rests at all of them, and moves of the law from rest to rest between."""
+    levels = np.arange(3000) % 7 / 7.0
+    rows = "".join(f"{k},{level!r}\n" for k, level in enumerate(np.repeat(levels, 2).tolist()))
+    (function,) = load_waypoints(write(tmp_path / "path.csv", f"t,value\n{rows}")).spline.functions()
+    rests = np.arange(len(levels)) * 2.0
+    for s in (0.0, 0.3, 1.0):
+        np.testing.assert_allclose(function.sample(rests + s), [levels, 0 * levels, 0 * levels], atol=1e-14)
+        moved = levels[:-1] + s**3 * (10 - 15 * s + 6 * s**2) * np.diff(levels)
+        np.testing.assert_allclose(function.sample(rests[:-1] + 1 + s)[0], moved, atol=1e-14)
 
 
 @pytest.mark.parametrize(
