@@ -42,7 +42,7 @@ from .loop import (
     sample_times,
     times_of_run,
 )
-from .margins import Feedback, lowest_frequency
+from .margins import MOST, Feedback, eigenvalue_count, lowest_frequency
 from .metrics import LoopMotion, last_change, place_of_tip
 from .observer import Observed, make_observed
 from .probing import LONGEST, find_feedback
@@ -169,7 +169,8 @@ class ClosedLoop(SampledAnalysis):
         readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
         found, along = loops_about(setup, begun, readings[: loop.taken], models)
         filtering = filters(read, self.sample_time)
-        loops = [(model, feedback.behind(*filtering)) for model, feedback in found]
+        every = ((model, feedback.behind(*filtering)) for model, feedback in found)
+        loops = [loop for loop in every if eigenvalue_count(loop, self.sample_time, self.delay) <= MOST]
         gears = bool(plant.tree.gears)
         record = loop_record(self, setup, loop, acting, runs, loops=loops, lowest=lowest, gears=gears)
         record = replace(record, feedback=along)

@@ -30,6 +30,7 @@ from .sampling import sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to round-off
 LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times
+FEW, MOST = 150, 600  # eigenvalues of a loop: margins are sought for so many; for more than the second none are found
 GRID = 60  # points of the search for the first crossing, before bisection
 RELATIVE = 1e-3  # to which margins are found
 LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
@@ -75,8 +76,9 @@ class Margins:
     """Stability margins of a loop, the worst of several configurations."""
 
     radius: float  # the spectral radius; below 1 the loop is stable
-    gain: float  # factor by which all gains may grow; below 1 the factor that would make it stable, 0 where none does
-    delay: float  # s, by which the delay may grow; 0 where the loop is not stable
+    # factor by which all gains may grow; below 1 the factor that would make it stable, 0 where none does
+    gain: float  # NaN for more than `FEW` eigenvalues
+    delay: float  # s, by which the delay may grow; 0 where the loop is not stable; NaN as `gain`
 
     @property
     def is_stable(self) -> bool:
@@ -133,14 +135,20 @@ def lowest_frequency(
     pids = [record for record in controllers if isinstance(record, JointPid)]
     if any(not isinstance(record, JointPid | ModalVelocity) for record in controllers):
         locked *= 0.5
-    elif pids and models:
-        gains = joint_gains(models[0], pids, T)
+    elif pids and models and eigenvalue_count((models[0], gains := joint_gains(models[0], pids, T)), T, delay) <= MOST:
         z = np.concatenate([_without_aliases(loop_eigenvalues(model, gains, T, delay), model, T) for model in models])
         s = np.log(z[np.abs(z) > GONE]) / T
         ringing = s[(s.imag > 0.0) & (-s.real < LIGHTLY * np.abs(s)) & (np.abs(s.imag) * T < np.pi * SAMPLED)]
         vibrating = ringing[np.abs(ringing) > RIGID * np.abs(s).max(initial=0.0)]
         locked = min(locked, float(vibrating.imag.min(initial=np.inf)) / (2 * np.pi))
     return locked if np.isfinite(locked) else float("nan")
+
+
+def eigenvalue_count(loop: tuple[LinearModel, Feedback], T: float, delay: float) -> int:
+    """Return how many eigenvalues a sampled loop has: a long delay adds one for each command on its way."""
+    model, feedback = loop
+    longest = delay + (0.0 if feedback.late is None else feedback.late[1].max(initial=0.0))
+    return len(model.A) + len(feedback.A) + int(np.ceil(longest / T)) * len(feedback.inputs)
 
 
 def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexArray:
@@ -195,6 +203,8 @@ def margins(loops: Loops, T: float, delay: float) -> Margins:
         return max(spectral_radius(model, of.times(factor), T, delay + more) for model, of in loops)
 
     now = radius(1.0, 0.0)
+    if max(eigenvalue_count(loop, T, delay) for loop in loops) > FEW:
+        return Margins(now, np.nan, np.nan if now <= STABLE else 0.0)
     if now > STABLE:
         factors = as_floats(np.geomspace(1.0, LEAST_GAIN, GRID))
         return Margins(now, _last_before(lambda c: radius(c, 0.0) <= STABLE, factors, missing=0.0), 0.0)
@@ -322,6 +332,8 @@ def light_roots(models: Sequence[LinearModel]) -> list[str]:
 
 def advice(loops: Loops, records: Sequence[JointPid], T: float, delay: float, found: Margins) -> list[str]:
     """Why a loop is not stable, and gains to start with where `records` of joint PID controllers are all of it."""
+    if np.isnan(found.gain):
+        return [f"margins, and gains to start with, are not computed for a delay of {delay / T:.4g} samples"]
     models = [model for model, _ in loops]
     texts = []
     if found.is_stable and found.gain < NARROW:

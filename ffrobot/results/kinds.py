@@ -90,6 +90,8 @@ def _loop_margins(about: About) -> str:
     if about["delay_margin"] == 0.0:
         return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
     gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
+    if np.isnan(gain):
+        return "margins (linear model): not computed for a delay of so many samples"
     texts = (
         f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow freely",
         f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",

@@ -101,6 +101,20 @@ def test_delay_margin_of_a_fast_sampled_loop_is_that_of_the_continuous_one():
     assert found.delay == pytest.approx(phase / omega - fast / 2, rel=5e-3)  # holding is T/2 to (ωT)²/12 = 1e-4
 
 
+def test_of_a_delay_of_many_samples_stability_alone_is_known():
+    """The slowest root of I s² + (P + D s) e^{−s (d + T/2)} = 0, by Newton's method: holding is a delay of T/2."""
+    P, D, delay, fast = 0.5, 1.0, 0.3, 1e-3
+    s, late = -0.3 + 0.3j, delay + fast / 2
+    for _ in range(20):
+        value = INERTIA * s**2 + (P + D * s) * np.exp(-s * late)
+        s -= value / (2 * INERTIA * s + (D - late * (P + D * s)) * np.exp(-s * late))
+    plant = models(wheel())[0]
+    found = margins([(plant, joint_gains(plant, [pid(P, D)], fast))], fast, delay)
+    assert np.log(found.radius) / fast == pytest.approx(s.real, rel=1e-4)
+    assert found.is_stable
+    assert np.isnan([found.gain, found.delay]).all()
+
+
 def test_amplifiers_are_in_the_loop():
     """A lag is a state, V' = (u − V)/τ, a delay of the amplifier one more of the loop; of two inputs each its own."""
     plant, tau = models(wheel())[0], 0.7 * T
