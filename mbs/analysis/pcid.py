@@ -9,7 +9,7 @@ from ..model.gears import with_prescribed_motors
 from ..posture.posture import check_path, mobility
 from ..posture.reach import check_reach
 from ..posture.redundancy import resolved
-from ..posture.start import undeformed_posture
+from ..posture.start import displaced_joints, undeformed_posture
 from ..run.context import Context
 from ..run.drive import drive_robot
 from ..run.record import Run
@@ -42,6 +42,7 @@ class Pcid(IntegratedAnalysis):
         warnings, way = tuple(check_path(rigid, posture, self.last_time)), mobility(rigid, posture)
         model = with_prescribed_motors(rigid)
         start = initial_state(model)
+        warnings += tuple(displaced_joints(model, {gear.joint.joint.name for gear in model.tree.gears}))
         if way.followed < way.freedom:
             warnings += tuple(hanging_joints(model, start))
         return drive_robot(

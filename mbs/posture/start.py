@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -28,8 +29,10 @@ def undeformed_posture(model: Model) -> State:
     """
     tree = model.tree
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
-    named = _named(model, "joints")
-    q = model.posture(0.0, guess, named) if named.any() else None
+    named, behind = _named(model, "joints"), _behind_known_motors(model)
+    if behind.any():
+        guess = _with_gears_as_asked(model, State(guess, np.zeros(tree.n_v))).q
+    q = model.posture(0.0, guess, named | behind) if (named | behind).any() else None
     q = model.posture(0.0, guess) if q is None else q
     if q is None:
         check_reach(model, 0.0)
@@ -47,12 +50,31 @@ def undeformed_posture(model: Model) -> State:
             f" {owners} at t = 0",
             f"none by Newton's method ({'; '.join(advice) or 'out of reach, or on another branch?'})",
         )
-    v, named = _guessed_rates(model), _named(model, "joint_rates")
+    v, named = _guessed_rates(model), _named(model, "joint_rates") | behind
     start = with_rates(model, q, v)
     if named.any():
+        v = _with_gears_as_asked(model, State(q, v)).v if behind.any() else v
         kept = with_rates(model, q, with_rates(model, q, v, locked=named).v)
         start = kept if np.allclose(kept.v[named], v[named], atol=SAME * np.abs(v[named]).max()) else start
     return _twisted_gears(model, start, relaxed_gears(model, start))
+
+
+def _with_gears_as_asked(model: Model, guess: State) -> State:
+    """The guess with motors on their paths, and joints behind them as [initial] has them, else without a twist."""
+    alone = replace(model, rows=tuple(row for row in model.rows if row.is_trajectory))
+    q = alone.posture(0.0, guess.q)
+    at = guess if q is None else with_rates(alone, q, guess.v)
+    return _twisted_gears(model, guess, relaxed_gears(model, at))
+
+
+def _behind_known_motors(model: Model) -> Booleans:
+    """(n_v,) of joints behind compliant gears in robots with loops whose paths are those of motors alone."""
+    behind, motors = np.zeros(model.tree.n_v, dtype=bool), {gear.motor.v.start for gear in model.tree.gears}
+    known = {row.coordinate for row in model.rows if row.is_trajectory}
+    if model.loop_rows.any() and known <= motors:
+        for gear in model.tree.gears:
+            behind[gear.joint.v] = gear.motor.v.start in known
+    return behind
 
 
 def _twisted_gears(model: Model, given: State, relaxed: State) -> State:
@@ -136,14 +158,16 @@ def shape_in_redundant_loops(model: Model, rows: Indices) -> str:
     )
 
 
-def displaced_joints(model: Model) -> Iterator[str]:
-    """A warning where loops cannot be closed with all values of [initial], and joints start elsewhere."""
+def displaced_joints(model: Model, joints: Container[str] | None = None) -> Iterator[str]:
+    """A warning where loops cannot be closed with all values of [initial], and joints, or any of `joints`, move."""
     if not model.loop_rows.any():
         return
     initial, start, scales = model.scene.initial, undeformed_posture(model), model.joint_sizes
     guess, moved = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model)), []
     fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
     for node in (node for node in model.tree.nodes if node.joint.units):
+        if joints is not None and node.joint.name not in joints:
+            continue
         ways, rates = np.abs(start.q - guess.q)[node.q], np.abs(start.v - guess.v)[node.v]
         name, most = node.joint.name, AWAY * scales[node.v]
         is_elsewhere = name in initial.named("joints") and np.any(ways > most)

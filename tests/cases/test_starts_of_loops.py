@@ -13,6 +13,7 @@ import ffrobot
 A, RATE, STEP = 1.0, 3.0, 1e-5
 D, D_RATE = closed(A)["D"], RATE * (closed(A + STEP)["D"] - closed(A - STEP)["D"]) / (2 * STEP)
 RUN = {"name": "run", "kind": "forward", "end": 0.01, "output_step": 0.01}
+GEAR = {"gear_ratio": 50.0, "rotor_inertia": 1e-5, "stiffness": 100.0, "motor": True}
 SPACES = {"planar": planar, "spatial": in_3d}
 STARTS = {
     "joints": {"joints": {"A": A}, "joint_rates": {"A": RATE}},
@@ -48,6 +49,28 @@ def test_named_joints_keep_their_values(space, start):
 def test_values_that_no_loop_meets_are_told(initial):
     with pytest.warns(ffrobot.FfrobotWarning, match='joints "A".* start away from the values'):
         started("spatial", {"joints": {"A": A}} | initial)
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("initial", [{"joints": {"A": A}, "joint_rates": {"A": RATE}}, {"joints": {"B": -0.5}}])
+def test_gears_in_loops_start_as_asked(initial, space):
+    """Behind a motor on a path: twisted where [initial] has values, else as the motor is; the others close the loop."""
+    run, path = RUN | {"kind": "pcid"}, {"name": "crank", "motor": "A", "value": "0.9 + 0.5*t"}
+    tables = SPACES[space]({name: GEAR if name == "A" else {} for name in SIDES}, [run], trajectory=[path])
+    with ffrobot.solve(ffrobot.make_scene(**tables | {"initial": initial})) as found:
+        start, rate = (A, RATE) if "A" in initial["joints"] else (0.9, 0.5)
+        assert found["run/joints/A/coordinate"][0] == pytest.approx(start, abs=1e-9)
+        assert found["run/joints/A/rate"][0] == pytest.approx(rate, abs=1e-9)
+        assert found["run/joints/D/coordinate"][0] == pytest.approx(closed(start)["D"], abs=1e-9)
+        assert found["run/joints/A/motor_coordinate"][0] == pytest.approx(0.9, abs=1e-12)
+        assert not found.warnings
+
+
+def test_gears_in_loops_that_cannot_start_as_asked_are_told():
+    run, path = RUN | {"kind": "pcid"}, {"name": "rocker", "motor": "D", "value": f"{D!r}"}
+    tables = in_3d({name: GEAR if name == "D" else {"motor": False} for name in SIDES}, [run], trajectory=[path])
+    with pytest.warns(ffrobot.FfrobotWarning, match='joints "D" start away from the values'):
+        ffrobot.solve(ffrobot.make_scene(**tables | {"initial": {"joints": {"A": A, "D": D + 1.5}}}))
 
 
 @pytest.mark.parametrize("last", "CD")
