@@ -131,7 +131,8 @@ class RobotTarget:
             scene["initial"] = scene.get("initial", {}) | initial
         tables = {path.name: link for path, link in files.links.items()}
         for body in scene["body"]:
-            body["link"] = tables.get(body.get("link"), body.get("link")) if "link" in body else None
+            if isinstance(file := body.get("link"), str):
+                body["link"] = tables.get(file, file)
             if body.get("modes") == "auto":  # the linear model needs no choice: all of them
                 del body["modes"]
         return make_scene(folder=self._path.parent, **scene)

@@ -136,6 +136,10 @@ def test_links_of_a_scene_get_files_of_their_own(write, tmp_path):
     with pytest.raises(InputError, match="output: expected a new name, or --force to replace it"):
         ffrobot.fit_measured(scene, measured, vary, motors="locked")
     ffrobot.fit_measured(scene, measured, vary, motors="locked", force=True)
+    inside, link = tmp_path / "inside.toml", LINK.format(E=E, rho=RHO, tip=0.0)  # in a table of the scene
+    tables = ROBOT.replace('body = [{ name = "arm", link = "arm.toml" }]\n', "")
+    inside.write_text(f'{tables}\n[[body]]\nname = "arm"\n[body.link]{link}', encoding="utf-8")
+    assert ffrobot.fit_measured(inside, measured, vary, motors="locked").value[0] == pytest.approx(60e9, rel=1e-6)
 
 
 def test_values_are_replaced_where_they_stand():
