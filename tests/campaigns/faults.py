@@ -63,7 +63,7 @@ FAULTS = [
           "s * c**3 + (2 * S_22", "tests/actuation/test_patched_links_3d.py"),
     Fault(PATCHES + "patches.py", "required = F_p @", "required = 2.0 * F_p @", PATCHED),
     Fault("actuation/control/lqr.py", "np.eye(len(R)) + B.T @ X @ B, B.T",
-          "np.eye(len(R)), B.T", "tests/actuation/test_closed_loop.py"),
+          "np.eye(len(R)), B.T", "tests/actuation/test_controllers.py"),
     Fault("actuation/control/margins.py", 'record.rate == "measured"',
           'record.rate != "measured"', "tests/actuation/test_margins.py"),
     Fault(RECURSION + "inverse/newton_euler.cpp", "node.rotor_turns * A[Space::axis] + node",

@@ -1,0 +1,104 @@
+"""Sampled control of links that bend, by patches: closed forms of their damping, what sensors read."""
+
+import numpy as np
+import pytest
+from beam_links import paper_link
+from loop_scenes import loop
+
+from ffrobot.actuation.control.robot import volts_on_file
+from ffrobot.mbs.quantities.motion import node_of
+from ffrobot.run.solve import prepare_scene, solve_scene
+from ffrobot.scene.load import make_scene
+
+PATCHES = {
+    "body": "link", "count": 10, "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9,
+    "d31": 110e-12, "structural": False,
+}  # fmt: skip
+
+
+def held_link(link, *analyses, **keys):
+    """A cantilever whose root a rotor holds like a wall, sagging; its tip is hit for 2 ms."""
+    inverse = {"name": "inverse", "kind": "fcid", "shape": "static", "end": keys.pop("end", 0.4), "output_step": 5e-4}
+    hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
+    joint = {"name": "O", "type": "revolute", "between": ["ground", "link.root"], "rotor_inertia": 1e4}
+    return make_scene(
+        name="held", gravity=[0.0, -9.81], body=[{"name": "link", "link": link}], joint=[joint],
+        trajectory=[{"name": "stand", "joint": "O", "value": "0"}], pzt=[PATCHES | keys.pop("pzt", {})],
+        analysis=[inverse, *(analysis | {"disturbance": hit, "tolerance": 1e-6} for analysis in analyses)], **keys,
+    )  # fmt: skip
+
+
+def decay(solution, name):
+    """Damping ratio and amplitude of the lowest mode after the hit, from the envelope of its vibration."""
+    outcome, node = solution.outcomes[name], node_of(solution.analyses[name].run, "link")
+    p = outcome.q[:, node.p_q.start] - solution.outcomes["inverse"].q[:, node.p_q.start]
+    omega = np.sqrt(node.body.stiffness[0])
+    envelope = np.hypot(p, outcome.v[:, node.p_v.start] / omega)
+    ring = (outcome.time > 0.01) & (envelope > 0.02 * envelope.max())
+    return -np.polyfit(outcome.time[ring], np.log(envelope[ring]), 1)[0] / omega
+
+
+@pytest.mark.parametrize("sensor", [pytest.param("ideal", marks=pytest.mark.nightly), "pzt"])
+def test_patches_add_the_damping_that_is_asked_for(sensor):
+    control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": sensor}
+    loops = loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4)
+    scene = held_link(paper_link(count=3), *loops, end=0.2)
+    solution = solve_scene(scene)
+    assert abs(decay(solution, "free")) < 1e-4
+    assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("space", "inverse"),
+    [("planar", {"kind": "pcid"}), ("planar", {"kind": "fcid", "shape": "zero"}),
+     ("spatial", {"kind": "fcid", "shape": "static"})],
+)  # fmt: skip
+def test_a_beam_that_is_welded_needs_no_trajectory(space, inverse):
+    """Its tip is hit, and patches damp it as is asked for: nothing moves but the link."""
+    control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": "ideal"}
+    hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
+    solution = solve_scene(make_scene(
+        name="welded", space=space, gravity=[0.0, 0.0] if space == "planar" else [0.0, 0.0, 0.0],
+        body=[{"name": "link", "link": paper_link(count=3)}], pzt=[PATCHES],
+        joint=[{"name": "O", "type": "weld", "between": ["ground", "link.root"]}],
+        analysis=[{"name": "inverse", "end": 0.15, "output_step": 5e-4} | inverse,
+                  loop(sample_time=1e-4, controller=[control], disturbance=hit)],
+    ))  # fmt: skip
+    assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
+
+
+def test_all_integrators_go_from_sample_to_sample_alike():
+    """Loads jump at every sample: methods that look back must not look across."""
+    control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
+    names = ["dop853", "dopri5", "radau", "generalized-alpha"]
+    loops = [loop(name, integrator=name, sample_time=2e-3, controller=[control]) for name in names]
+    solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.04))
+    first = solution.outcomes["dop853"].q
+    sag = solution.outcomes["inverse"].q
+    for name in names[1:]:
+        assert solution.outcomes[name].status == "completed"
+        assert np.abs(solution.outcomes[name].q - first).max() < 1e-3 * np.abs(first - sag).max(), name
+
+
+@pytest.mark.parametrize(("sensor", "unread"), [("pzt", ["LQR: no sensor reads modal/link/2"]), ("ideal", [])])
+def test_lqr_names_what_no_sensor_reads(sensor, unread):
+    """One patch tells one mode of two."""
+    control = {"kind": "lqr", "modes": 2, "sensor": sensor}
+    patch = {"count": 1, "allocation": "least-squares"}
+    scene = held_link(paper_link(count=3), loop(sample_time=1e-3, controller=[control]), end=5e-3, pzt=patch)
+    lines = solve_scene(scene).outcomes["loop"].details.warnings
+    assert [line.partition(",")[0] for line in lines if "no sensor reads" in line] == unread
+
+
+def test_a_patch_reads_the_charge_of_its_bending():
+    """A force at the tip of a cantilever turns its sections by F (L x − x²/2)/(E I)."""
+    solution = prepare_scene(held_link(paper_link(), loop()))
+    of_link, link = solution.patches["link"], solution.bodies["link"].carrying
+    EI = 2.068427e11 * 0.025 * 0.015**3 / 12
+    p = link.modal_transform @ (link.points["tip"].translation[1] / link.stiffness)
+    edges = of_link.arrays["link"].edges
+    turn = np.diff(edges - edges**2 / 2, axis=1)[:, 0] / EI
+    capacitance = 1e-7
+    expected = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2 * turn / capacitance
+    volts = volts_on_file(of_link, "link", capacitance)["link"] @ p  # of ten modes: patches at the ends miss the others
+    np.testing.assert_allclose(volts, expected, atol=2e-2 * expected.max())
