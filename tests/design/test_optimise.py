@@ -192,7 +192,7 @@ def test_catalogue_beside_a_number(write):
 def test_places_of_patches(write, tmp_path):
     """Two patches where the largest voltage over a path is least: as `kind = "placement"` says of all pairs.
 
-    Pairs with one patch in the right place are compared.
+    Pairs whose first patch is in the right place are compared.
     """
     section = {"shape": "rectangle", "height": 0.004, "width": 0.03}
     link = BEAM | {"modes": FREE, "mesh": {"elements": 10}, "geometry": BEAM["geometry"] | {"section": section}}
@@ -212,7 +212,7 @@ def test_places_of_patches(write, tmp_path):
     with ffrobot.solve(path) as results:
         best, places = results["placed/placement/best/centers"], results["placed/placement/candidates"]
         voltage = results["placed/placement/best/value"]
-    rows = ", ".join(f"{a}:{b}" for a in places for b in places if b - a > 0.0999 and {a, b} & set(best))
+    rows = ", ".join(f"{a}:{b}" for a in places for b in places if b - a > 0.0999 and a == best[0])
     found = ffrobot.optimise(
         path, [f"pzt.beam.centers.0,pzt.beam.centers.1 in {{{rows}}}"],
         minimise="peak pzt.beam.required_voltage",
@@ -336,18 +336,23 @@ JOLTED = ARM | {
 MOST = 4e-6 * OMEGA**2  # of |α| = A ω² |12 sin² φ − 16 sin⁴ φ|, between the outputs at 0.1 and 0.101 s
 
 
+@pytest.mark.nightly
+def test_limits_of_peaks_between_outputs(write):
+    """There is a least N with (J / N + J_m N) α within a limit."""
+    share = 0.01  # J / N + J_m N, kg m²
+    within = ffrobot.optimise(
+        write(JOLTED), [f"{RATIO}=20:100"], minimise=f"value {RATIO}", subject_to=[f"{MOTOR} <= {share * MOST}"]
+    )
+    assert within.value == pytest.approx((share - np.sqrt(share**2 - 4.0 * J * 2e-5)) / 4e-5, rel=2e-3)
+
+
 def test_peaks_between_outputs_count(write):
-    """The torque (J / N + J_m N) α is least at N = √(J / J_m), or there is a least N within a limit; its power."""
+    """The torque (J / N + J_m N) α is least at N = √(J / J_m); its power."""
     path = write(JOLTED)
     found = ffrobot.optimise(path, [f"{RATIO}=20:400"], minimise=MOTOR)
     assert found.value == pytest.approx(2.0 * np.sqrt(J * 2e-5) * MOST, rel=1e-3)
     (note,) = (line for line in str(found).splitlines() if MOTOR in line and line.startswith("note"))
     assert f"near outputs, {found.value:.6g} between them, which counts" in note
-    share = 0.01  # J / N + J_m N, kg m²
-    within = ffrobot.optimise(
-        path, [f"{RATIO}=20:100"], minimise=f"value {RATIO}", subject_to=[f"{MOTOR} <= {share * MOST}"]
-    )
-    assert within.value == pytest.approx((share - np.sqrt(share**2 - 4.0 * J * 2e-5)) / 4e-5, rel=2e-3)
     power = ffrobot.optimise(path, [f"{RATIO} in {{50}}"], minimise="peak joints.shoulder.power")
     sine, cosine = np.sin(x := np.linspace(0.0, np.pi, 10001)), np.cos(x)
     of_power = (12 * sine**2 - 16 * sine**4) * 4 * sine**3 * cosine

@@ -227,7 +227,7 @@ def test_jitter_is_told_apart_from_the_motion(tmp_path):
 def test_joints_go_by_name_in_any_order_and_file(tmp_path, ffrobot):
     """A JointTrajectory in YAML with joints the other way round, in degrees, by the command: what the CSV is."""
     rows = motion(averaged_step(np.array([0.6, 0.3])))
-    scene_file, expected = arm(tmp_path), None
+    scene_file = arm(tmp_path)
     points = [
         {"positions": [float(np.degrees(rows[name][k])) for name in ("knee", "hip")],
          "time_from_start": {"sec": 0, "nanosec": round(1e9 * TIMES[k])}}
@@ -235,7 +235,7 @@ def test_joints_go_by_name_in_any_order_and_file(tmp_path, ffrobot):
     ]  # fmt: skip
     message = {"joint_names": ["knee", "hip"], "points": points}
     (tmp_path / "path.yaml").write_text(json.dumps(message))
-    expected = smooth_motion(scene_file, table(tmp_path / "path.csv", TIMES, **rows))
+    expected = diagnosed(scene_file, table(tmp_path / "path.csv", TIMES, **rows))
     found = smooth_motion(scene_file, tmp_path / "path.yaml", degrees=True)
     assert found.before.residual == pytest.approx(expected.before.residual, rel=1e-6)
     printed = ffrobot.ok("smooth", scene_file, "--path", tmp_path / "path.yaml", "--degrees").stdout
