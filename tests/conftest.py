@@ -91,20 +91,21 @@ def pytest_collection_modifyitems(config, items):
 
     Of the night are tests with that mark and those of nightly.txt.
     """
-    of_night = {f"tests/{line.partition(' | ')[0]}" for line in NIGHTLY.read_text(encoding="utf-8").splitlines()[4:]}
-    config.unknown_nights = of_night - {item.nodeid for item in items} - {_function(item) for item in items}
-    if config.getoption("--nightly"):
-        return
+    beside = dict(line.split(" | ") for line in NIGHTLY.read_text(encoding="utf-8").splitlines()[4:])
+    of_night = {f"tests/{name}" for name in beside}
     seeds = defaultdict(set)
     for item in items:
         seeds[_function(item)].add(_seed(item))
     many = {name for name, of_name in seeds.items() if len(of_name) >= MANY_SEEDS}
-    left_out = [item for item in items if item.get_closest_marker("nightly")
+    left_out = {item for item in items if item.get_closest_marker("nightly")
                 or of_night & {item.nodeid, _function(item)}
-                or (_function(item) in many and (_seed(item) or 0) % 5)]  # fmt: skip
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        left_out = set(left_out)
+                or (_function(item) in many and (_seed(item) or 0) % 5)}  # fmt: skip
+    by_day = {_function(item) for item in items if item not in left_out}
+    names = seeds.keys() | {item.nodeid for item in items}
+    config.wrong_nights = [name for name, day in beside.items()
+                           if f"tests/{name}" not in names or f"tests/{day}" not in by_day]  # fmt: skip
+    if left_out and not config.getoption("--nightly"):
+        config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
 
 

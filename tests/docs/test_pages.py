@@ -19,8 +19,9 @@ from palette import SAME, WIDEST, difference, pictures, reduced  # noqa: E402
 
 # What their commands do has tests of its own: studies, solids, resumed runs, paths, tracking, controllers, pictures.
 LONG = {
-    "compare", "control", "design", "drive", "hammer", "long_runs", "machine_paths", "measured", "modes",
+    "compare", "control", "design", "drive", "exchange", "hammer", "long_runs", "machine_paths", "measured", "modes",
     "motor_sizing", "solid", "space", "speed", "stiffness", "sweep", "tracking", "tutorial_urdf", "vibration", "view",
+    "voltages",
 }  # fmt: skip
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 

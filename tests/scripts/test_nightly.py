@@ -24,9 +24,9 @@ def test_lines_are_in_order_and_each_is_once():
     assert sorted(set(LINES)) == LINES
 
 
-def test_every_line_is_of_a_test_that_is_collected(request):
+def test_tests_of_the_night_are_collected_and_those_beside_them_run_by_day(request):
     """Where all tests are: pytest without files or words that choose."""
     chosen = request.config.option
     if chosen.file_or_dir or chosen.keyword or chosen.markexpr:
         pytest.skip("not all tests were collected")
-    assert not request.config.unknown_nights
+    assert request.config.wrong_nights == []
