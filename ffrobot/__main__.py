@@ -12,9 +12,14 @@ def main() -> None:
         signal.signal(number, EndOfCommand())
     from .cli import main as command_line
 
-    command_line()
-    if "mpi4py.MPI" not in sys.modules:  # which ends with the interpreter
-        end_process(0)
+    code = 0
+    try:
+        command_line()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 1
+    if "mpi4py.MPI" in sys.modules:  # which ends with the interpreter
+        sys.exit(code)
+    end_process(code)
 
 
 if __name__ == "__main__":
