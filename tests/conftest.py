@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from forked_commands import LIMIT, Commands
 
+from ffrobot.batch import batch
 from ffrobot.common.cache import cache_folder
 from ffrobot.common.parallel import environment_without_mpi
 from ffrobot.mesh import form_cache
@@ -51,7 +52,7 @@ class Command:
 
     def __call__(self, *arguments, cwd=None, timeout=LIMIT, env=None, **options):
         arguments = [str(argument) for argument in arguments]
-        if arguments and arguments[0] in STUDIES and "-j" not in arguments:  # tests go side by side already
+        if arguments and arguments[0] in STUDIES and "-j" not in arguments:  # as `own_cache`
             arguments += ["-j", "1"]
         if not options and env is None and OTHER_COMMAND is None:
             return self.forks.run(arguments, self.environment, cwd, timeout)
@@ -157,13 +158,15 @@ def own_made(folder):
 def own_cache(shared_folder):
     """Nothing that tests compute goes to the user's cache or comes from there; returns the cache of the test run.
 
-    Finite element forms are compiled once for all tests, those with caches of their own included.
+    Finite element forms are compiled once for all tests, those with caches of their own included. Studies begin one
+    process, unless they are told how many.
     """
     cache = shared_folder / "cache"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
         forms = cache_folder("forms")
         patch.setattr(form_cache, "cache_folder", lambda _, name: own_made(forms / name))
+        patch.setattr(batch, "processors", lambda: 1)  # tests go side by side already
         yield cache
 
 

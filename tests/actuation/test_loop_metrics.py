@@ -78,7 +78,7 @@ def test_on_a_circle_vibration_is_the_diameter():
     assert vibration(TIME, turning, 6 * np.pi / 41, 41 / (2 * np.pi)) == pytest.approx(0.04, rel=0.01)
 
 
-def testsettling_is_where_the_error_comes_down_to_its_share():
+def test_settling_is_where_the_error_comes_down_to_its_share():
     """e^{−5 t} comes to 5 % at ln 20/5, between the times at which it is known, whatever these are."""
     for times in (np.linspace(0.0, 2.0, 101), np.linspace(0.0, 1.9, 73) ** 1.1):
         assert settling(times, np.exp(-5.0 * times)) == pytest.approx(np.log(20.0) / 5.0, rel=1e-5)
