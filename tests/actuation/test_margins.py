@@ -154,7 +154,7 @@ def test_integral_and_differences_are_in_the_loop():
 
 
 def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
-    """Verdict of the nonlinear loop about rest, from a small blow on the tip."""
+    """Record of the nonlinear loop about rest, from a small blow on the tip."""
     loop = {
         "name": "loop", "kind": "closed-loop", "actuation": "rest", "sample_time": sample_time, "delay": delay,
         "controller": [{"kind": "joint-pid"} | gains],
@@ -165,7 +165,7 @@ def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
         np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop],
         trajectory=[{"name": "still", "joint": "J0", "value": "0.3"}],
     )  # fmt: skip
-    return solve_scene(arm)
+    return solve_scene(arm).outcomes["loop"].details
 
 
 def shaking(record):
@@ -186,7 +186,7 @@ def grows(record, calm):
 @pytest.mark.parametrize("delay", [pytest.param(0.0, marks=pytest.mark.nightly), 0.003])
 def test_margin_is_where_the_simulated_loop_begins_to_grow(delay, scaled):
     sample_time, gains = 0.002, {"proportional": {"J0": 2.0}, "derivative": {"J0": 0.2}}
-    record = simulated(3, gains, sample_time, delay).outcomes["loop"].details
+    record = simulated(3, gains, sample_time, delay)
     assert (record.metrics.verdict, record.advice) == ("stable", ())
     factor, later = record.margins.gain, record.margins.delay
     assert 1.0 < factor < 1e3
@@ -194,10 +194,10 @@ def test_margin_is_where_the_simulated_loop_begins_to_grow(delay, scaled):
     for part in (0.93, 1.07):
         if scaled == "gains":
             larger = {what: {"J0": part * factor * of["J0"]} for what, of in gains.items()}
-            run = simulated(3, larger, sample_time, delay)
+            found = simulated(3, larger, sample_time, delay)
         else:
-            run = simulated(3, gains, sample_time, delay + part * later)
-        assert grows(run.outcomes["loop"].details, record) == (part > 1.0)
+            found = simulated(3, gains, sample_time, delay + part * later)
+        assert grows(found, record) == (part > 1.0)
 
 
 @pytest.mark.parametrize("seed", range(24))
