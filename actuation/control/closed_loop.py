@@ -172,7 +172,8 @@ class ClosedLoop(SampledAnalysis):
         every = ((model, feedback.behind(*filtering)) for model, feedback in found)
         loops = [loop for loop in every if eigenvalue_count(loop, self.sample_time, self.delay) <= MOST]
         gears = bool(plant.tree.gears)
-        record = loop_record(self, setup, loop, acting, runs, loops=loops, lowest=lowest, gears=gears)
+        with run.arithmetic:
+            record = loop_record(self, setup, loop, acting, runs, loops=loops, lowest=lowest, gears=gears)
         record = replace(record, feedback=along)
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T

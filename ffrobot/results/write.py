@@ -40,7 +40,8 @@ def results_image(solution: Solution) -> bytes:
     with in_memory() as file:
         _write_head(file, solution)
         for name, result in solution.analyses.items():
-            _write_analysis(file.create_group(name), solution, result)
+            with result.run.arithmetic:
+                _write_analysis(file.create_group(name), solution, result)
         if (run := solution.unread) is not None:
             _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
         write_state(file, solution)

@@ -197,7 +197,7 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
         finally:
             interruption.at_once = False
         try:
-            with of_file(solution.scene.path):
+            with of_file(solution.scene.path), run.arithmetic:
                 result = _result(solution, run, results)
         except Exception as error:  # raised once the integration is kept
             return _unread(replace(solution, analyses=results, seconds=seconds), run, error)

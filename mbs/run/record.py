@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from ..model.divided_link import LinkInPieces
 
+HUGE = 1e100  # rates (rad/s, m/s), beyond which squares of what follows from them may be no numbers
 ADVICE = {
     "step underflow": "no step is small enough there",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
@@ -211,6 +212,12 @@ class Run:
     def failed(self) -> bool:
         """Whether the run missed its purpose; some kinds may end early without failing."""
         return self.status not in ("completed", *self.analysis.findings)
+
+    @property
+    def arithmetic(self) -> np.errstate[Any]:
+        """For what follows from a run: one that ended early, or diverges, may grow beyond all numbers."""
+        is_calm = self.status == "completed" and np.abs(self.v).max(initial=0.0) < HUGE
+        return np.errstate() if is_calm else np.errstate(over="ignore", invalid="ignore")
 
     def check_completed(self, how_to_go_on: str = "") -> None:
         """Raise `SolveError` with advice where the run failed."""

@@ -227,3 +227,21 @@ def test_verdicts_are_those_of_the_sampled_model_and_the_run(seed):
     about = about_loop(case.tables())
     assert about["spectral_radius"] == pytest.approx(case.radius(), abs=1e-5)
     assert about["verdict"] in case.expected()
+
+
+@pytest.mark.parametrize(("end", "verdict"), [(0.43, "grows"), (2.0, "diverges")])
+def test_loops_that_grow_beyond_all_numbers_are_judged_without_a_word_of_numpy(recwarn, end, verdict):
+    """A mass on a slider, whose error grows 2.449-fold a sample: beyond 1e154 squares overflow, and steps end."""
+    body = {"name": "a", "rigid": {"mass": 1.0, "inertia": 0.01, "center": [0.2, 0.0], "points": {"root": [0.0, 0.0]}}}
+    gains = {"kind": "joint-pid", "proportional": {"O": 1e7}, "derivative": {"O": 1.0}}
+    loop = {"name": "l", "kind": "closed-loop", "actuation": "i", "sample_time": 0.001, "controller": [gains]}
+    results = ffrobot.solve(
+        ffrobot.make_scene(
+            name="slider", gravity=[0.0, 0.0], body=[body],
+            joint=[{"name": "O", "type": "prismatic", "axis": [1.0, 0.0], "between": ["ground", "a.root"]}],
+            trajectory=[{"name": "t", "joint": "O", "via": [0.0, 0.5], "duration": 0.3}],
+            analysis=[of | {"end": end, "output_step": 0.01} for of in ({"name": "i", "kind": "pcid"}, loop)],
+        )
+    )  # fmt: skip
+    assert not [str(one.message) for one in recwarn if issubclass(one.category, RuntimeWarning)]
+    assert results.attributes("l/control")["verdict"] == verdict
