@@ -33,7 +33,7 @@ def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
         for point in (f"{body}.{label}" for label in labels):
             yield f"points/{point}/deflection", space.along(deflection(run, point))
     for joint in solution.scene.joint:
-        for key, values in _of_joint(solution, of, joint):
+        for key, values in _of_joint(of, joint):
             yield f"joints/{joint.name}/{key}", values
     for trajectory in followed_trajectories(run):
         yield f"trajectories/{trajectory.name}/force", path_force(run, trajectory.name)
@@ -49,7 +49,7 @@ def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
         yield f"pzt/{name}/required_voltage", voltages.required
 
 
-def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator[tuple[str, Array]]:
+def _of_joint(of: Histories, joint: JointRecord) -> Iterator[tuple[str, Array]]:
     run, acting, is_single = of.run, of.reactions[joint.name], len(joint.units) == 1
     yield "reaction", run.space.along(acting.force)
     if not (run.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
@@ -57,7 +57,7 @@ def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator
     if (moving := joint_motion(run, joint.name)) is not None:
         yield "rate", np.squeeze(moving[1], 1) if is_single else moving[1]
     moment, motor = motor_moments(run).get(joint.name), motor_motion(run, joint.name)
-    if moment is not None and joint in solution.scene.motor_joints:
+    if moment is not None and joint.name in run.model.motors:
         moment = np.squeeze(moment, 1) if is_single else moment
         yield "moment", moment
         if joint.given_gear_ratio is not None or motor is not None:
