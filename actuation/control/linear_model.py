@@ -17,7 +17,7 @@ from ...common.errors import InputError, check_known, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.libraries import scipy
-from ...common.structs import struct
+from ...common.structs import kept, struct
 from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions
 from ...mbs.linear.joint_conditions import robot_modes as modes_of
 from ...mbs.linear.linearisation import LinearMechanism
@@ -264,12 +264,14 @@ STILL = 1e-10  # of the largest effect on its kind of output: less is round-off
 OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mode
 
 
+@kept
 def robot_modes(model: LinearModel) -> RobotModes:
     """Poles and shapes of a model, about a frozen configuration."""
     K, D, _, _ = model.second_order
     return modes_of(K, D, np.linalg.inv(np.linalg.cholesky(model.mass)).T, model.transformation)
 
 
+@kept
 def locked_frequencies(model: LinearModel) -> Array:
     """Undamped frequencies, Hz, the lowest first, with the shafts of all motors locked: of NᵀK̂ N, BᵀN = 0."""
     K, _, B, _ = model.second_order
@@ -323,19 +325,25 @@ def _scaled(columns: Array, names: Sequence[str]) -> Array:
     return found
 
 
-def _reach(model: LinearModel, columns: Array, left: bool) -> Reachability:
+@kept
+def _null_vectors(model: LinearModel) -> list[tuple[ComplexArray, ComplexArray]]:
+    """Left and right vectors (f, count) at which λ² I + λ D̂ + K̂ is 0, λ the first pole of each mode."""
     K, D, _, _ = model.second_order
-    modes, unit = robot_modes(model), np.eye(model.freedom)
-    scale = np.abs(modes.poles).max(initial=0.0) ** 2
-    measure = np.zeros(model.freedom)
-    for k, pole in enumerate(modes.poles[:, 0]):
-        P = pole**2 * unit + pole * D + K
-        U, values, V = np.linalg.svd(P)
+    poles, unit, found = robot_modes(model).poles, np.eye(model.freedom), []
+    scale = np.abs(poles).max(initial=0.0) ** 2
+    for pole in poles[:, 0]:
+        U, values, V = np.linalg.svd(pole**2 * unit + pole * D + K)
         count = max(1, int(np.count_nonzero(values < RIGID**2 * scale)))
-        vectors = U[:, -count:] if left else V[-count:].conj().T
-        by_rate = pole * columns[model.freedom :] if len(columns) > model.freedom else 0.0
-        reached = vectors.conj().T @ columns if left else vectors.T @ (columns[: model.freedom] + by_rate)
-        padded = np.zeros((count, max(count, reached.shape[1])), dtype=complex)
+        found.append((U[:, -count:].copy(), V[-count:].conj().T))
+    return found
+
+
+def _reach(model: LinearModel, columns: Array, left: bool) -> Reachability:
+    modes, measure = robot_modes(model), np.zeros(model.freedom)
+    for k, (of_left, of_right) in enumerate(_null_vectors(model)):
+        by_rate = modes.poles[k, 0] * columns[model.freedom :] if len(columns) > model.freedom else 0.0
+        reached = of_left.conj().T @ columns if left else of_right.T @ (columns[: model.freedom] + by_rate)
+        padded = np.zeros((len(reached), max(reached.shape)), dtype=complex)
         padded[:, : reached.shape[1]] = reached
         measure[k] = np.linalg.svd(padded, compute_uv=False)[-1]
     names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(modes.frequency, 1)]

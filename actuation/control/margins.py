@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -26,11 +27,12 @@ from ...common.structs import struct
 from ...common.toml_files import toml_key
 from .linear_model import LinearModel, locked_frequencies
 from .records import ControllerRecord, JointPid, ModalVelocity
-from .sampling import sampled
+from .sampling import SampledModel, sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to round-off
 LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times
 FEW, MOST = 150, 600  # eigenvalues of a loop: margins are sought for so many; for more than the second none are found
+PLANTS = 16  # that are kept: gains are sought for the same ones, of several configurations in turn
 GRID = 60  # points of the search for the first crossing, before bisection
 RELATIVE = 1e-3  # to which margins are found
 LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
@@ -161,9 +163,25 @@ def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexAr
 
 def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
     """Return eigenvalues of the sampled loop: plant, commands on their way, and controller states."""
-    seen, felt = _readings(model, feedback.outputs)
-    columns = model.inputs(feedback.inputs)
-    lag, wait = np.zeros((2, len(columns))) if feedback.late is None else feedback.late
+    late = None if feedback.late is None else tuple(map(tuple, feedback.late))
+    plant, y = _plant(model, feedback.inputs, feedback.outputs, late, T, delay)
+    F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
+    return np.asarray(np.linalg.eigvals(F), dtype=complex)
+
+
+@lru_cache(maxsize=PLANTS)
+def _plant(
+    model: LinearModel,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    late: tuple[tuple[float, ...], ...] | None,
+    T: float,
+    delay: float,
+) -> tuple[SampledModel, Array]:
+    """The sampled plant, and the readings of its states: those of a loop whatever its gains are."""
+    seen, felt = _readings(model, outputs)
+    columns = model.inputs(inputs)
+    lag, wait = np.zeros((2, len(columns))) if late is None else np.array(late)
     slow = np.flatnonzero(lag)
     A, B, n = model.A, model.B[:, columns], len(model.A)
     A = np.block([[A, B[:, slow]], [np.zeros((len(slow), n)), -np.diag(1.0 / lag[slow])]])
@@ -175,8 +193,7 @@ def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: fl
         places = plant.last.copy()
         places[slow] = n + np.arange(len(slow))
         y[:, places] = felt[:, columns]
-    F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
-    return np.asarray(np.linalg.eigvals(F), dtype=complex)
+    return plant, y
 
 
 def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
@@ -270,13 +287,17 @@ def joint_inertia(model: LinearModel) -> Array | None:
 
 
 def suggested_gains(
-    models: Sequence[LinearModel], T: float, delay: float = 0.0, side: Literal["joint", "motor"] = "joint"
+    models: Sequence[LinearModel],
+    T: float,
+    delay: float = 0.0,
+    side: Literal["joint", "motor"] = "joint",
+    most_times: int = MOST_TIMES,
 ) -> Suggestion | None:
     """PD gains for all motors to start with; None where none are found.
 
     P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and other joints locked,
     the largest of the `models`. ω is a third of the lowest frequency with locked motors, with 30 samples a period at
-    least, and is made smaller until the sampled loops of all models stay stable with twice the gains.
+    least, and is made smaller until the sampled loops of all models stay stable with twice the gains, `most_times`.
     """
     inertias = [joint_inertia(model) for model in models]
     known = [np.diag(inertia) for inertia in inertias if inertia is not None]
@@ -286,7 +307,7 @@ def suggested_gains(
     lowest = min((locked_frequencies(model).min(initial=np.inf) for model in models), default=np.inf)
     omega = 2 * np.pi * min(FRACTION * lowest, 1 / (SAMPLES * T))
     names = [models[0].input_names[k].removeprefix("joint/") for k in _motor_inputs(models[0])]
-    for _ in range(MOST_TIMES):
+    for _ in range(most_times):
         P, D = ({n: float(f"{v:.2g}") for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
         if min(*P.values(), *D.values()) < SMALLEST:
             return None  # no scene may have such gains
@@ -305,8 +326,7 @@ def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] |
     """
     lowest = min(locked_frequencies(model).min(initial=np.inf) for model in models)
     for T in SAMPLE_TIMES if np.isfinite(lowest) else ():
-        found = suggested_gains(models, T)
-        if found is not None and found.bandwidth > 0.999 * FRACTION * lowest:
+        if FRACTION * lowest * SAMPLES * T <= 1.001 and (found := suggested_gains(models, T, most_times=1)) is not None:
             return found, T
     return None
 
