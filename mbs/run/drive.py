@@ -295,9 +295,9 @@ class _Integration:
             sizes = np.maximum(sizes, np.abs(values).max(axis=0))
             return motion.at(telling(motion.time, values, sizes))
 
-        blocks = (np.arange(first, min(first + LOOKS.most, len(times))) for first in range(0, len(times), LOOKS.most))
-        parts = []
-        for rows in blocks:
+        size, parts = LOOKS.all_up_to, []
+        for first in range(0, len(times), size):
+            rows = np.arange(first, min(first + size, len(times)))
             parts.append(thinned(self.motion(at(rows), times[rows])))
             if not progress(float(times[-1])):
                 break

@@ -4,8 +4,7 @@ An integration keeps the ends of its steps, which resolve whatever rings above i
 where steps are long. Those from which the others follow by straight lines are looked at, and all about the highest.
 
 Peaks of an arm that rings are right to 1e-5, means over time to 1e-4, whatever the outputs are; those of smooth pulses
-that last 1e-4 of the run to 1e-2 (tests/mbs/test_peaks_between_outputs.py). Of runs that ring at every step for more
-than `LOOKS.most` of them, every second or third state is looked at: reactions may peak by 1e-2 higher.
+that last 1e-4 of the run to 1e-2 (tests/mbs/test_peaks_between_outputs.py).
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ class _Looks(NamedTuple):
     parts_of_step: int = 4  # in runs whose differences count: their peaks have to be known as well as their derivatives
     all_up_to: int = 16_384  # states of a loop; of more those from which others follow; of repeated runs as many a part
     follows: float = 1e-4  # of the largest value, by which a straight line may miss one: the error of means
-    most: int = 65_536  # of these, so that what rings all the time has an end
+    most: int = 1_048_576  # states, all of which are looked at where what rings leaves none out
     thinned: float = 0.98  # of the states, from one pass over them to the next: fewer passes than by the last few
     evenly: int = 2000  # states beside, for means over time
     highest: int = 4  # local maxima of each quantity about which all states are looked at: alike ones compete
@@ -47,7 +46,8 @@ def new_samples(times: Array, analysis: IntegratedAnalysis, size: int) -> _core.
     if not size or duration <= 0.0:
         return None
     parts = LOOKS.parts_of_step if analysis.keep_steps or analysis.is_repeated else 1
-    return _core.Samples(duration / LOOKS.intervals, max(LOOKS.kept // size, LOOKS.intervals), parts)
+    most = max(min(LOOKS.kept // size, LOOKS.most), LOOKS.intervals)
+    return _core.Samples(duration / LOOKS.intervals, most, parts)
 
 
 def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:
@@ -73,8 +73,7 @@ def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
 def telling(times: Array, values: Array, sizes: Array) -> Indices:
     """Numbers of the samples at `times` (k,), s, between which `values` (k, columns) are linear.
 
-    But for `LOOKS.follows` of their `sizes` (columns,). The ends of `LOOKS.evenly` intervals are among them. Of what
-    rings all the time there are too many: then those about the highest, and some at even distances for the means.
+    But for `LOOKS.follows` of their `sizes` (columns,). The ends of `LOOKS.evenly` intervals are among them.
     """
     chain, misses = np.arange(len(times)), LOOKS.follows * sizes
     while len(chain) > 2:
@@ -86,8 +85,6 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
         if len(left) > LOOKS.thinned * len(chain):
             break
         chain = left
-    if len(chain) > LOOKS.most:
-        chain = np.union1d(chain[:: -(-len(chain) // LOOKS.most)], about_highest(np.arange(len(times)), values, 2))
     return np.union1d(chain, np.arange(0, len(times), -(-len(times) // LOOKS.evenly)))
 
 
