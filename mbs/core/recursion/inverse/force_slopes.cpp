@@ -128,9 +128,15 @@ MatrixXd stiffness_at_rest(const Mechanism<Space> &m, const Scene &scene, double
   AtRest<Space> at(m, scene, t, q, w);
   VectorXd state = VectorXd::Zero(m.n_q + m.n_v);
   state.head(m.n_q) = q;
-  // Under these forces nothing accelerates, and lambda are the multipliers that the elimination finds.
-  const VectorXd forces = at.required(lambda.data());
-  w.keep(independent);
+  // The gradients of equations that are coordinates of joints do not change, and all motors may be locked by such ones.
+  VectorXd changing = VectorXd::Zero(lambda.size());
+  std::vector<int> kept;
+  for (const int r : independent)
+    if (m.constraints[r].model.kind != ConstraintKind::coordinate)
+      changing[r] = lambda[r], kept.push_back(r);
+  // Under these forces nothing accelerates, and `changing` are the multipliers that the elimination finds.
+  const VectorXd forces = at.required(changing.data());
+  w.keep(kept);
   const Derivatives found = derivatives_under(m, scene, t, state, forces, VectorXd::Zero(lambda.size()).eval(), w);
   MatrixXd K = -matrix_product(mass_matrix(q.data(), at.forces, w), found.a_q), unused = MatrixXd::Zero(m.n_v, m.n_v);
   add_transposed_product(found.value_q, found.lambda_q, K, -1);
