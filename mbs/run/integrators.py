@@ -199,14 +199,20 @@ def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     )
 
 
-def beyond_round_off(tolerance: float, round_off: float) -> str:
-    """A sentence where round-off, which may add errors of `round_off` in all, needs a larger tolerance; else ""."""
-    if not round_off > tolerance:
+def beyond_round_off(tolerance: float, run: _core.TreeRun) -> str:
+    """A sentence where round-off of `run` needs a larger tolerance; else "".
+
+    It adds the errors that the core has found of its steps. Where equations hardly differ they determine forces less
+    well: with r the least ratio of postures (`describe_posture`), to double precision over r².
+    """
+    of_posture = float(np.finfo(float).eps) / run.least_ratio**2 if run.least_ratio > 0.0 else 0.0
+    if not (round_off := max(run.rounding, of_posture)) > tolerance:
         return ""
     digit = 10.0 ** np.floor(np.log10(round_off))
+    cause = "parts with next to no inertia" if of_posture < 0.01 * round_off else "nearly singular postures"
     return (
-        f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as parts with next to"
-        f" no inertia amplify round-off of forces; errors may reach {round_off:.1g} of the peaks, within tolerance ="
+        f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as {cause} amplify"
+        f" round-off of forces; errors may reach {round_off:.1g} of the peaks, within tolerance ="
         f" {np.ceil(round_off / digit) * digit:.1g}"
     )
 

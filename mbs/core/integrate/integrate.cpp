@@ -27,9 +27,12 @@ constexpr double radians_too_long = 5, notable = 0.1;
 // steps that are much shorter. Of methods that damp what they do not resolve all steps are.
 constexpr double radian = 10;
 
-// Rounding of a single step beyond the tolerance and this part of the peaks is none that a run could go on with: rows
-// hardly differ there, and steps that collapse say so.
-constexpr double hopeless = 1e-7;
+// Rounding of a single step beyond this part of the peaks is none that a run could go on with: steps that collapse say
+// so.
+constexpr double hopeless = 0.1;
+
+// Rounding of one step may be so many times that of another: each is one draw.
+constexpr double scatter = 3;
 
 // Steps that are rejected until they are this part of the usual ones may have met a jump, which is looked for. Steps
 // end before it and begin behind it, and are as long as usual.
@@ -249,10 +252,10 @@ private:
       return size;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
     const double by_rounding = system_.error_size(attempt.end, method_->end(), left.data());
-    if (!(by_rounding <= std::max(controls_.tolerance, hopeless)))
+    if (!(by_rounding <= hopeless))
       return size;
-    by_rounding_ = by_rounding;
-    return std::max(size - by_rounding / allowance.error, 0.0);
+    by_rounding_ = std::min(scatter * by_rounding, size * allowance.error);
+    return size - by_rounding_ / allowance.error;
   }
 
   // That of outputs between its ends, which no later step depends on: relative to the whole tolerance.

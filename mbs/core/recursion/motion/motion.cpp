@@ -14,12 +14,29 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
+constexpr double singular_ratio = 2e-6; // of Posture: below, joints cannot follow, and rounding leaves 5e-5 of forces
 constexpr double near = 0.01;           // likewise: above, …
 constexpr double brief = 1. / 4000;     // … postures hardly change within this part of a run
 constexpr int instants = 100;           // of a run, at which accelerations on paths are looked at
 constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
 constexpr double is_on = 1e-11;         // residuals of a state on its constraint equations
+constexpr double rounding = 8 * std::numeric_limits<double>::epsilon(); // of mobilities, relative, as sums
+constexpr double hopeless = 0.1; // of forces: more rounding is none that a run could go on with
+
+// What rounding leaves of multipliers, relative: each follows from what other equations leave of its own mobility,
+// which is next to nothing where they hardly differ.
+template <class Space> double rounding_of_multipliers(const Workspace<Space, double> &w) {
+  const int m = w.factored();
+  double found = 0;
+  for (int r = 0; r < m; ++r) {
+    const double *L = w.factor.data() + r * m;
+    double own = 1 / L[r];
+    for (int c = 0; c < r; ++c)
+      own += L[c] * L[c] / w.factor[c * m + c];
+    found = std::max(found, rounding * own * L[r]);
+  }
+  return found < hopeless ? found : 0;
+}
 
 } // namespace
 
@@ -217,7 +234,8 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
   const double *q = local().state(shifted_.data());
   evaluate(t, q, shifted_.data() + n_v(), unused_.data());
-  const double of_forces = norm_.of_observed(workspace_, motors_at(q)) / stretch;
+  const double change = norm_.of_observed(workspace_, motors_at(q)) - rounding_of_multipliers(workspace_);
+  const double of_forces = change / stretch;
   return of_forces <= size || std::isnan(size) ? size : of_forces; // keeps NaN
 }
 
