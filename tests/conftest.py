@@ -26,7 +26,9 @@ from ffrobot.mesh import form_cache
 pytest_plugins = ["costs"]
 MANY_SEEDS = 6
 NIGHTLY = Path(__file__).with_name("nightly.txt")
-TOGETHER = {"cases": ("tests/references/test_references", "tests/results/test_summary")}
+TOGETHER = {  # files that set up the same: all cases, a browser
+    "cases": ("tests/references/test_references", "tests/results/test_summary"), "browser": ("tests/report/",)
+}  # fmt: skip
 CASES = Path(__file__).parent.parent / "cases"
 STUDIES = ("sweep", "sensitivity", "uncertainty", "optimise")
 OTHER_COMMAND = os.environ.get("FFROBOT_COMMAND")  # an older version's, to see whether a test fails there
@@ -132,7 +134,7 @@ def pytest_runtest_protocol(item):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """With --dist loadfile two files go as one: both solve all cases."""
+    """With --dist loadfile some files go as one."""
     from xdist.scheduler import LoadFileScheduling
 
     class Scheduling(LoadFileScheduling):
