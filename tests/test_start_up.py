@@ -16,8 +16,6 @@ import pytest
 
 from ffrobot.scene.kinds import KINDS
 
-pytestmark = pytest.mark.alone
-
 HEAVY = ("numpy", "scipy", "h5py", "pydantic", "rich", "dolfinx", "matplotlib", "plotly")
 IMPORT_AIM, HELP_AIM = 0.05, 0.2  # s
 
@@ -43,6 +41,7 @@ def loaded(program):
     return set(done.stdout.split())
 
 
+@pytest.mark.alone
 def test_import_takes_a_few_milliseconds():
     def cost():
         done = subprocess.run([sys.executable, "-X", "importtime", "-c", "import ffrobot"],
@@ -56,6 +55,7 @@ def test_import_loads_nothing_heavy():
     assert not loaded("import ffrobot") & set(HEAVY)
 
 
+@pytest.mark.alone
 def test_help_comes_at_once(ffrobot):
     assert seconds(ffrobot.path, "--help") < HELP_AIM * busy()
 
@@ -101,6 +101,7 @@ def test_a_link_loads_nothing_of_scenes(tmp_path):
     assert not [name for name in found if name.startswith(("ffrobot.mbs", "ffrobot.scene", "ffrobot.actuation"))]
 
 
+@pytest.mark.alone
 @pytest.mark.nightly
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
     """Processor time, which other processes do not change; bytecode is kept, as pip does when it installs.

@@ -21,8 +21,6 @@ from ffrobot.mbs.run.context import Context
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
-pytestmark = pytest.mark.alone
-
 ROOT = Path(__file__).parents[2]
 ALARM = {"evaluation": 2.25, "pcid": 3.2}
 MOST = 40
@@ -63,6 +61,7 @@ def test_without_the_source_tree_it_says_what_is_missing(two_link, tmp_path):
         HandWritten(tmp_path, two_link, tmp_path)
 
 
+@pytest.mark.alone
 @pytest.mark.nightly
 def test_right_hand_side_ratio(benchmark, two_link, program):
     state = general_state(two_link)
@@ -76,6 +75,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
     report(benchmark, "evaluation", *times)
 
 
+@pytest.mark.alone
 @pytest.mark.nightly
 def test_pcid_ratio(benchmark, two_link, program):
     analysis = Pcid(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
