@@ -6,6 +6,7 @@ from pathlib import Path
 
 import ffrobot.mbs.joints.joints as joints
 import ffrobot.scene.kinds as kinds
+from ffrobot.exchange.urdf.export_urdf import STEPS
 
 TOY = '''
 """The robot turned about its first motor as it stands, without dynamics."""
@@ -14,9 +15,15 @@ from typing import Literal
 
 import numpy as np
 
-from ffrobot.mbs.run.record import Run
+from ffrobot.common.structs import struct
+from ffrobot.mbs.run.record import Details, Run
 from ffrobot.mbs.fields.field_types import Positive, Reference
 from ffrobot.mbs.scene.analysis import TimedAnalysis
+
+
+@struct
+class Turned(Details):
+    angle: float
 
 
 class Turntable(TimedAnalysis):
@@ -35,7 +42,8 @@ class Turntable(TimedAnalysis):
         model = context.model
         q = self.rate * self.times[:, None]
         v, nothing = np.full_like(q, self.rate), np.zeros((len(q), len(model.rows)))
-        return Run(analysis=self, model=model, time=self.times, q=q, v=v, a=0 * v, multipliers=nothing)
+        motion = {"time": self.times, "q": q, "v": v, "a": 0 * v, "multipliers": nothing}
+        return Run(analysis=self, model=model, details=Turned(q[-1, 0]), **motion)
 '''
 
 EDITED = """
@@ -55,6 +63,8 @@ from ffrobot.schema import schema
 """
 
 SOLVE = """
+from ffrobot.results.kinds import OF_KIND, OwnResults
+
 ROD = {"mass": 2.0, "inertia": 0.5, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
 KEYS = {
     "name": "toy", "gravity": [0.0, 0.0], "body": [{"name": "rod", "rigid": ROD}],
@@ -70,10 +80,17 @@ def rejected(**analysis):
         return str(error)
 
 
+OF_KIND["turntable"] = OwnResults(
+    "turned",
+    write=lambda group, run, details: group.create_group("turned").attrs.update(angle=details.angle),
+    answer=lambda about: f"turned: by {about['angle']:g} rad",
+)
 results = ffrobot.solve(ffrobot.make_scene(**KEYS, analysis=[TURN]))
 np.testing.assert_allclose(results["turn/bodies/rod/angle"], 2.0 * np.linspace(0.0, 1.0, 5))
 np.testing.assert_allclose(results["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0)])
 assert dict(results.attributes("turn"))["kind"] == "turntable"
+verdict = results.verdict.analyses[0]
+assert (verdict.answer, verdict.in_short) == ("turned: by 2 rad", "turned")
 
 solid = ROD | {"inertia": [0.1, 0.5, 0.5], "center": [0.5, 0.0, 0.0]}
 solid["points"] = {"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}
@@ -191,6 +208,10 @@ def solved_with(entry, module, own, program, folder):
 def test_a_kind_is_a_file_and_an_entry(tmp_path):
     entry = '        "pcid"', '        "turntable": "turntable:Turntable",\n        "pcid"'
     solved_with(entry, kinds, ("turntable", TOY), SOLVE, tmp_path)
+
+
+def test_urdfs_have_joints_for_every_type():
+    assert set(STEPS) == set(joints.JOINT_TYPES), "STEPS in ffrobot/exchange/urdf/export_urdf.py"
 
 
 def test_a_type_of_joint_is_a_file_and_an_entry(tmp_path):

@@ -149,7 +149,8 @@ class AnalysisVerdict:
         if self.status != "completed":
             return "ended early"
         if self.feasible is None:
-            return self.answer.partition(":")[0] if self.kind == "closed-loop" else ""
+            short, colon, _ = self.answer.partition(":")
+            return short if colon else ""
         factor = self.worst[1]
         if self.feasible:
             return "within limits" if factor else "no limits given"

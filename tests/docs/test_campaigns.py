@@ -11,4 +11,6 @@ def test_the_page_is_current():
 
 def test_faults_are_in_the_source_once():
     counts = {fault.old: (ROOT / fault.file).read_text(encoding="utf-8").count(fault.old) for fault in FAULTS}
-    assert set(counts.values()) == {1}, [old for old, count in counts.items() if count != 1]
+    assert set(counts.values()) == {1}, [
+        ("tests/campaigns/faults.py", old) for old, count in counts.items() if count != 1
+    ]

@@ -101,7 +101,7 @@ def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
     assert (DOCS / "cases.md").read_text(encoding="utf-8") == gallery_page(), "python docs/gallery.py"
     for name, text in pages.items():
         assert (measured if name == measured.name else DOCS / "reference" / name).read_text(encoding="utf-8") == text, (
-            name
+            f"{name}: python docs/key_tables.py, interfaces.py or benchmark_tables.py"
         )
 
 
