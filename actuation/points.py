@@ -218,7 +218,7 @@ class PointForces:
 
 
 def solve_points(chosen: PointSet, run: Run) -> PointForces:
-    """L_a F_a = Q_a at every output time."""
+    """Solve L_a F_a = Q_a at every output, by least squares: forces at points for the driving forces Q_a."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = find_driving_forces(run)[chosen.body]
     p = run.q[:, node.p_q]

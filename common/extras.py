@@ -26,7 +26,7 @@ def missing(error: ModuleNotFoundError) -> str | None:
 
 @contextmanager
 def extras() -> Iterator[None]:
-    """Turn the lack of one of these libraries into `SolveError`."""
+    """Context that turns a missing library into `SolveError`, which says what to install."""
     try:
         yield
     except ModuleNotFoundError as error:

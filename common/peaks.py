@@ -19,7 +19,7 @@ def largest(time: Array, values: Array) -> tuple[float, float]:
 
 
 def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
-    """Return size and time (s) of the local maximum of |values| next to values[k]."""
+    """Return size and time (s) of the local maximum of |values| (T,) next to values[k]."""
     peak, at = float(abs(values[k])), float(time[k])
     if not 2 <= k < len(values) - 2:
         return peak, at

@@ -106,9 +106,9 @@ def _bandwidth(A: Array, closed: Array, T: float) -> float:
 
 
 def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> LinearModel:
-    """About the reference at `time`, links with their lowest modes: the higher ones are left out (truncated).
+    """Return the linear model for the design: about the reference at `time`, with the lowest modes of links.
 
-    Joints that other controllers hold are held by springs and dampers, as if these neither sampled nor waited.
+    Springs and dampers replace other controllers of joints, without sampling and delay.
     """
     mechanism, voltages = setup.robot.linear(int(np.argmin(np.abs(setup.source.time - record.time))))
     mechanism, voltages = kept_modes(mechanism, voltages, record.modes)

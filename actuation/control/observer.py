@@ -214,7 +214,7 @@ def given(record: GainsObserver, setup: Setup) -> Observer:
 
 @struct
 class Schedule:
-    """Observers at times (N,) of the path, between which all matrices are straight lines."""
+    """Observers at times (N,), s, of the path; their matrices are interpolated linearly in between."""
 
     times: Array
     observers: tuple[Observer, ...]

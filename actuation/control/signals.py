@@ -174,7 +174,7 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
 
 
 def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
-    """Discrete A, B, C, D (step T, s) from true values to sensor readings: high-pass filters, then delays.
+    """Discrete A (m, m), B, C, D (p, p) of step T, s, from true values to p readings: high-pass filters, then delays.
 
     A high-pass filter is exact for what changes as a straight line between samples.
     """

@@ -194,7 +194,7 @@ def voltage_scale(patches: Reach) -> Array:
 
 
 def voltage_gain(patches: Reach) -> Array:
-    """Voltages (k, n) per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
+    """Voltages (k, n), V√kg/N, per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
 
     Of many that do, the smallest relative to `voltage_scale`.
     """

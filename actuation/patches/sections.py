@@ -136,7 +136,7 @@ def _lever_of_rectangle(extent: float, across: float, patch_width: float) -> flo
 
 
 class LayerLoads(NamedTuple):
-    """Loads of layers on a section, P = f V − C e over its strains e = (φ_z', u', φ_x', −φ_y'): C (4, 4), f (4,)."""
+    """Loads P = f V − C e on a section, N·m and N, by its strains e = (φ_z', u', φ_x', −φ_y'): C (4, 4), f (4,)."""
 
     C: Array
     f: Array
@@ -204,7 +204,7 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
 
 
 def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
-    """Return loads (4,) per volt on a link kept straight, in the strains that feel it: N·m, N."""
+    """Return `f` (4,) of `layer_loads` on a straight link; 0 along strains that do not interact with patches."""
     found, rows = np.zeros(4), felt_rows(layout)
     found[rows] = layer_loads(layout, extent, lever).f[rows]
     return found

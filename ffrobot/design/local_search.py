@@ -248,11 +248,10 @@ class Local:
 def search_from(
     start: Place, method: str, differentiation: Differentiation, watcher: Watcher, title: str = ""
 ) -> Local:
-    """Search along gradients from one start, at first with unjudged gradients, then with judged ones.
+    """Search along gradients from one start, first without error estimates of gradients, then with them.
 
-    What SLSQP then leaves, whose line search may come to nothing where a limit trades for the objective almost
-    linearly, trust-constr goes on with. Where one ends beyond limits, the largest excess is made less until they are
-    kept; where that fails with judged gradients, the search ends.
+    SLSQP may stop early where a limit trades for the objective almost linearly; trust-constr then continues. After a
+    design beyond limits, the search reduces the largest excess; it ends if that fails with error estimates.
     """
     evaluations = differentiation.evaluations
     begun = len(evaluations.searched)

@@ -37,7 +37,7 @@ class Reading:
         column, sign: of its history, and of the value there.
         mode: of a frequency, the family and its number in it.
         coarse: of a peak, its value by every second output; NaN of all else.
-        missed_by: of a peak or mean that outputs miss, what it is by these; NaN of all else.
+        missed_by: of a peak or mean that outputs miss, its value by outputs alone; NaN of all else.
         doubt: why the value is uncertain; empty where it is not.
     """
 

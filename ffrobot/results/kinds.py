@@ -25,14 +25,14 @@ def _nothing(*_: object) -> str:
 
 @struct
 class OwnResults:
-    """Results of one kind of analysis alone; functions of `about` get the attributes of `part`.
+    """Results of one kind of analysis alone. Functions of `About` get the attributes of the group `part`.
 
     Attributes:
-        part: its group in that of the analysis; empty without one.
+        part: name of that group in the group of the analysis; empty without one.
         is_controlled: whether a controller keeps it on its path.
         write: writes the details of a run to the group of its analysis.
         answer: answer in words, in place of whether motors and patches can do it.
-        least: of the group, what is said beside the limits of motors and patches that can do it.
+        least: text after "motors and patches can do it", from the group of the analysis.
         margins: gain and delay margins in words.
         advice: what to try next, by whether it is known what motors and patches can do.
     """

@@ -24,7 +24,7 @@ ALIKE = 1e-9  # of ω²: of a round link, both planes of bending
 
 
 def reported_modes(result: AnalysisResult) -> Reported:
-    """Everything of an analysis whose error counts; moments on joints and paths as forces at the arm of a link."""
+    """Return what `modes = "auto"` compares, by kind; moments on joints and paths over the largest length of links."""
     run = result.run
     nodes = [node for node in run.model.tree.nodes if node.body.n_modes]
     size = max((node.body.length or 0.0 for node in nodes), default=0.0) or 1.0

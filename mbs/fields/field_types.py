@@ -146,8 +146,8 @@ Kind = Literal["body", "flexible body", "patches", "patched body", "joint", "ela
 class Reference:
     """Reference to another table: the `key` that holds it, and its `name` "BODY", "BODY.POINT" or a joint's.
 
-    "patches" are a layout of them, a "patched body" has some, an "elastic joint" has stiffness. Forces of the mechanism
-    act at a point that is `loaded`.
+    `kind` is that of the other table: "patches" a layout, "patched body" a body with patches, "elastic joint" a joint
+    with stiffness. Forces of the mechanism act at a point that is `loaded`.
     """
 
     key: str

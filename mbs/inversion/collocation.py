@@ -144,7 +144,7 @@ def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tupl
 
 
 def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> scipy.interpolate.PPoly:
-    """Return coefficients in powers of t − left break, highest first."""
+    """Return p(t) (n,) from p, ṗ (N + 1, n) at the `breaks` (N + 1,), s, and p̈ at the stages, K (N, s, n)."""
     h = np.diff(breaks)[:, None]
     powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]

@@ -100,7 +100,7 @@ def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
 
 
 def is_unstable(s: ComplexArray) -> Booleans:
-    """Zeros in the right half plane, beyond round-off."""
+    """Whether zeros s (…,), 1/s, are in the right half plane, beyond round-off."""
     return s.real > CENTRE * np.abs(s)
 
 

@@ -196,7 +196,7 @@ class Statics:
         return q, taken == 1.0
 
     def balance(self, q: Array, free: Indices, relief: Relief = FULL_LOADS) -> Balance:
-        """Forces at q (n_q,), with multipliers that leave least along v[`free`], with a `relief`."""
+        """Forces at q (n_q,), less `relief`, with multipliers that balance them best along v[`free`]; natural sizes."""
         at, J = self._at_rest(q)
         independent = _independent(J[:, free])
         J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
@@ -224,7 +224,7 @@ class Statics:
         return as_floats(K * self.sizes * self.sizes[:, None])
 
     def holding_multipliers(self, q: Array) -> Array:
-        """λ (rows,) with C_vᵀ λ = Q at q (n_q,), those of least work on natural motions where rows depend on others."""
+        """λ (rows,) with C_vᵀ λ = Q at q (n_q,), N or N·m; in natural sizes the least if rows depend on others."""
         at, J = self._at_rest(q)
         return as_floats(np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes)
 

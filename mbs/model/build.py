@@ -147,7 +147,7 @@ ALONG = 1e-12  # of the largest rotation of modes: what is left of them across a
 
 
 def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
-    """The tree with such coordinates of all joints that have them."""
+    """The tree whose revolute joints have angles between frames, where modes turn sections about the axis alone."""
     changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
     changed.on_frames = frozenset(
         joint.name

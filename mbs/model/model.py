@@ -77,7 +77,7 @@ class Model:
         return dict(zip(motors, parts[:-1], strict=True))
 
     def columns(self, joint: str) -> Array:
-        """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
+        """Indices (k,) in v of the coordinates of a tree joint, in the scene's order; none of a spherical one."""
         return _in_order(self.tree.nodes[self.tree.carried[joint]])
 
     def joint_of(self, row: ConstraintRow) -> str:
@@ -202,7 +202,7 @@ class Model:
     def postures(self, times: Array, q: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
         """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s, as `posture`; with flags (T,) of convergence.
 
-        Where C = 0 with a joint or a tool turned over it did not.
+        A solution with a joint or tool axis turned by π does not count as converged.
         """
         if not self.rows:
             return np.array(q), np.ones(len(q), dtype=bool)

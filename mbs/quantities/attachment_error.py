@@ -120,8 +120,8 @@ def phase_error(start: Start) -> float:
 def start_vibrations(start: Start) -> Ringing:
     """Return vibrations of the links that begin at the start of a run, under its constraints.
 
-    The vibrations φ_i, ω_i have of the first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand
-    z̈_i/ω_i² from where they vibrate about: their amplitudes are z̈_i/ω_i in √(2 J).
+    Vibration i of shape φ_i and frequency ω_i has the share z̈_i = φ_iᵀ K q̈/ω_i² of the first accelerations q̈. It begins
+    z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J).
     """
     squares, shapes = elastic_shapes(start.M, np.diag(start.stiffness), start.C_q)
     accelerations = shapes.T @ (start.stiffness * start.a) / squares

@@ -64,7 +64,7 @@ def drive_robot(
     earlier: Run | None = None,
     is_recorded: bool = False,
 ) -> Run:
-    """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
+    """The run of an integration from `start`, with outputs at `times` (T,), s; by default those of the analysis.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
     `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an

@@ -30,7 +30,7 @@ def graded(start: float, end: float, intervals: int) -> Array:
 
 
 def start_breaks(start: float, path_end: float, end: float, intervals: int) -> Array:
-    """Graded breaks from `start` to `end`, with those next to 0 and to the end of the path moved there (s)."""
+    """Graded breaks (intervals + 1,), s, those next to 0 and `path_end` moved there."""
     breaks = graded(start, end, intervals)
     for t in (0.0, path_end):
         breaks[np.abs(breaks - t).argmin()] = t

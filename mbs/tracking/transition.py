@@ -63,7 +63,7 @@ class Transition:
 
     @property
     def order(self) -> int:
-        """Of the derivative of V that is linear between breaks."""
+        """Order of the derivative of the voltages V(t) that is linear between breaks."""
         return 0 if self.gears is None else 2
 
     def driven_at(self, times: Array, error: PPoly | None) -> Servo:

@@ -164,7 +164,7 @@ def both_ways(limit: float | list[float]) -> tuple[float, ...]:
 def file_name(*parts: str) -> str:
     """A file name: everything but letters, digits, `.` and `-` becomes `_`.
 
-    Letters other than a to z and signs take a few digits of their own besides: names of other scripts stay apart.
+    Names that lose other characters end in digits of a hash, so that different names differ.
     """
     joined = "_".join(parts)
     plain = "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)

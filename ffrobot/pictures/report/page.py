@@ -198,7 +198,7 @@ def write_report(paths: Sequence[Path], path: Path) -> None:
     """Write a page about one results file, or several side by side, to `path`; an earlier report is replaced.
 
     `paths` may have studies, too: their files, or folders of design commands. Raises `InputError` where a file is no
-    results file and no study, or `path` would cost a file of another kind, `SolveError` where the page cannot be
+    results file and no study, or `path` is a file of another kind, `SolveError` where the page cannot be
     written or Plotly is not installed.
     """
     check_ending(path, "output", (".html", ".htm"))

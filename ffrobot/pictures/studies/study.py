@@ -73,8 +73,8 @@ class Bars(Drawing):
 class DesignAxis(Record):
     """One axis of parallel coordinates from `low` to `high`, with the value of every design.
 
-    `limit` is what a response may not exceed (`sense` 1) or fall below (−1); `names` of a catalog's rows, whose values
-    are then their numbers.
+    `limit` of a response is an upper (`sense` 1) or lower (−1) one. `names` are those of a catalog's rows; values are
+    then numbers of rows.
     """
 
     label: str
