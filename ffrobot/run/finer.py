@@ -108,8 +108,8 @@ def _check(solution: Solution, source: Run, finer: Solution, watcher: Watcher) -
     scene = solution.scene
     run = _replayed(source, finer.model, _drives(solution, source, finer), watcher)
     followed = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
-    nodes = (solution.model.tree.nodes[solution.model.tree.index[name]] for name in solution.links)
-    points = followed or [f"{node.body.name}.{point}" for node in nodes for point in node.body.points]
+    bodies = {node.body.name: node.body for node in solution.model.tree.nodes}
+    points = followed or [f"{name}.{point}" for name in solution.links or bodies for point in bodies[name].points]
     errors = {point: _distance(source, run, point) for point in points}
     worst = max(errors, key=lambda point: errors[point])
     modes = {name: link.eigenmode_count for name, link in finer.links.items()}

@@ -73,7 +73,7 @@ class FinerCheck:
     def in_words(self) -> str:
         """Number of modes, largest deviation and least voltage as text."""
         ended = "" if self.status == "completed" else f", which ended early ({self.status})"
-        modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
+        modes = ", ".join(map(str, dict.fromkeys(self.modes.values()))) or "no"
         least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
         if self.least_voltage is not None and np.isnan(self.least_voltage):
             least = "; no motion within the limits was found with these modes, so their least voltage is not known"

@@ -107,3 +107,16 @@ def test_modal_body_files_cannot_be_refined(tmp_path):
     ]
     with pytest.raises(library.InputError, match=r'check: expected "link" in body "link1" for "finer"'):
         solve_scene(arm(2, bodies=bodies))
+
+
+def test_the_check_of_a_rigid_robot_is_its_replay():
+    rod = {"mass": 1.0, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
+    scene = library.make_scene(
+        name="rod", gravity=[0.0, -9.81], body=[{"name": "rod", "rigid": rod}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]}],
+        trajectory=[{"name": "turn", "joint": "O", "value": "t**3"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05, "check": "finer"}],
+    )  # fmt: skip
+    check = solve_scene(scene).analyses["inverse"].check
+    assert (check.point, check.status) == ("rod.tip", "completed")
+    assert check.error < 1e-6
