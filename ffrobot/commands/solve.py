@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 @output_option("RESULTS.h5", "Output file [SCENE.results.h5 next to the input].")
 @click.option("--resume", is_flag=True, help="Resume a stopped run from its results file.")
 @click.option("--robust", is_flag=True, help="State what remains of tracking and motors-only motions under deviations.")
+@click.option("--wanted", multiple=True, hidden=True)  # datasets and groups that a study reads, written alone
 @click.option("--strict", is_flag=True, help="Exit code 1 if there is a warning; results are written nevertheless.")
 @python_option
 @logging_options
-def solve(scene_file: Path, output: Path | None, *, resume: bool, robust: bool, strict: bool) -> None:
+def solve(
+    scene_file: Path, output: Path | None, *, resume: bool, robust: bool, strict: bool, wanted: tuple[str, ...]
+) -> None:
     """Run the analyses of a scene (stage 2).
 
     Stage 1 runs first for link files that are not up to date. Prints a summary of at most fifteen lines: by analysis
@@ -35,12 +38,18 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, robust: bool, 
     from ..present.console import Display
     from ..present.lines import folded
     from ..results.solving import check_ended, solve_and_keep
+    from ..run.watcher import Watcher
     from ..scene.load import load_scene
     from ..scene.plausibility import remarks
 
     path = output or scene_file.with_suffix(".results.h5")
     again = f"ffrobot solve {scene_file}{f' -o {output}' if output else ''} --resume"
     scene = load_scene(scene_file)
+    if wanted:
+        watcher = Watcher()
+        if (solution := solve_and_keep(scene, path, watcher, "", wanted=wanted)) is not None:
+            check_ended(solution, watcher, "", scene_file)
+        return
     if robust:
         from ..run.robustness import robust as robustly
 

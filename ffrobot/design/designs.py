@@ -154,11 +154,12 @@ def runs_of(
 
 @dataclass(frozen=True)
 class Design:
-    """One run: its point, its row in the table, and where its results are."""
+    """One run: its point, its row in the table, and where its results are; of all `asked` is what was read of them."""
 
     point: Point
     row: Row
     folder: Path
+    asked: set[str]
 
     @property
     def completed(self) -> bool:
@@ -172,7 +173,9 @@ class Design:
 
     def results(self) -> Results:
         """Open the results file of the run, for use in a `with`."""
-        return Results(self.folder / RESULTS)
+        results = Results(self.folder / RESULTS)
+        results.asked = self.asked
+        return results
 
     def read(self, responses: Iterable[Response]) -> tuple[Reading, ...]:
         """The responses of a design that completed. Raises `InputError` where its results do not have them."""
@@ -209,6 +212,7 @@ class Designs:
         self._runs, self.most = runs, most
         self._designs: dict[Path, Design] = {}
         self._inputs = _digests(runs.path)
+        self._asked = set[str]()
 
     @property
     def table(self) -> Path | None:
@@ -248,6 +252,7 @@ class Designs:
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
         """Solve the designs at `points` with `changes` in addition, failed ones included; none twice in one folder.
 
+        What is read of the first ones is all that the results of the others have.
         Raises `InputError` where the scene or its files are others than at first, `SpentError` where designs would be
         too many.
         """
@@ -263,13 +268,22 @@ class Designs:
             raise SpentError
         if new:
             earlier = tuple(design.row for design in self._designs.values())
-            lot = replace(wanted, points=tuple(new.values()), earlier=earlier)
+            lot = replace(wanted, points=tuple(new.values()), earlier=earlier, wanted=tuple(sorted(self._asked)))
             if self._runs.retry:
                 forget_failures(lot)
             rows = run_sweep(lot, self._runs.batch, self._runs.watcher)
             triples = zip(new.items(), rows, strict=True)
-            self._designs |= {folder: Design(point, row, folder) for (folder, point), row in triples}
+            self._designs |= {folder: Design(point, row, folder, self._asked) for (folder, point), row in triples}
         return [self._designs[folder] for folder in folders]
+
+    def whole(self, design: Design) -> Design:
+        """The completed design with all results: solved again if it has only those that were read of others."""
+        if not design.row.wanted:
+            return design
+        earlier = tuple(one.row for one in self._designs.values() if one is not design)
+        lot = replace(self._sweep, points=(design.point,), earlier=earlier)
+        (row,) = run_sweep(lot, self._runs.batch, self._runs.watcher)
+        return replace(design, row=row)
 
 
 def _digests(path: Path) -> dict[str, str]:

@@ -157,7 +157,7 @@ def _optimum(
     runs: Runs, method: str, evaluations: Evaluations, best: Local, searches: Sequence[Local], tolerance: float
 ) -> Optimum:
     space, problem = evaluations.space, evaluations.problem
-    with best.best.design.results() as results:
+    with evaluations.designs.whole(best.best.design).results() as results:
         verdict = results.verdict
     point = space.point(best.best.place)
     changes = {key: value for key, value, own in zip(space.keys, point, space.own, strict=True) if value != own}

@@ -24,7 +24,8 @@ from ..mbs.run.record import Details, Run
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
 from ..run.mode_search import ModeChoice
-from ..run.solution import AnalysisResult, Solution
+from ..run.result import AnalysisResult
+from ..run.solution import Solution
 from .lines import alike, error_budget, folded, integrated, named_tables, warning_lines
 
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone

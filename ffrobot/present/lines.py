@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..mbs.quantities.attachment_error import JOLT
 from ..mbs.quantities.validity import Bending, deflection_warning, largest
-from ..run.solution import AnalysisResult, Solution
+from ..run.result import AnalysisResult
+from ..run.solution import Solution
 
 if TYPE_CHECKING:
     from rich.console import Console

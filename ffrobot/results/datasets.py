@@ -41,10 +41,12 @@ class Datasets:
     Attributes:
         path: of the file, as messages call it.
         scene, scene_text: the scene file, as TOML has it and as text.
+        asked: names of datasets and groups in analyses that were read.
     """
 
     def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
         self.path, self._in_memory = path, isinstance(content, h5py.h5f.FileID)
+        self.asked = set[str]()
         try:
             self._file = h5py.File(content, "r") if isinstance(content, h5py.h5f.FileID) else open_checked(path)
         except OSError as error:
@@ -111,6 +113,7 @@ class Datasets:
 
         Raises `InputError` where there is no such group, or no such attribute.
         """
+        self.asked |= {group} if "/" in group.strip("/") else set()
         if group not in self._file:
             raise InputError(f'{self.path}: expected the group "{group}"', f"none{self._near(group)}")
         return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
@@ -138,6 +141,7 @@ class Datasets:
 
     def group(self, name: str) -> h5py.Group:
         """h5py group of an analysis."""
+        self.asked.add(name)
         return self._file[name]
 
     def has(self, dataset: str) -> bool:
@@ -147,6 +151,7 @@ class Datasets:
     def __getitem__(self, dataset: str) -> Array:
         """Dataset with its shape in the file. Raises `InputError` if absent."""
         item = self._file.get(dataset)
+        self.asked.add(dataset)
         if isinstance(item, h5py.Group):
             inside = quoted(f"{dataset}/{name}" for name in item)
             raise InputError(f"{self.path}: expected the name of a dataset", f'the group "{dataset}" of {inside}')

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -16,21 +14,18 @@ from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.motion import body_motion, joint_motion, plane_angle, point_motion, reported_points
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
-from ..mbs.quantities.validity import Bending
 from ..mbs.scene.trajectories import Trajectory
-from ..run.solution import AnalysisResult, Solution
-
-if TYPE_CHECKING:
-    pass
+from ..run.result import AnalysisResult
+from ..run.solution import Solution
 
 SAME = 1e-9  # of a time: what differs by less is round-off
 
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Write bodies/ and points/ of an analysis; modes of planar scenes are those that move in the plane."""
+    """Write bodies/ of an analysis; modes of planar scenes are those that move in the plane."""
     run, histories = result.run, result.histories
     forces = actuator_forces(histories.run)
-    for name, points in reported_points(run).items():
+    for name in reported_points(run):
         body, moved = solution.bodies[name].spatial, body_motion(run, name)
         F_p, T = None if forces is None else forces.modal[name][histories.outputs], body.modal_transform
         about = "modes of the modal body file"
@@ -48,15 +43,7 @@ def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) 
             group[f"bodies/{name}"].attrs.update({"modal_coordinates": about, "modes_kept": modes_kept(body)})
         if name in solution.divided:
             group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
-        for label in points:
-            for key, values in point_motion(run, f"{name}.{label}").within(run.space).datasets.items():
-                if key != "deflection":  # which has peaks
-                    group[f"points/{name}.{label}/{key}"] = values
-
-
-def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:
-    """Write deflection, foreshortening and their errors as attributes of bodies/BODY."""
-    for name, link in links.items():
+    for name, link in result.bending.items():
         group[f"bodies/{name}"].attrs.update(
             {
                 "largest_deflection": link.deflection,
@@ -68,6 +55,18 @@ def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:
                 "relative_error": link.missing.of_deflections,
             }
         )
+
+
+def write_points(group: h5py.Group, result: AnalysisResult) -> None:
+    """Write points/ of an analysis, except quantities with peaks."""
+    run = result.run
+    for place in (f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels):
+        if result.wants(f"points/{place}"):
+            for key, values in point_motion(run, place).within(run.space).datasets.items():
+                if key != "deflection":  # which has peaks
+                    group[f"points/{place}/{key}"] = values
+        if result.wants(f"points/{place}/predicted_shift") and place in result.predicted_shift:
+            group[f"points/{place}/predicted_shift"] = run.space.along(result.predicted_shift[place])
 
 
 def read_modal(group: h5py.Group, body: str) -> Array:

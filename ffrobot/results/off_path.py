@@ -9,7 +9,8 @@ import numpy as np
 
 from ..common.peaks import largest, root_mean_square
 from ..mbs.quantities.motion import point_motion
-from ..run.solution import AnalysisResult, Solution
+from ..run.result import AnalysisResult
+from ..run.solution import Solution
 from .actuators import read_unsupplied
 from .joints import Scene
 from .kinds import own_results

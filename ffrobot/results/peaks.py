@@ -16,7 +16,7 @@ from ..mbs.quantities.supply import followed_trajectories, gear_moment, motor_mo
 
 if TYPE_CHECKING:  # reading can do without the core
     from ..mbs.joints.joint import JointRecord
-    from ..run.solution import Histories, Solution
+    from ..run.result import AnalysisResult
 
 VOLTAGE = "pzt/*/voltage"
 
@@ -26,34 +26,44 @@ MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
 """Attributes of a joint: of the power of its motor, summed over its coordinates, W."""
 
 
-def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
-    """Name in its analysis and values (T, …) of all that has peaks; the moment in a joint of the plane is its own."""
+def peaking(result: AnalysisResult) -> Iterator[tuple[str, Array]]:
+    """Name in its analysis and values (T, …) of what has peaks; the moment in a joint of the plane is its own.
+
+    Of all of it, or where only parts are wanted, these and what comes without further evaluation.
+    """
+    of, wants = result.histories, result.wants
     run, space = of.run, of.run.space
     for body, labels in reported_points(run).items():
         for point in (f"{body}.{label}" for label in labels):
-            yield f"points/{point}/deflection", space.along(deflection(run, point))
-    for joint in solution.scene.joint:
-        for key, values in _of_joint(of, joint):
-            yield f"joints/{joint.name}/{key}", values
+            if wants(name := f"points/{point}/deflection"):
+                yield name, space.along(deflection(run, point))
+    for joint in result.prepared.scene.joint:
+        if wants(place := f"joints/{joint.name}"):
+            for key, values in _of_joint(result, joint, place):
+                yield f"{place}/{key}", values
     for trajectory in followed_trajectories(run):
         yield f"trajectories/{trajectory.name}/force", path_force(run, trajectory.name)
-    for body, forces in of.point_forces.items():
+    for body, forces in of.point_forces.items() if wants("actuation_points") else ():
         yield f"actuation_points/{body}/force", forces.force
-    for body, stress in of.stresses.items():
+    for body, stress in of.stresses.items() if wants("stress") else ():
         for point, at in stress.points.items():
             yield f"stress/{body}/points/{point}/von_mises", at.von_mises
         if stress.surface is not None:
             yield f"stress/{body}/surface/von_mises_max", stress.surface.von_mises_max
-    for name, voltages in ({} if of.actuation is None else of.actuation.voltages).items():
+    actuation = of.actuation if wants("pzt") else None
+    for name, voltages in ({} if actuation is None else actuation.voltages).items():
         yield f"pzt/{name}/voltage", voltages.within_limit
         yield f"pzt/{name}/required_voltage", voltages.required
 
 
-def _of_joint(of: Histories, joint: JointRecord) -> Iterator[tuple[str, Array]]:
-    run, acting, is_single = of.run, of.reactions[joint.name], len(joint.units) == 1
-    yield "reaction", run.space.along(acting.force)
-    if not (run.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
-        yield "reaction_moment", run.space.about(acting.moment)
+def _of_joint(result: AnalysisResult, joint: JointRecord, place: str) -> Iterator[tuple[str, Array]]:
+    of, wants, is_single = result.histories, result.wants, len(joint.units) == 1
+    run = of.run
+    if wants(f"{place}/reaction"):
+        yield "reaction", run.space.along(of.reactions[joint.name].force)
+    # In the plane a revolute joint carries no moment about its axis.
+    if not (run.space.is_plane and joint.type == "revolute") and wants(f"{place}/reaction_moment"):
+        yield "reaction_moment", run.space.about(of.reactions[joint.name].moment)
     if (moving := joint_motion(run, joint.name)) is not None:
         yield "rate", np.squeeze(moving[1], 1) if is_single else moving[1]
     moment, motor = motor_moments(run).get(joint.name), motor_motion(run, joint.name)

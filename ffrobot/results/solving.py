@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,12 +21,13 @@ from .write import write_results
 
 
 def solve_and_keep(
-    scene: Scene, path: Path | None, watcher: Watcher, again: str, *, resume: bool = False
+    scene: Scene, path: Path | None, watcher: Watcher, again: str, *, resume: bool = False, wanted: Iterable[str] = ()
 ) -> Solution | None:
     """Run the analyses of a scene, which go on from the file `path` with `resume`, and write that file where given.
 
-    It is written before an error is raised. `again`: the command that resumes the run; empty without a file. None where
-    nothing is left to run. Raises as `solve_scene`, and `StoppedError` where a signal has cut a run short.
+    It is written before an error is raised: all of it, or what is `wanted` (see `Solution`). `again`: the command that
+    resumes the run; empty without a file. None where nothing is left to run. Raises as `solve_scene`, and
+    `StoppedError` where a signal has cut a run short.
     """
     inputs, kept = files_of_tables(scene.path, scene.text), list[Solution]()
     if path is not None:
@@ -43,7 +45,7 @@ def solve_and_keep(
         if path is not None and resume:
             solution = resume_scene(scene, path, watcher, keep)
         else:
-            solution = solve_scene(scene, watcher, keep)
+            solution = solve_scene(scene, watcher, keep, frozenset(wanted) or None)
     except SolveError as error:
         if not watcher.signal:
             raise

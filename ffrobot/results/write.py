@@ -18,11 +18,12 @@ from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.posture.redundancy import resolving_joints
 from ..mbs.quantities.motion import constraint_violation
 from ..mbs.run.record import Details, Run
-from ..run.solution import AnalysisResult, Solution
+from ..run.result import AnalysisResult
+from ..run.solution import Solution
 from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
 from .kinds import own_results
-from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress
+from .motion import write_bodies, write_joints, write_paths, write_points, write_stress
 from .off_path import write_off_path
 from .peaks import peaking, write_peaks
 from .resume import write_state
@@ -36,15 +37,17 @@ def write_results(solution: Solution, path: Path) -> None:
 
 
 def results_image(solution: Solution) -> bytes:
-    """The content of the results file of a solution."""
+    """The content of the results file of a solution: all of it, or what is wanted."""
     with in_memory() as file:
         _write_head(file, solution)
         for name, result in solution.analyses.items():
             with result.run.arithmetic:
                 _write_analysis(file.create_group(name), solution, result)
         if (run := solution.unread) is not None:
-            _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
-        write_state(file, solution)
+            _write_run(file.create_group(run.analysis.name), run)
+            _write_texts(file[run.analysis.name], run.statistics.warnings, ())
+        if solution.wanted is None:
+            write_state(file, solution)
         return image_of(file)
 
 
@@ -68,21 +71,23 @@ def _write_head(file: h5py.File, solution: Solution) -> None:
 
 
 def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    run = result.run
-    _write_run(group, run, result.warnings, result.notes)
-    _write_judgement(group, solution, result)
+    run, wants = result.run, result.wants
+    _write_run(group, run)
+    if solution.wanted is None:
+        _write_texts(group, result.warnings, result.notes)
+        _write_judgement(group, solution, result)
     if joints := resolving_joints(run.model):
         group.attrs.update({"redundancy": run.model.scene.redundancy, "resolved_by": joints})
-    write_bodies(group, solution, result)
-    write_bending(group, result.bending)
+    if wants("bodies"):
+        write_bodies(group, solution, result)
     _write_forces(group, solution, result)
-    if result.actuation is not None:
+    if wants("points"):
+        write_points(group, result)
+    if wants("feasibility") and result.actuation is not None:
         write_feasibility(group, solution, result.actuation.feasibility)
     for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
         write_record(group.create_group(f"patch_structure/{name}"), effect)
-    for point, shift in result.predicted_shift.items():
-        group[f"points/{point}/predicted_shift"] = run.space.along(shift)
-    for point, settled in result.settling.items():
+    for point, settled in result.settling.items() if wants("settling") else ():
         write_record(group.create_group(f"settling/{point}"), settled)
     if (left := result.deviations) is not None:
         about = group.create_group("robustness")
@@ -90,36 +95,44 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         about.attrs.create("causes", list(left.causes), dtype=h5py.string_dtype())
         for lane, values in left.lanes.items():
             about[lane] = values
+    if wants("energy", "momentum", "constraint_violation"):
+        _write_balances(group, result)
+    if type(run.details) is not Details:
+        own_results(group).write(group, run, run.details)
+    if wants("off_path"):
+        write_off_path(group, solution, result)
+
+
+def _write_balances(group: h5py.Group, result: AnalysisResult) -> None:
+    """Of an analysis: energy/, momentum/ and how well constraints are kept."""
+    run = result.run
     write_record(group.create_group("energy"), result.energies)
     group["momentum/linear"] = run.space.along(result.momentum.linear)
     group["momentum/angular"] = run.space.about(result.momentum.angular)
     violation = group.create_dataset("constraint_violation", data=constraint_violation(run))
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
-    if type(run.details) is not Details:
-        own_results(group).write(group, run, run.details)
-    write_off_path(group, solution, result)
 
 
 def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Of an analysis: joints/, trajectories/, actuation_points/, stress/ and pzt/, and all that has peaks."""
-    histories = result.histories
-    write_joints(group, solution, result)
-    for body, forces in result.point_forces.items():
+    histories, wants = result.histories, result.wants
+    if wants("joints"):
+        write_joints(group, solution, result)
+    for body, forces in result.point_forces.items() if wants("actuation_points") else ():
         points = group.create_group(f"actuation_points/{body}")
         write_point_forces(points, solution.points[body], forces, result.run.space)
-    for body, stress in histories.stresses.items():
+    for body, stress in histories.stresses.items() if wants("stress") else ():
         write_stress(group.create_group(f"stress/{body}"), stress, histories.outputs)
-    write_paths(group, result)
-    if result.actuation is not None:
+    if wants("trajectories"):
+        write_paths(group, result)
+    if wants("pzt") and result.actuation is not None:
         write_voltages(group, solution, result.actuation)
-    write_peaks(group, histories.run.time, dict(peaking(solution, histories)), histories.outputs)
+    with_peaks = {name: values for name, values in peaking(result) if wants(name)}
+    write_peaks(group, histories.run.time, with_peaks, histories.outputs)
 
 
-def _write_run(group: h5py.Group, outcome: Run, warnings: Sequence[str], notes: Sequence[str]) -> None:
-    """What is known of a run whether it has outputs or not: its analysis, how it went, its times and steps.
-
-    `warnings` say why its results may be wrong, `notes` what is worth knowing of right ones.
-    """
+def _write_run(group: h5py.Group, outcome: Run) -> None:
+    """What is known of a run whether it has outputs or not: its analysis, how it went, its times and steps."""
     analysis, run = outcome.analysis, outcome.statistics
     group.attrs["kind"] = analysis.kind
     group.attrs["integrator"] = run.integrator.name if analysis.is_integrated else "none"
@@ -129,12 +142,16 @@ def _write_run(group: h5py.Group, outcome: Run, warnings: Sequence[str], notes: 
     group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
     for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
         group.attrs[key] = getattr(run, key)
-    for name, texts in (("warnings", warnings), ("notes", notes)):
-        group.attrs.create(name, list(texts), dtype=h5py.string_dtype())
     group["time"] = outcome.time
     if len(run.step_ends):
         group[DATASET] = run.step_ends
         group[DATASET].attrs[METHOD] = run.integrator.name
+
+
+def _write_texts(group: h5py.Group, warnings: Sequence[str], notes: Sequence[str]) -> None:
+    """`warnings` say why results of an analysis may be wrong, `notes` what is worth knowing of right ones."""
+    for name, texts in (("warnings", warnings), ("notes", notes)):
+        group.attrs.create(name, list(texts), dtype=h5py.string_dtype())
 
 
 def _write_judgement(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:

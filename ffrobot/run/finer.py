@@ -30,7 +30,8 @@ from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.tracking.tracking import Tracking, least_voltage
 from ..scene.scene import Scene
-from .solution import FinerCheck, Solution
+from .result import FinerCheck
+from .solution import Solution
 from .watcher import Watcher
 
 logger = logging.getLogger(__name__)
@@ -51,7 +52,7 @@ def with_finer_check(solution: Solution, prepare: Prepare, watcher: Watcher) -> 
         finer = prepare(_finer_scene(solution), watcher)
         for name in wanted:
             watcher.stage(f'check of "{name}" on finer links')
-            results[name] = replace(results[name], check=_check(solution, results[name].run, finer, watcher))
+            results[name] = results[name].having(check=_check(solution, results[name].run, finer, watcher))
     except Exception as error:
         if failure is not None:  # which is raised
             logger.error("check on finer links failed, too", exc_info=error)

@@ -14,7 +14,7 @@ from ..mbs.quantities.motion import point_motion
 from ..mbs.quantities.supply import followed_trajectories, motor_moments, path_force
 from ..scene.scene import Scene
 from .bodies import LoadedBody
-from .solution import AnalysisResult
+from .result import AnalysisResult
 
 if TYPE_CHECKING:
     from .mode_search import Reported

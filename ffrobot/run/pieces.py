@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,17 +17,17 @@ from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bendi
 from ..mbs.run.record import Run
 from ..scene.pieces import BodyInPieces, bodies_in_pieces
 from ..scene.scene import Scene
-from .solution import Solution
+from .prepared import Prepared
 
 MOST = 64
 
 
-def links_in_pieces(solution: Solution) -> dict[str, LinkInPieces]:
-    """The links in pieces of a solution, by name."""
+def links_in_pieces(prepared: Prepared) -> dict[str, LinkInPieces]:
+    """The links in pieces of a scene, by name."""
     links = {}
-    for name, body in solution.divided.items():
-        modal, whole = solution.bodies[name].modal, solution.bodies[name].spatial
-        pieces = (solution.parts[piece].modal for piece in body.names)
+    for name, body in prepared.divided.items():
+        modal, whole = prepared.bodies[name].modal, prepared.bodies[name].spatial
+        pieces = (prepared.parts[piece].modal for piece in body.names)
         assert modal is not None
         links[name] = LinkInPieces(
             modal=modal,
@@ -41,44 +41,44 @@ def links_in_pieces(solution: Solution) -> dict[str, LinkInPieces]:
     return links
 
 
-def wanted_pieces(solution: Solution) -> dict[str, int]:
+def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
     """Return the number of pieces for bodies with `pieces = "auto"` after a solve; empty if they have it.
 
     What a piece loses of its length goes down with the square of their number. A run that failed has bent links
     farther than they are.
     """
     wanted, now = {}, {}
-    for body in solution.scene.body:
+    for body in prepared.scene.body:
         if body.pieces == "auto":
-            names = solution.divided[body.name].names if body.name in solution.divided else (body.name,)
-            worst = max((_shortening(solution, name) for name in names), default=0.0)
+            names = prepared.divided[body.name].names if body.name in prepared.divided else (body.name,)
+            worst = max((_shortening(prepared, runs, name) for name in names), default=0.0)
             count = enough_pieces(worst, len(names)) if worst > ENOUGH else 1
             wanted[body.name], now[body.name] = max(min(MOST, count), len(names)), len(names)
     return {} if wanted == now else wanted
 
 
-def bending_of_links(solution: Solution, run: Run) -> dict[str, Bending]:
+def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
     """Return deflections of flexible bodies (of links in pieces, the worst piece) and whether they can be divided."""
-    bodies = solution.parts or solution.bodies
+    bodies = prepared.parts or prepared.bodies
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
-    worst = worst_of_pieces(link_bending(run, links), solution.divided)
-    for name in solution.divided:
+    worst = worst_of_pieces(link_bending(run, links), prepared.divided)
+    for name in prepared.divided:
         if worst[name].is_stiffened:
-            worst[name] = replace(worst[name], missing=_missing(solution, run, name))
+            worst[name] = replace(worst[name], missing=_missing(prepared, run, name))
     if not run.is_at_rest:
         worst = shared_in_motion(worst)
     return {
-        name: replace(bent, is_divisible=is_divisible(solution.scene, name)) if bent.is_beyond else bent
+        name: replace(bent, is_divisible=is_divisible(prepared.scene, name)) if bent.is_beyond else bent
         for name, bent in worst.items()
     }
 
 
-def _missing(solution: Solution, run: Run, name: str) -> Missing:
+def _missing(prepared: Prepared, run: Run, name: str) -> Missing:
     """What the pieces of a link miss, which have geometric stiffening; in motion it makes the link vibrate besides."""
-    link, pieces = solution.bodies[name].modal, []
+    link, pieces = prepared.bodies[name].modal, []
     assert link is not None
-    for piece in solution.divided[name].names:
-        modal, node = solution.parts[piece].modal, node_of(run, piece)
+    for piece in prepared.divided[name].names:
+        modal, node = prepared.parts[piece].modal, node_of(run, piece)
         assert modal is not None
         ends = (section_motion(run, f"{piece}.{end}") for end in ("root", "tip"))
         pieces.append(PieceInMotion(modal, node.body, run.q[:, node.p_q], *ends))
@@ -88,14 +88,11 @@ def _missing(solution: Solution, run: Run, name: str) -> Missing:
     return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
 
 
-def _shortening(solution: Solution, name: str) -> float:
+def _shortening(prepared: Prepared, runs: Sequence[Run], name: str) -> float:
     """The largest of a body of the equations over all analyses, of its length."""
-    modal = (solution.parts or solution.bodies)[name].modal
+    modal = (prepared.parts or prepared.bodies)[name].modal
     assert modal is not None
-    shortenings = [
-        shape_from_chord(modal, modal_coordinates(result.run, name))[2].max(initial=0.0)
-        for result in solution.analyses.values()
-    ]
+    shortenings = [shape_from_chord(modal, modal_coordinates(run, name))[2].max(initial=0.0) for run in runs]
     return float(max(shortenings, default=0.0)) / modal.length
 
 

@@ -40,7 +40,7 @@ def made_solution(scene: Scene, bodies: Bodies, seconds: Mapping[str, float]) ->
         own = {"joints": start.guesses, "angles": {}, "branch": {}}
         scene = scene.model_copy(update={"initial": scene.initial.model_copy(update=own)})
         model = _model(scene, bodies, patches, {}, {}, stiffened)
-    return Solution(scene, model, bodies, patches, {}, seconds, points=points, stiffened=stiffened)
+    return Solution(scene, model, bodies, patches, points=points, stiffened=stiffened, seconds=seconds)
 
 
 def with_bodies(solution: Solution, spatial: Mapping[str, Body]) -> Solution:

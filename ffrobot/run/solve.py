@@ -13,28 +13,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..actuation.context import ActuatedContext
-from ..actuation.points import PointForces, forces_at_points, solve_points
-from ..common.arrays import Array, Indices
-from ..common.errors import FfrobotError, InputError, SolveError, of_file
+from ..actuation.points import forces_at_points
+from ..common.errors import FfrobotError, SolveError, of_file
 from ..mbs.posture.reach import turned_guesses
 from ..mbs.posture.start import check_turning
-from ..mbs.quantities.motion import reported_points
-from ..mbs.quantities.reactions import reactions, shared_evenly
-from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
-from ..mbs.quantities.supply import actuator_forces, gear_motions, totals
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.run.record import Run
-from ..mbs.scene.analysis import Analysis, TimedAnalysis
+from ..mbs.scene.analysis import Analysis
 from ..scene.load import load_scene
 from ..scene.scene import Scene
-from .actuation import Actuation, find_actuation, missing_forces
 from .bodies import load_bodies
 from .fastest import with_paths
 from .mode_choice import mode_levels, reported_modes
-from .pieces import bending_of_links, links_in_pieces, wanted_pieces
+from .pieces import wanted_pieces
 from .prepare import check_replays, made_solution, with_bodies, with_pieces, with_scene, with_stiffening
-from .solution import AnalysisResult, Histories, Solution
-from .stresses import find_stresses
+from .result import AnalysisResult
+from .solution import Solution
 from .watcher import Interruption, Watcher
 from .whole_links import make_whole_links
 
@@ -47,18 +41,24 @@ logger = logging.getLogger(__name__)
 Keep = Callable[[Solution], None]
 
 
-def solve_scene(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
+def solve_scene(
+    scene: Scene | Path,
+    watcher: Watcher | None = None,
+    keep: Keep | None = None,
+    wanted: frozenset[str] | None = None,
+) -> Solution:
     """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
 
     Shapers for the robot's frequencies and the fastest motion are found first (see `fastest`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run (`Run.check_completed`).
-    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
+    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised. Nothing is evaluated
+    for the results file but what is `wanted` (see `Solution`).
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
-    return run_analyses(prepare_scene(scene, watcher), watcher, keep)
+    return run_analyses(replace(prepare_scene(scene, watcher), wanted=wanted), watcher, keep)
 
 
 def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
@@ -112,7 +112,7 @@ def _with_deviations(solution: Solution, interruption: Interruption) -> Solution
         try:
             with of_file(solution.scene.path):
                 context = _context(solution, result.analysis, results, interruption)
-                results[name] = replace(result, deviations=deviations(context, result.run))
+                results[name] = result.having(deviations=deviations(context, result.run))
         except Exception as error:
             failure = failure or error
     return replace(solution, analyses=results, failure=failure)
@@ -141,7 +141,10 @@ def _with_enough_pieces(solution: Solution, interruption: Interruption) -> Solut
     """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
     solution = _completed(solution, interruption)
     given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
-    while solution.failure is None and not interruption.requested and (more := wanted_pieces(solution)):
+    while solution.failure is None and not interruption.requested:
+        more = wanted_pieces(solution, list(solution.outcomes.values()))
+        if not more:
+            break
         solution = _completed(with_pieces(solution, {**given, **more}, interruption.watcher), interruption)
     return solution
 
@@ -198,11 +201,11 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
             interruption.at_once = False
         try:
             with of_file(solution.scene.path), run.arithmetic:
-                result = _result(solution, run, results)
+                result = AnalysisResult.of(solution, run, results)
         except Exception as error:  # raised once the integration is kept
             return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if automatic and result.stiffening_effect > NOTABLE_STIFFNESS_CHANGE and run.status != "interrupted":
+        if automatic and run.status != "interrupted" and result.stiffening_effect > NOTABLE_STIFFNESS_CHANGE:
             return None
         results[analysis.name] = result
         seconds[analysis.name] = time.perf_counter() - began
@@ -247,95 +250,6 @@ def _context(
         carrying={name: body.carrying for name, body in solution.bodies.items()},
         whole=make_whole_links(solution),
     )
-
-
-def _result(solution: Solution, run: Run, earlier: Mapping[str, AnalysisResult]) -> AnalysisResult:
-    """What is read off a run; what has peaks at its outputs and between, as far as that is known."""
-    seen, sharing = shared_evenly(replace(run, links=links_in_pieces(solution)))
-    twists = {joint: gear.curve for joint, gear in gear_motions(seen).items()}  # splines through outputs
-    known = {joint: curve for joint, curve in twists.items() if curve is not None}
-    closest = seen
-    if run.closer is not run and len(known) == len(twists):
-        closest = shared_evenly(replace(run.closer, links=seen.links, twists=known))[0]
-    histories = _histories(solution, closest, np.searchsorted(closest.time, run.time))
-    energies, momentum = totals(seen)
-    result = AnalysisResult(
-        run=seen,
-        energies=energies,
-        momentum=momentum,
-        histories=histories,
-        sharing=sharing,
-        bending=bending_of_links(solution, closest),
-        point_forces=histories.point_forces if closest is seen else _point_forces(solution, run),
-        settling=_settling(solution, seen, earlier),
-    )
-    return replace(result, predicted_shift=_predicted_shift(solution, result))
-
-
-def _settling(solution: Solution, run: Run, earlier: Mapping[str, AnalysisResult]) -> dict[str, Settling]:
-    """By point, of a run that goes on after the paths that it, or the analysis that it replays, follows."""
-    analysis = run.analysis
-    source = earlier.get(analysis.source or "") if analysis.takes_actuation else None
-    commanding = run if source is None else source.run
-    if not isinstance(analysis, TimedAnalysis) or run.status != "completed":
-        return {}
-    rest = commanded_rest(commanding)
-    if rest is None or not rest.since < run.time[-1]:
-        return {}
-    metrics = getattr(run.details, "metrics", None)
-    lowest = rest.frequency if metrics is None else metrics.lowest_frequency
-    points = list(end_points(solution.scene, reported_points(run)))
-    return settling(replace(run.closer, links=run.links), rest, points, analysis.settled, lowest)
-
-
-def _predicted_shift(solution: Solution, result: AnalysisResult) -> dict[str, Array]:
-    """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces as of the whole links.
-
-    None where the joints of whole links cannot say how the pieces move.
-    """
-    run, of = result.run, result.histories
-    missing = {} if of.actuation is None else missing_forces(of.run, of.actuation)
-    if not missing:
-        return {}
-    from ..actuation.feasibility import quasi_static_shift
-
-    points = [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
-    if (whole := make_whole_links(solution)) is not None:
-        try:
-            run = whole.as_links(run)
-        except InputError:
-            return {}
-    return quasi_static_shift(run, {name: forces[of.outputs] for name, forces in missing.items()}, points)
-
-
-def _actuation(solution: Solution, run: Run) -> Actuation | None:
-    """What a run asks of motors and patches; None where nothing is asked of them."""
-    if actuator_forces(run) is None or not run.analysis.is_motion:
-        return None
-    actuation = find_actuation(solution.scene, run, solution.bodies, solution.patches)
-    if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
-        from ..mbs.analysis.operating_points import open_loop_growth
-
-        missed = replace(missed, growth=open_loop_growth(run))
-        actuation = replace(actuation, feasibility=replace(actuation.feasibility, unsupplied=missed))
-    return actuation
-
-
-def _histories(solution: Solution, run: Run, outputs: Indices) -> Histories:
-    return Histories(
-        run=run,
-        outputs=outputs,
-        reactions=reactions(run),
-        actuation=_actuation(solution, run),
-        stresses=find_stresses(run, solution.parts or solution.bodies, solution.patches, solution.divided),
-        point_forces=_point_forces(solution, run),
-    )
-
-
-def _point_forces(solution: Solution, run: Run) -> dict[str, PointForces]:
-    if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
-        return {name: solve_points(points, run) for name, points in solution.points.items()}
-    return {}
 
 
 def _log(run: Run) -> None:

@@ -17,20 +17,20 @@ from ..mbs.run.context import WholeLinks
 from ..mbs.run.record import Run
 from ..scene.pieces import places_on_pieces
 from .pieces import links_in_pieces
-from .solution import Solution
+from .prepared import Prepared
 
 
-def make_whole_links(solution: Solution) -> WholeLinks | None:
-    """The links of a solution in which some are in pieces; None where none is."""
-    if solution.whole is None:
+def make_whole_links(prepared: Prepared) -> WholeLinks | None:
+    """The links of a scene in which some are in pieces; None where none is."""
+    if prepared.whole is None:
         return None
     divided = {}
-    for name, link in links_in_pieces(solution).items():
-        own = (solution.parts[piece].spatial for piece in link.names)
+    for name, link in links_in_pieces(prepared).items():
+        own = (prepared.parts[piece].spatial for piece in link.names)
         pieces = [PieceOfLink(*of) for of in zip(link.starts, link.pieces, own, strict=True)]
-        divided[name] = divided_link_of(link.modal, solution.bodies[name].spatial, pieces)
-    places = places_on_pieces(solution.divided)
-    return WholeLinks(solution.whole, divided, places, partial(_as_links, solution.whole, divided))
+        divided[name] = divided_link_of(link.modal, prepared.bodies[name].spatial, pieces)
+    places = places_on_pieces(prepared.divided)
+    return WholeLinks(prepared.whole, divided, places, partial(_as_links, prepared.whole, divided))
 
 
 def _as_links(whole: Model, divided: Mapping[str, DividedLink], run: Run) -> Run:

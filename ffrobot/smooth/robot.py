@@ -22,7 +22,7 @@ from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
 from ..run.prepare import with_scene
-from ..run.solution import AnalysisResult
+from ..run.result import AnalysisResult
 from ..run.solve import prepare_scene, run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene

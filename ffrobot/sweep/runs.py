@@ -51,7 +51,10 @@ OF_MODES = {"linear", "joints_locked", "joints_compliant"}
 
 @dataclass(frozen=True)
 class SweepRun:
-    """One combination of values: the paths of its files, the quantities to collect, and its input."""
+    """One combination of values: the paths of its files, the quantities to collect, and its input.
+
+    `wanted`: see `Sweep`.
+    """
 
     number: int
     values: tuple[Any, ...]
@@ -59,6 +62,7 @@ class SweepRun:
     collect: tuple[str, ...] = ()
     inputs: dict[str, str] = field(default_factory=dict)
     allow_python: tuple[Path, ...] = ()
+    wanted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Row:
     """Row of a run: `status` "completed", "wrong input", "failed" or "crashed", with the program's message.
 
     `inputs` are the fingerprints of what it was made from: see `run.inputs`; among them those of the files `imported`
-    by the scene's Python files, which nobody knows before the run.
+    by the scene's Python files, which nobody knows before the run. `wanted`: what alone its results have; empty: all.
     """
 
     number: int
@@ -76,6 +80,11 @@ class Row:
     quantities: dict[str, float] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
     imported: tuple[str, ...] = ()
+    wanted: tuple[str, ...] = ()
+
+    def has(self, wanted: tuple[str, ...]) -> bool:
+        """Whether the results have what is `wanted`, as of `Sweep`."""
+        return not self.wanted or (bool(wanted) and set(wanted) <= set(self.wanted))
 
     def changes(self, inputs: Mapping[str, str]) -> list[str]:
         """Return names of inputs that have changed since the run; see `run.inputs.changed`."""
@@ -93,6 +102,7 @@ def perform(run: SweepRun) -> Row | None:
             left.unlink(missing_ok=True)
     arguments = ["solve", str(run.folder / SCENE), "-o", str(made)]
     arguments += [f"--allow-python={path}" for path in run.allow_python]
+    arguments += [f"--wanted={name}" for name in run.wanted]
     code, printed, imported = own_worker().perform(arguments)
     if made.exists():
         made.replace(results)
@@ -102,16 +112,17 @@ def perform(run: SweepRun) -> Row | None:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
     message = "" if code == 0 else _message(printed, run.folder, code)
-    quantities = _quantities(results, run.collect) if results.exists() else {}
+    quantities = _quantities(results, run) if results.exists() else {}
     inputs = run.inputs | imported
-    return Row(run.number, run.values, status, message, quantities, inputs=inputs, imported=tuple(imported))
+    about = {"inputs": inputs, "imported": tuple(imported), "wanted": run.wanted}
+    return Row(run.number, run.values, status, message, quantities, **about)
 
 
 def finished_row(folder: Path) -> Row | None:
     """Return the row that a completed earlier run wrote to `folder`; None if there is none."""
     with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
         data = json.loads((folder / ROW).read_text(encoding="utf-8"))
-        return Row(**(data | {key: tuple(data.get(key, ())) for key in ("values", "imported")}))
+        return Row(**(data | {key: tuple(data.get(key, ())) for key in ("values", "imported", "wanted")}))
     return None
 
 
@@ -124,16 +135,19 @@ def _message(printed: str, folder: Path, code: int) -> str:
     return message.replace(f"{folder.absolute()}{os.sep}", "").replace(f"{folder}{os.sep}", "")
 
 
-def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:
+def _quantities(path: Path, run: SweepRun) -> dict[str, float]:
+    """How the analyses went; of whole results also the standard quantities, and those to collect."""
     with Results(path) as results:
         quantities: dict[str, float] = {}
         for analysis in results.analyses:
             about = results.attributes(analysis)
             quantities |= {f"{analysis} {key}": float(about[key]) for key in ("steps", "wall_seconds")}
+            if run.wanted:
+                continue
             quantities[f"{analysis} warnings"] = float(len(about["warnings"]))
             for name in _standard(results, analysis):
                 quantities[f"{name} max"] = _reduce(results, name, "max")
-        for request in collect:
+        for request in run.collect:
             name, reduction = collected(request)
             if name in SETTLING:
                 with suppress(InputError):

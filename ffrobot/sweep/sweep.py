@@ -39,7 +39,8 @@ class Sweep:
     `collect` names histories whose reductions become columns beside the standard ones; see `runs.REDUCTIONS`. `fixed`
     are changes that all points share, `own` the values that the scene has itself, which change nothing. `growing`: of
     the points of a search, which has `earlier` rows and may have later ones; folders of runs are then named by what
-    their scenes have changed, and their results stay, to be read.
+    their scenes have changed, and their results stay, to be read. `wanted`: datasets and groups of the results, with
+    their analysis, where no others are needed.
     """
 
     scene: Path
@@ -52,6 +53,7 @@ class Sweep:
     own: tuple[Value, ...] = ()
     growing: bool = False
     earlier: tuple[Row, ...] = ()
+    wanted: tuple[str, ...] = ()
 
     @property
     def keys(self) -> list[str]:
@@ -72,8 +74,9 @@ class Sweep:
     def runs(self) -> list[SweepRun]:
         """Runs in the order of the table."""
         folder = self.folder.absolute() / "runs"
+        common = {"collect": self.collect, "allow_python": self.allow_python, "wanted": self.wanted}
         return [
-            SweepRun(k, values, folder / self._name(k, values), self.collect, {}, self.allow_python)
+            SweepRun(k, values, folder / self._name(k, values), **common)
             for k, values in enumerate(self.points, start=len(self.earlier))
         ]
 
@@ -170,13 +173,18 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, SweepRun]]:
     rows, waiting = {}, {}
     for run in sweep.runs:
         files, row = _files(sweep, run), finished_row(run.folder)
-        is_whole = not sweep.growing or (run.folder / RESULTS).exists()  # their results are to be read
-        if row is not None and not row.changes(files.inputs) and (is_whole or row.status != "completed"):
+        if row is not None and not row.changes(files.inputs) and _is_whole(sweep, run, row):
             rows[run.number] = replace(row, number=run.number, values=run.values)
         else:
             files.write(run.folder)
             waiting[run.number] = replace(run, inputs=files.inputs)
     return rows, waiting
+
+
+def _is_whole(sweep: Sweep, run: SweepRun, row: Row) -> bool:
+    """Whether all is there that is read of a finished run."""
+    can_be_read = (run.folder / RESULTS).exists() and row.has(sweep.wanted)
+    return can_be_read or not sweep.growing or row.status != "completed"
 
 
 def _files(sweep: Sweep, run: SweepRun) -> RunFiles:
@@ -281,5 +289,6 @@ def _width(header: str) -> int:
 
 
 def _quantities(rows: Sequence[Row]) -> list[str]:
-    """All that is not zero in every row: points at which a link cannot bend are no news."""
+    """All that is not zero in every row: points at which a link cannot bend are no news. Of studies what they ask."""
+    rows = [row for row in rows if row.wanted] or rows
     return list(dict.fromkeys(name for row in rows for name, value in row.quantities.items() if value != 0.0))

@@ -9,6 +9,7 @@ import tomli_w
 from small_robots import SWING
 
 import ffrobot
+from ffrobot.design.responses import parse_response
 from ffrobot.pictures.studies.study import (
     Band,
     Bars,
@@ -17,6 +18,10 @@ from ffrobot.pictures.studies.study import (
     read_study,
     study_files,
 )
+from ffrobot.results.file import Results
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve_scene
+from ffrobot.scene.load import make_scene
 
 OUTER, INNER = "links.arm.geometry.section.outer", "links.arm.geometry.section.inner"
 DENSITY = "links.arm.material.density"
@@ -143,3 +148,37 @@ def test_a_folder_without_a_study(ffrobot, tmp_path):
     done = ffrobot("report", tmp_path)
     assert done.returncode == 2
     assert "expected a folder of ffrobot sensitivity, optimise or uncertainty" in done.stderr
+
+
+PATCHES = {
+    "body": "arm", "count": 3, "length": 0.1, "width": 0.01, "thickness": 5e-4, "modulus": 63e9, "d31": 110e-12,
+    "structural": False, "limit": 20.0,
+}  # fmt: skip
+ANALYSES = [
+    *SWING["analysis"],
+    {
+        "name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints",
+        "end": 0.1, "output_step": 0.01,
+    },
+]  # fmt: skip
+RESPONSES = [
+    "peak joints.shoulder.moment", "rms forward.points.arm.tip.deflection", "energy joints.shoulder",
+    "peak pzt.arm.required_voltage", "peak joints.shoulder.reaction", "mean trajectories.swing.force",
+    "peak forward.bodies.arm.modal", "at 0.05 energy.kinetic", "mass arm", "frequency 1 arm",
+]  # fmt: skip
+
+
+def test_runs_write_what_responses_read(tmp_path):
+    """And evaluate nothing else: with the bits of a whole solve."""
+    scene = make_scene(folder=tmp_path, **SWING | {"pzt": [PATCHES], "analysis": ANALYSES})
+    image = results_image(solve_scene(scene))
+    for response in map(parse_response, RESPONSES):
+        with Results.from_image(image, scene.path) as whole:
+            reading = response.read(whole)
+            part = results_image(solve_scene(scene, wanted=frozenset(whole.asked)))
+            with Results.from_image(part, scene.path) as results:
+                assert repr(response.read(results)) == repr(reading)
+                assert set(results) < set(whole)
+                assert len(results.keys()) < len(whole.keys()) / 2
+                for name in results:
+                    np.testing.assert_array_equal(results[name], whole[name])

@@ -1,0 +1,315 @@
+"""What is read off a run: evaluated where it is asked for, since studies ask for little of most runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import field, replace
+from functools import cached_property
+from math import hypot
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from ..actuation.points import solve_points
+from ..common.arrays import Array, Indices
+from ..common.errors import InputError
+from ..common.structs import struct
+from ..mbs.model.known_motion import Wrench
+from ..mbs.posture.limits import left_ranges
+from ..mbs.quantities.attachment_error import (
+    Start,
+    mode_error,
+    modes_in_motion,
+    phase_error,
+    start_jolt,
+    start_of_motion,
+)
+from ..mbs.quantities.motion import reported_points
+from ..mbs.quantities.path_seen import path_warnings
+from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
+from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
+from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.supply import Energies, Momentum, actuator_forces, gear_motions, totals
+from ..mbs.quantities.validity import Bending, deflection_warning, doubts
+from ..mbs.run.gears import unresolved_gears
+from ..mbs.run.record import Run
+from ..mbs.scene.analysis import Analysis, IntegratedAnalysis, TimedAnalysis
+from .actuation import Actuation, find_actuation, missing_forces
+from .pieces import bending_of_links, links_in_pieces
+from .prepared import Prepared
+from .stresses import find_stresses
+from .whole_links import make_whole_links
+
+if TYPE_CHECKING:  # most scenes have none of these
+    from ..actuation.points import PointForces
+    from .robustness import Deviations
+
+
+@struct
+class FinerCheck:
+    """Result of a forward simulation on links with twice the modes.
+
+    Attributes:
+        modes: eigenmodes of each flexible body in it.
+        point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
+        error: by how much, m, at worst.
+        status: how the replay ended.
+        growth: mean rate, 1/s, at which the open loop multiplies deviations of the inverse analysis; nan if unknown.
+        least_voltage: V, that tracking needs with these modes; None of other kinds.
+    """
+
+    modes: Mapping[str, int]
+    point: str
+    error: float
+    status: str
+    growth: float
+    least_voltage: float | None = None
+
+    @property
+    def in_words(self) -> str:
+        """Number of modes, largest deviation and least voltage as text."""
+        ended = "" if self.status == "completed" else f", which ended early ({self.status})"
+        modes = ", ".join(map(str, dict.fromkeys(self.modes.values()))) or "no"
+        least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
+        if self.least_voltage is not None and np.isnan(self.least_voltage):
+            least = "; no motion within the limits was found with these modes, so their least voltage is not known"
+        grown = f", in an open loop in which deviations grow by {self.growth:.2g} 1/s" if self.growth > 0.0 else ""
+        off = f"{self.point} is off by {1e3 * self.error:.2g} mm{grown}"
+        return f"forward simulation on {modes} modes{ended}: {off}{least}"
+
+
+@struct
+class Histories:
+    """Quantities with peaks, at outputs of an analysis and at times between them.
+
+    Attributes:
+        prepared: the scene.
+        run: at these times.
+        outputs: (T,) which of the times are outputs.
+    """
+
+    prepared: Prepared = field(repr=False)
+    run: Run
+    outputs: Indices
+
+    @cached_property
+    def reactions(self) -> Mapping[str, Wrench]:
+        """Forces in joints by name."""
+        return reactions(self.run)
+
+    @cached_property
+    def actuation(self) -> Actuation | None:
+        """What patches have to do, and whether motors and patches can; None where nothing is asked of them."""
+        run, prepared = self.run, self.prepared
+        if actuator_forces(run) is None or not run.analysis.is_motion:
+            return None
+        actuation = find_actuation(prepared.scene, run, prepared.bodies, prepared.patches)
+        if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
+            from ..mbs.analysis.operating_points import open_loop_growth
+
+            missed = replace(missed, growth=open_loop_growth(run))
+            actuation = replace(actuation, feasibility=replace(actuation.feasibility, unsupplied=missed))
+        return actuation
+
+    @cached_property
+    def stresses(self) -> Mapping[str, BodyStress]:
+        """By body, where modal body files hold modal stresses."""
+        prepared = self.prepared
+        return find_stresses(self.run, prepared.parts or prepared.bodies, prepared.patches, prepared.divided)
+
+    @cached_property
+    def point_forces(self) -> Mapping[str, PointForces]:
+        """At actuation points, by body."""
+        return _point_forces(self.prepared, self.run)
+
+
+@struct
+class AnalysisResult:
+    """Results of one analysis.
+
+    Attributes:
+        prepared: the scene.
+        run: its motion, with forces that redundant constraints share, and how it went.
+        histories: what has peaks.
+        commanding: the run whose paths it follows: itself, or the one that it replays.
+        sharing: reactions that redundant constraints leave open; None where there are none.
+        check: what a replay on finer links found, where that is asked for.
+        deviations: what is left of it where the robot is not its model, where that is asked for.
+    """
+
+    prepared: Prepared = field(repr=False)
+    run: Run
+    histories: Histories = field(repr=False)
+    commanding: Run = field(repr=False)
+    sharing: Sharing | None = None
+    check: FinerCheck | None = None
+    deviations: Deviations | None = None
+
+    @classmethod
+    def of(cls, prepared: Prepared, run: Run, earlier: Mapping[str, AnalysisResult]) -> Self:
+        """What is read off a run; what has peaks at its outputs and between, as far as that is known."""
+        seen, sharing = shared_evenly(replace(run, links=links_in_pieces(prepared)))
+        twists = {joint: gear.curve for joint, gear in gear_motions(seen).items()}  # splines through outputs
+        known = {joint: curve for joint, curve in twists.items() if curve is not None}
+        closest = seen
+        if run.closer is not run and len(known) == len(twists):
+            closest = shared_evenly(replace(run.closer, links=seen.links, twists=known))[0]
+        outputs = np.searchsorted(closest.time, run.time)
+        source = earlier.get(run.analysis.source or "") if run.analysis.takes_actuation else None
+        commanding = seen if source is None else source.run
+        result = cls(prepared, seen, Histories(prepared, closest, outputs), commanding, sharing)
+        if prepared.wanted is None:  # now: an error is one of the outputs of this analysis
+            of = result.histories
+            _ = of.reactions, of.actuation, of.stresses, of.point_forces, result._totals, result.bending
+            _ = result.point_forces, result.settling, result.predicted_shift
+        return result
+
+    def wants(self, *names: str) -> bool:
+        """Whether the results file has one of these datasets or groups of the analysis, or a part of it."""
+        return any(self.prepared.wants(f"{self.analysis.name}/{name}") for name in names)
+
+    def having(self, **others: Any) -> Self:
+        """The same with other values of its fields, and with all that is evaluated."""
+        made = copy(self)
+        vars(made).update(others)
+        return made
+
+    @cached_property
+    def _totals(self) -> tuple[Energies, Momentum]:
+        return totals(self.run)
+
+    @property
+    def energies(self) -> Energies:
+        """Of the robot."""
+        return self._totals[0]
+
+    @property
+    def momentum(self) -> Momentum:
+        """Of the robot."""
+        return self._totals[1]
+
+    @cached_property
+    def point_forces(self) -> Mapping[str, PointForces]:
+        """At actuation points, by body."""
+        of = self.histories
+        return of.point_forces if of.run is self.run else _point_forces(self.prepared, self.run)
+
+    @cached_property
+    def bending(self) -> Mapping[str, Bending]:
+        """How far flexible bodies leave small deformations, and what loads do to their stiffness."""
+        return bending_of_links(self.prepared, self.histories.run)
+
+    @cached_property
+    def settling(self) -> Mapping[str, Settling]:
+        """By point, of a run that goes on after the paths that it, or the analysis that it replays, follows."""
+        run, analysis = self.run, self.run.analysis
+        if not isinstance(analysis, TimedAnalysis) or run.status != "completed":
+            return {}
+        rest = commanded_rest(self.commanding)
+        if rest is None or not rest.since < run.time[-1]:
+            return {}
+        metrics = getattr(run.details, "metrics", None)
+        lowest = rest.frequency if metrics is None else metrics.lowest_frequency
+        points = list(end_points(self.prepared.scene, reported_points(run)))
+        return settling(replace(run.closer, links=run.links), rest, points, analysis.settled, lowest)
+
+    @cached_property
+    def predicted_shift(self) -> Mapping[str, Array]:
+        """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces that of the links.
+
+        None where the joints of whole links cannot say how the pieces move.
+        """
+        run, of = self.run, self.histories
+        missing = {} if of.actuation is None else missing_forces(of.run, of.actuation)
+        if not missing:
+            return {}
+        from ..actuation.feasibility import quasi_static_shift
+
+        points = [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
+        if (whole := make_whole_links(self.prepared)) is not None:
+            try:
+                run = whole.as_links(run)
+            except InputError:
+                return {}
+        return quasi_static_shift(run, {name: forces[of.outputs] for name, forces in missing.items()}, points)
+
+    @cached_property
+    def reactions(self) -> Mapping[str, Wrench]:
+        """Forces in joints by name."""
+        of, outputs = self.histories.reactions, self.histories.outputs
+        return {joint: Wrench(acting.force[outputs], acting.moment[outputs]) for joint, acting in of.items()}
+
+    @cached_property
+    def actuation(self) -> Actuation | None:
+        """Requirements on motors and patches at outputs; None if nothing is prescribed."""
+        actuation = self.histories.actuation
+        return None if actuation is None else actuation.at(self.histories.outputs)
+
+    @property
+    def analysis(self) -> Analysis:
+        """Record of the analysis."""
+        return self.run.analysis
+
+    @cached_property
+    def mode_error(self) -> float | None:
+        """Estimated for too few modes, of peaks; None where it is not known."""
+        error = mode_error(modes_in_motion(self.run)) if self._is_integrated else None
+        return None if error is None else hypot(error, phase_error(self._start))
+
+    @cached_property
+    def start_jolt(self) -> float:
+        """Relative jump of acceleration at the start; see `attachment_error`."""
+        return start_jolt(self._start) if self._is_integrated else 0.0
+
+    @cached_property
+    def _start(self) -> Start:
+        return start_of_motion(self.run)
+
+    @property
+    def _is_integrated(self) -> bool:
+        return self.analysis.is_integrated and len(self.run.time) > 0
+
+    @property
+    def status(self) -> str:
+        """Status of the run, such as "completed"."""
+        return self.run.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to doubt the results, one text each, most serious first."""
+        bent, run = deflection_warning(self.bending), self.run
+        texts = [bent] if bent else []
+        texts += [*self._doubts, *run.statistics.warnings, *unresolved_gears(gear_motions(run)), *run.details.warnings]
+        if not isinstance(self.analysis, IntegratedAnalysis) and len(run.time):
+            of = self.histories.run
+            texts += left_ranges(of.model, None, of.time, of.q, of.v)
+        if run.is_prescribed:
+            texts += path_warnings(run.analysis, run.time, run.model.scene.trajectory)
+        if self.actuation is not None and (missed := self.actuation.feasibility.unsupplied) is not None:
+            texts.append(missed.in_words)
+        return tuple(texts)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Properties of correct results, a text each."""
+        model = self.run.model
+        texts = () if self.sharing is None else (self.sharing.in_words,)
+        if self.run.is_prescribed and model.tree.loops and not model.motors:
+            return (*texts, "no motors, so no torques: joints of kinematic loops have motors with motor = true alone")
+        return texts
+
+    @cached_property
+    def _doubts(self) -> tuple[str, ...]:
+        return tuple(doubts(self.run, self.run.analysis.tolerance))
+
+    @property
+    def stiffening_effect(self) -> float:
+        """Largest relative change of a link's stiffness by the loads of the run."""
+        return max((link.stiffness_change for link in self.bending.values()), default=0.0)
+
+
+def _point_forces(prepared: Prepared, run: Run) -> dict[str, PointForces]:
+    if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
+        return {name: solve_points(points, run) for name, points in prepared.points.items()}
+    return {}
