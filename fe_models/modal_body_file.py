@@ -83,7 +83,31 @@ def read_modal_body(path: AnyPath) -> ModalBody:
     Example:
         ffrobot.read_modal_body("arm.h5").mass  # kg
     """
-    return _read(Path(path), _body)
+    path = Path(path)
+    found = _found(path)
+    read_files.add(path)
+    return found if found is not None else _read(path, _body)
+
+
+_kept = dict[Path, tuple[object, ModalBody]]()
+read_files = set[Path]()
+"""Modal body files that this process, or one that it is forked from, has read."""
+
+
+def keep_modal_body(path: Path) -> None:
+    """Read a file for this process and those forked from it: none of them reads it again until it changes."""
+    if _found(path) is None:
+        _kept[path] = _state(path), _read(path, _body)
+
+
+def _found(path: Path) -> ModalBody | None:
+    state, body = _kept.get(path, (None, None))
+    return body if state is not None and state == _state(path) else None
+
+
+def _state(path: Path) -> object:
+    about = path.stat() if path.is_file() else None
+    return about and (about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns, about.st_ctime_ns)
 
 
 def read_mass(path: Path) -> float:

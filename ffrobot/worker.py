@@ -2,9 +2,10 @@
 
 It loads the program once, and forks for every scene: what a run does to its process (a crash, memory, the folder it is
 in, modules and caches that a scene's Python functions leave) ends with that run, and a run finds what one of
-`ffrobot solve` finds. Requests and answers are lines of JSON on the standard streams, `{"arguments": ["solve", …]}` and
-`{"code": 0, "imported": {}}`, the exit code as `subprocess` has it and the run's `python_files.imported_files`. What
-runs print on the error stream goes where this process's does.
+`ffrobot solve` finds. Modal bodies that two runs have read, later ones find in memory. Requests and answers are lines
+of JSON on the standard streams, `{"arguments": ["solve", …]}` and `{"code": 0, "imported": {}}`, the exit code as
+`subprocess` has it and the run's `python_files.imported_files`. What runs print on the error stream goes where this
+process's does.
 """
 
 from __future__ import annotations
@@ -19,13 +20,16 @@ import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from tempfile import TemporaryFile
 from types import FrameType
 from typing import Any, BinaryIO, NoReturn
 
 from .common.deferred import USED
+from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand, end_process, end_with_parent
 from .common.python_files import imported_files
+from .fe_models.modal_body_file import keep_modal_body, read_files
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
     "ffrobot.cli",
@@ -48,6 +52,7 @@ def main() -> None:
     report = TemporaryFile()  # noqa: SIM115 (as long as the worker)
     _load(LOADED)
     gc.freeze()  # runs share what is loaded as long as none looks through it
+    read_before = set[str]()
     for line in requests:
         report.truncate(0)
         report.seek(0)
@@ -60,6 +65,10 @@ def main() -> None:
         answers.write(json.dumps({"code": code, "imported": reported.get("imported", {})}).encode() + b"\n")
         answers.flush()
         _load(reported.get("loaded", []))
+        for path in read_before.intersection(reported.get("read", [])):
+            with suppress(FfrobotError):
+                keep_modal_body(Path(path))
+        read_before.update(reported.get("read", []))
 
 
 def _report(report: BinaryIO) -> dict[str, Any]:
@@ -105,7 +114,7 @@ def _run(arguments: Sequence[str], report: BinaryIO) -> NoReturn:
     names += [f"{record.__module__}:{record.__qualname__}" for record in USED]
     imported = {str(file): digest for file, digest in imported_files().items()}
     with suppress(OSError):
-        report.write(json.dumps({"loaded": names, "imported": imported}).encode())
+        report.write(json.dumps({"loaded": names, "imported": imported, "read": [*map(str, read_files)]}).encode())
         report.flush()
     if "mpi4py.MPI" in loaded:  # it has to be finished where it was begun
         sys.exit(code)

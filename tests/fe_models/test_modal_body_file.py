@@ -10,7 +10,7 @@ from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import OutlinedPatches, StressPoint
-from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
+from ffrobot.fe_models.modal_body_file import keep_modal_body, read_modal_body, write_modal_body
 from ffrobot.present.info import describe
 
 N = 12
@@ -180,3 +180,16 @@ def test_wrong_and_missing_datasets(outcome, name, change):
     said = rf".*{name.split('/')[-1]}: expected finite numbers" if change is not_a_number else ""
     with pytest.raises(InputError, match=rf"link1\.h5: {said}"):
         read_modal_body(outcome.path)
+
+
+def test_a_body_is_kept_until_its_file_changes(outcome, tmp_path):
+    path = tmp_path / "kept.h5"
+    write_modal_body(path, outcome.body)
+    assert read_modal_body(path) is not read_modal_body(path)
+    keep_modal_body(path)
+    assert read_modal_body(path) is read_modal_body(path)
+    write_modal_body(path, replace(outcome.body, mass=2.0 * outcome.body.mass))
+    assert read_modal_body(path).mass == 2.0 * outcome.body.mass
+    path.unlink()
+    with pytest.raises(InputError, match="not found"):
+        read_modal_body(path)
