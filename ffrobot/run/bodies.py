@@ -167,6 +167,8 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
 
 def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> LoadedBody:
     """With the mass and stiffness of its patches, as far as the scene asks for it."""
+    if not any(layout.adds_mass or layout.adds_stiffness for layout in layouts):
+        return body
     from ..actuation.patches.link_patches import link_patches, placed_patches
 
     assert body.modal is not None
