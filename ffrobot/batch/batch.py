@@ -119,6 +119,7 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def _leave() -> NoReturn:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # within a wait for the worker it would wait again, forever
     end_own_worker()
     os._exit(0)
 

@@ -8,13 +8,16 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from threading import Timer
 
 import pytest
 import tomli_w
 
 import ffrobot as library
 from ffrobot.batch.batch import Batch, Processes, _done, batch_of
+from ffrobot.batch.worker import own_worker
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.common.version import VERSION
 
 ARM = {
     "name": "arm",
@@ -129,6 +132,24 @@ def test_processes_end_with_their_batch():
 
 def _pid(_):
     return os.getpid()
+
+
+def _told_twice(_):
+    """The first SIGTERM asks this process to leave, the second one comes while it waits for its worker to end."""
+    worker = own_worker()
+    worker.stop = lambda: None
+    os.kill(os.getpid(), signal.SIGTERM)
+    Timer(0.2, os.kill, (os.getpid(), signal.SIGTERM)).start()
+
+
+def test_processes_that_are_told_twice_end():
+    executor = Processes(1)
+    executor.submit(_done, VERSION, _told_twice, None)
+    (process,) = executor._processes.values()
+    process.join(60.0)
+    alive = process.is_alive()
+    process.kill()
+    assert not alive
 
 
 def test_an_executor_of_the_users_own_stays(scene):
