@@ -7,7 +7,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -114,8 +114,8 @@ def perform(run: SweepRun) -> Row | None:
     message = "" if code == 0 else _message(printed, run.folder, code)
     quantities = _quantities(results, run) if results.exists() else {}
     inputs = run.inputs | imported
-    about = {"inputs": inputs, "imported": tuple(imported), "wanted": run.wanted}
-    return Row(run.number, run.values, status, message, quantities, **about)
+    row = Row(run.number, run.values, status, message, quantities, inputs=inputs)
+    return replace(row, imported=tuple(imported), wanted=run.wanted)
 
 
 def finished_row(folder: Path) -> Row | None:

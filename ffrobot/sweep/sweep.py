@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -74,7 +75,7 @@ class Sweep:
     def runs(self) -> list[SweepRun]:
         """Runs in the order of the table."""
         folder = self.folder.absolute() / "runs"
-        common = {"collect": self.collect, "allow_python": self.allow_python, "wanted": self.wanted}
+        common: dict[str, Any] = dict(collect=self.collect, allow_python=self.allow_python, wanted=self.wanted)
         return [
             SweepRun(k, values, folder / self._name(k, values), **common)
             for k, values in enumerate(self.points, start=len(self.earlier))
