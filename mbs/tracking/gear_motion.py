@@ -118,13 +118,13 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
     driven, gears = asked.driven, asked.gears
     assert isinstance(driven, GearedServo)
     assert gears is not None
-    motion, n = smooth(asked, tracked), len(asked.Phi_V)
-    breaks, still = motion.curve.x, np.zeros((2, 1, n))
+    motion, (n, m) = smooth(asked, tracked), asked.Phi_V.shape
     lasts = step * ceil(LASTS * float((gears.damping / gears.stiffness).max()) / step)
-    at_rest = driven.forces(breaks[-1:], asked.rest[1][None], *still)[1][0]
+    curve, voltage = _held(motion.curve, asked.rest[1], lasts), _held(motion.voltage, np.zeros(m), lasts)
+    breaks, end = curve.x, motion.curve.x[-1]
 
     def curves(breaks: Array, torques: Array) -> dict[str, GearCurve]:
-        of_all, motors = _held(_through(breaks, torques), at_rest, lasts), len(at_rest) - len(gears.joints)
+        of_all, motors = _through(breaks, torques), torques.shape[1] - len(gears.joints)
         return {
             joint: _gear(gears, k, _column(of_all, motors + k), _column(of_all, gears.columns[k]))
             for k, joint in enumerate(gears.joints)
@@ -132,24 +132,19 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
 
     def along(breaks: Array) -> tuple[Array, list[Array]]:
         times = _nodes(breaks)
-        return times, [motion.curve(times, k) for k in range(3)]
+        return times, [curve(times, k) for k in range(3)]
 
     times, states = along(breaks)
     alone = curves(breaks, driven.forces(times, *states)[1])
     pieces = np.concatenate([of.twist.x for of in alone.values()])
-    breaks = np.union1d(breaks, pieces[pieces < breaks[1]])  # where δ̈ begins within D/K
+    breaks = np.union1d(breaks, pieces[(pieces < breaks[1]) | (pieces > end)])  # where δ̈ changes within D/K
     times, states = along(breaks)
     ahead = np.column_stack([of.twist(times, 2) for of in alone.values()]) * gears.inertia
     pushed = np.einsum("Tk,Tkf->Tf", ahead, driven.reactions(times, *states))
     torques = driven.forces(times, *states)[1] + np.hstack([pushed[:, n:], pushed[:, n + gears.columns]])
     more = pushed[:, :n] @ _inverse(asked.Phi_V).T
-    return replace(
-        tracked,
-        curve=_held(motion.curve, asked.rest[1], lasts),
-        voltage=_held(_through(breaks, motion.voltage(times) + more), np.zeros(asked.Phi_V.shape[1]), lasts),
-        gears=curves(breaks, torques),
-        unmet=motion.unmet,
-    )
+    voltage = _through(breaks, voltage(times) + more)
+    return replace(tracked, curve=curve, voltage=voltage, gears=curves(breaks, torques), unmet=motion.unmet)
 
 
 def _inverse(Phi_V: Array) -> Array:
@@ -158,12 +153,17 @@ def _inverse(Phi_V: Array) -> Array:
 
 
 def smooth(asked: Transition, tracked: Tracked) -> Motion:
-    """P as a quintic spline at rest at both ends, and voltages that leave as little on modes as patches can."""
+    """P as a quintic spline at rest at both ends, and voltages that leave as little on modes as patches can.
+
+    Its third derivative is zero there, in place of a condition at the breaks next to the ends: else δ̈ would jump, and
+    its reaction on a link with a gear of its own, whose motor would need an impulse.
+    """
     breaks, elastic = tracked.voltage.x, asked.driven.scale**2
-    still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2)]
-    curve = _on(
-        scipy.interpolate.make_interp_spline(breaks, tracked.curve(breaks), k=5, bc_type=(still, still)), breaks
-    )
+    still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2, 3)]
+    knots = np.concatenate([breaks[:1].repeat(5), breaks, breaks[-1:].repeat(5)])
+    through = np.delete(breaks, [1, -2])
+    spline = scipy.interpolate.make_interp_spline(through, tracked.curve(through), t=knots, k=5, bc_type=(still, still))
+    curve = _on(spline, breaks)
     times = _nodes(breaks)
     p = curve(times)
     wanted = tracked.voltage(times)

@@ -193,13 +193,20 @@ def test_without_voltage_motors_alone_carry():
 
 
 def test_twisting_rotors_push_the_links_that_carry_them():
-    """The arm of 15 Hz whose replay was 0.5 µm off for J N δ̈: forces that links with gears need, in their equations."""
+    """The arm of 15 Hz whose replay was 0.5 µm off for J N δ̈: forces that links with gears need, in their equations.
+
+    Also behind the path's end, where dampers bring gears to rest.
+    """
     scene = ffrobot.make_scene(**random_arm(np.random.default_rng([62, 11]), 0.0)[1])
     solution = prepare_scene(scene, Watcher())
     posed = _pose(solution.model, solution.patches, scene.analysis[0], lambda: True)
     problem = replace(posed.asked, objective="effort")
     found = behind_gears(problem, track(problem, posed.coarse, within=1e-5), 0.001)
-    at = 0.5 * (posed.coarse[1:] + posed.coarse[:-1])
+    lag = (problem.gears.damping / problem.gears.stiffness).max()
+    at = np.append(0.5 * (posed.coarse[1:] + posed.coarse[:-1]), posed.coarse[-1] + lag * np.array([0.1, 0.5, 2, 9]))
+    around_end, along = posed.coarse[-1] + np.array([-1e-9, 1e-9]), np.linspace(0.0, posed.coarse[-1], 999)
+    for of in found.gears.values():  # a rate that jumps would take an impulse
+        assert np.ptp(of.twist(around_end, 1)) < 1e-6 * np.abs(of.twist(along, 1)).max()
     run = outcome_along(found.curve, posed.servo, scene.analysis[0], solution.model, None, at)
     moved = with_motor_coordinates(replace(run, twists=found.gears), with_compliance(solution.model))
     needed = required_forces(with_compliance(solution.model), moved, at)
