@@ -15,7 +15,9 @@ from ..inversion.motors_only import decay_times
 from ..inversion.servo import Servo
 from ..inversion.stable_inversion import invert
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
+from ..model.nodes import rotor
 from ..run.context import Context
+from .geared import without_rotor
 from .intervals import OUT_OF_REACH, settled, start_breaks
 from .path_error import Tolerance, forces_off_path, rows_of_points
 from .transition import Tracked, Transition
@@ -240,12 +242,19 @@ def check_ends_for_gears(servo: Servo) -> float:
     return min(path_orders(servo.functions, servo.end))
 
 
-def singular_times(linear: Linearisation) -> Iterator[str]:
-    """Yield where the modal inertia with free motors changes its sign, and the remedy."""
+def singular_times(servo: Servo, linear: Linearisation) -> Iterator[str]:
+    """Yield where the modal inertia with free motors changes its sign, and the remedy.
+
+    That is a rotor without which its sign stays, or else less mass.
+    """
     for k in linear.singular_after[:1]:
+        names = [node.joint.name for node in servo.model.tree.nodes if rotor(node)[0]]
+        without = {name: replace(servo, model=without_rotor(servo.model, name)) for name in names}
+        rotors = [name for name, other in without.items() if not linearise(other, servo.end).singular_after]
+        remedy = f"Reduce rotor_inertia of {' or '.join(rotors)}" if rotors else "Put less mass behind flexible links"
         yield (
             f"between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s a zero of the modes passes through"
-            " infinity. Put less mass behind flexible links, or take another number of modes in the link files"
+            f" infinity, where the search need not converge. {remedy}, or take another number of modes in link files"
         )
 
 

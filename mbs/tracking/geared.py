@@ -133,7 +133,7 @@ def with_gears(servo: Servo) -> Servo:
         damping=np.array([damping for _, damping in springs.values()]),
         inertia=np.array([inertia * ratio**2 for inertia, ratio in rotors]),
     )
-    without = tuple(replace(servo, model=_without_rotor(model, node.joint.name)) for node in elastic)
+    without = tuple(replace(servo, model=without_rotor(model, node.joint.name)) for node in elastic)
     of_servo = {one.name: getattr(servo, one.name) for one in fields(servo)}
     geared = GearedServo(**of_servo, gears=gears, without=without)
     _check_rotors(geared, np.array([ratio for _, ratio in rotors]))
@@ -165,7 +165,8 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
             )
 
 
-def _without_rotor(model: Model, joint: str) -> Model:
+def without_rotor(model: Model, joint: str) -> Model:
+    """The robot without the inertia of a joint's rotor."""
     tree = copy.copy(model.tree)
     tree.nodes = tuple(
         replace(node, joint=node.joint.model_copy(update={"rotor_inertia": 0.0})) if node.joint.name == joint else node

@@ -116,7 +116,7 @@ def causes(context: Context, posed: Posed) -> str:
     zeros = posed.linear.zeros[[0, -1]]
     return "; ".join(
         [
-            *singular_times(posed.linear),
+            *singular_times(posed.servo, posed.linear),
             *rough_ends(posed.servo.functions, posed.servo.end),
             *far_patches(context, zeros),
         ]

@@ -19,6 +19,7 @@ from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.known_motion import required_forces
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.run.gears import with_motor_coordinates
+from ffrobot.mbs.tracking.advice import singular_times
 from ffrobot.mbs.tracking.gear_motion import behind_gears
 from ffrobot.mbs.tracking.geared import Gears, with_gears
 from ffrobot.mbs.tracking.intervals import graded
@@ -235,6 +236,10 @@ def test_zeros_that_a_rotor_takes_to_infinity(tolerance, expected):
     _, tables = random_arm(np.random.default_rng([62, 7]), tolerance)
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
     end = solution.scene.analysis[0].end
-    linear = linearise(with_gears(make_servo(solution.model, end, "arm", lambda: True, 1.0)), end)
+    servo = with_gears(make_servo(solution.model, end, "arm", lambda: True, 1.0))
+    linear = linearise(servo, end)
     np.testing.assert_allclose(own_changes(tables), expected, atol=1e-3)
     np.testing.assert_allclose(linear.times[list(linear.singular_after)], expected, atol=linear.times[1])
+    assert ["Reduce rotor_inertia of to_fore, or" in text for text in singular_times(servo, linear)] == [True][
+        : len(expected)
+    ]
