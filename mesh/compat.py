@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib import metadata
@@ -34,6 +35,8 @@ if _NEEDS_SETUPTOOLS:
     sys.modules["pkg_resources"] = ModuleType("pkg_resources")
     sys.modules["pkg_resources"].get_distribution = metadata.distribution  # type: ignore[attr-defined]
 
+_SHOWN = warnings.showwarning
+
 import basix  # noqa: E402
 import dolfinx  # noqa: E402
 import ufl  # noqa: E402
@@ -42,6 +45,8 @@ from dolfinx.fem import FunctionSpace  # noqa: E402
 from dolfinx.mesh import CellType, GhostMode, Mesh, create_cell_partitioner, create_mesh  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
+if warnings.showwarning is not _SHOWN:  # FFCx has the log take all warnings, also those of others
+    logging.captureWarnings(False)
 if _NEEDS_SETUPTOOLS:
     del sys.modules["pkg_resources"]
 

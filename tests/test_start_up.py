@@ -125,3 +125,9 @@ def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
     )
     (_, *solves), (_, *libraries) = zip(*((cost(*one) for one in commands) for _ in range(6)), strict=True)
     assert min(solves) < 3 * min(libraries)
+
+
+def test_warnings_stay_warnings_where_links_are_computed():
+    """FFCx of Debian hands all to the log, where nobody who records warnings finds them."""
+    lines = ("import warnings", "shown = warnings.showwarning", "import ffrobot.mesh.compat")
+    assert "dolfinx" in loaded("\n".join([*lines, "assert warnings.showwarning is shown"]))
