@@ -15,7 +15,7 @@ from .._core import TimeFunction
 from ..model.known_motion import State
 from ..model.model import Model
 
-SINGULAR = 2e-6  # ratio of singular values below which a posture counts as singular: round-off leaves 5e-5 of forces
+SINGULAR = 4e-6  # ratio of singular values below which a posture counts as singular: round-off leaves 1e-5 of forces
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
 BRANCHING = 0.05  # ratio below which bent links may take redundant loops from one branch to another
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest

@@ -254,8 +254,8 @@ private:
     const double by_rounding = system_.error_size(attempt.end, method_->end(), left.data());
     if (!(by_rounding <= hopeless))
       return size;
-    by_rounding_ = std::min(scatter * by_rounding, size * allowance.error);
-    return size - by_rounding_ / allowance.error;
+    by_rounding_ = scatter * by_rounding;
+    return std::max(size - by_rounding_ / allowance.error, 0.0);
   }
 
   // That of outputs between its ends, which no later step depends on: relative to the whole tolerance.

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double singular_ratio = 2e-6; // of Posture: below, joints cannot follow, and rounding leaves 5e-5 of forces
+constexpr double singular_ratio = 4e-6; // of Posture: below, joints cannot follow, and rounding leaves 1e-5 of forces
 constexpr double near = 0.01;           // likewise: above, …
 constexpr double brief = 1. / 4000;     // … postures hardly change within this part of a run
 constexpr int instants = 100;           // of a run, at which accelerations on paths are looked at
