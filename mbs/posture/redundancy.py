@@ -28,10 +28,11 @@ from .start import undeformed_posture
 OWNER = "redundancy"  # of the rows that this adds
 NODES = 401  # of the splines that joints follow
 TOLERANCE = 1e-9  # of the motion with rigid links
-INTERVALS = 4  # of the splines by which joints move
+INTERVALS = 6  # of the splines by which joints move
 STRIDE = 10  # of these nodes at which moments count
 OUT_OF_REACH = 1e3
 MOST_MOVES = 40  # to the least torque: most motions take 4 to 10
+TRIALS = 20  # in one of them; one that they do not suffice for is not the last
 LONGEST = 0.5  # of joints in one of them, rad or sizes of the robot
 SETTLED = 1e-4  # share of the integral that the last one takes off
 RANK = 1e-6  # of the largest singular value
@@ -143,8 +144,8 @@ def _least_torque(model: Model, times: Array, q: Array) -> Array:
     """
     last = np.inf
     for _ in range(MOST_MOVES):
-        q, squares = _less_torque(model, times, q)
-        if squares > (1.0 - SETTLED) * last:
+        q, squares, is_least = _less_torque(model, times, q)
+        if is_least and squares > (1.0 - SETTLED) * last:
             return q
         last = squares
     raise SolveError(
@@ -153,8 +154,8 @@ def _least_torque(model: Model, times: Array, q: Array) -> Array:
     )
 
 
-def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float]:
-    """Q (T, n_q) with the least ∫ Σ τ² dt near q, and this integral.
+def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float, bool]:
+    """Q (T, n_q) with the least ∫ Σ τ² dt near q, this integral, and whether the search for it came to its end.
 
     Quintic B-splines, which leave the state at t = 0, lead away from q along what the path leaves free; the nearest
     posture on the path follows, so that nothing leaves its reach.
@@ -186,8 +187,10 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float]:
     size, start = 1.0, np.ones(count * ways.shape[-1])  # at 1, where small steps are far above round-off of postures
     size = float(np.linalg.norm(moments(start))) or 1.0
     near = (start - LONGEST, start + LONGEST)
-    best = scipy.optimize.least_squares(moments, start, diff_step=1e-5, bounds=near, ftol=1e-5, xtol=1e-5, max_nfev=20)
-    return moved(best.x - 1.0, slice(None))[0], 2.0 * best.cost * size**2
+    best = scipy.optimize.least_squares(
+        moments, start, diff_step=1e-5, bounds=near, ftol=1e-5, xtol=1e-5, max_nfev=TRIALS
+    )
+    return moved(best.x - 1.0, slice(None))[0], 2.0 * best.cost * size**2, best.success
 
 
 def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:
