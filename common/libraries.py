@@ -1,9 +1,13 @@
-"""Libraries that only some runs need, as attributes of this module: each is imported when one of its names is used."""
+"""Libraries that only some runs need: imported when one of their names is used; what to say where one is missing."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
+
+from .errors import SolveError
 
 
 class _OnUse:
@@ -19,3 +23,31 @@ class _OnUse:
 
 
 scipy: Any = _OnUse("scipy")
+
+
+PACKAGES = {"imageio_ffmpeg": "imageio-ffmpeg", "trimesh": "trimesh pycollada"}
+"""What pip installs for libraries that it does not have under their own name."""
+ELSEWHERE = ("dolfinx", "basix", "ufl", "ffcx", "petsc4py", "slepc4py", "mpi4py")
+"""Libraries of finite elements, which come with dolfinx."""
+
+
+def missing(error: ModuleNotFoundError) -> str | None:
+    """Return which package to install for a missing module; None for a module of ffrobot."""
+    library = (error.name or "").partition(".")[0]
+    if library in ("", __name__.partition(".")[0]):
+        return None
+    how = "install dolfinx (Debian: python3-dolfinx)"
+    if library not in ELSEWHERE:
+        how = f"pip install {PACKAGES.get(library, library)}"
+    return f"this needs {library}, which is not installed: {how}"
+
+
+@contextmanager
+def extras() -> Iterator[None]:
+    """Context that turns a missing library into `SolveError`, which says what to install."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (message := missing(error)) is None:
+            raise
+        raise SolveError(message) from None

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common.errors import FfrobotWarning, InputError
-from .common.extras import extras
 from .common.files import AnyPath
+from .common.libraries import extras
 from .common.outputs import protected
 
 if TYPE_CHECKING:

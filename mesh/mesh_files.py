@@ -17,7 +17,7 @@ import numpy as np
 
 from ..common.arrays import Integers, NDArray
 from ..common.errors import InputError
-from ..common.extras import missing
+from ..common.libraries import missing
 from .cells import in_gmsh_order
 from .part_reader import read_apart
 from .source import MeshBlocks, RawMesh

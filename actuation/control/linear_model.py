@@ -14,9 +14,8 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError, check_known, quoted
-from ...common.extras import extras
 from ...common.files import write_atomically
-from ...common.libraries import scipy
+from ...common.libraries import extras, scipy
 from ...common.structs import kept, struct
 from ...mbs.linear.joint_conditions import RIGID, RobotModes, free_directions
 from ...mbs.linear.joint_conditions import robot_modes as modes_of

@@ -11,8 +11,7 @@ from ...common.arrays import Array, Booleans, ComplexArray
 from ...common.libraries import scipy
 from ...common.peaks import largest, root_mean_square
 from ...common.structs import struct
-from ...mbs.model.amplifiers import Amplifiers
-from ...mbs.model.hysteresis import Played
+from ...mbs.model.amplifiers import Amplifiers, Played
 from ...mbs.run.record import Details
 from ...mbs.run.samples import in_order
 from .controllers import Controller

@@ -13,8 +13,7 @@ from ...common.keys import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
 from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
-from ...mbs.model.amplifiers import Amplifiers
-from ...mbs.model.hysteresis import MOST_PLAYS
+from ...mbs.model.amplifiers import MOST_PLAYS, Amplifiers
 from .lamina import Fibres, Lamina, fibre_lamina, plain_lamina
 from .voltage_records import Amplifier, HysteresisKeys
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ...common.validation import Record
 from ...mbs.fields.field_types import NotEmpty, NotNegative, Positive
-from ...mbs.model.hysteresis import MOST_PLAYS
+from ...mbs.model.amplifiers import MOST_PLAYS
 
 Each = Positive | Annotated[tuple[Positive, ...], NotEmpty]
 Range = tuple[float, float]

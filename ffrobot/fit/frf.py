@@ -19,9 +19,8 @@ from ..present.lines import print_table
 from ..run.solve import prepare_scene
 from .covariance import write_covariance
 from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
-from .frf_fit import PoseComparison, ResponseFit, fit_receptances
+from .frf_fit import PoseComparison, PoseModel, ResponseFit, fit_receptances
 from .frf_measured import MeasuredPose, read_tests
-from .frf_model import PoseModel
 
 UNSEEN = 0.5  # relative deviation of a parameter from which the tests hardly see it
 POOR = 0.8  # FRAC of an FRF that the model hardly has

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, check_known, quoted
-from ..common.extras import extras
-from ..common.libraries import scipy
+from ..common.libraries import extras, scipy
 from ..common.tables import parse_csv, shown
 from ..common.toml_files import read_bytes, read_text
 

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
 from ..common.errors import FfrobotError
-from ..common.extras import missing
+from ..common.libraries import missing
 from ..common.parallel import is_first
 from ..run.watcher import Watcher
 

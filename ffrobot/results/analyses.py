@@ -9,8 +9,8 @@ import h5py
 
 from ..common.arrays import Array
 from ..common.errors import InputError, quoted
-from ..common.extras import extras
 from ..common.hdf5 import blaming
+from ..common.libraries import extras
 from .datasets import Datasets
 
 if TYPE_CHECKING:

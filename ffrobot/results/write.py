@@ -22,9 +22,9 @@ from ..run.result import AnalysisResult
 from ..run.solution import Solution
 from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
+from .judging import write_off_path
 from .kinds import own_results
 from .motion import write_bodies, write_joints, write_paths, write_points, write_stress
-from .off_path import write_off_path
 from .peaks import peaking, write_peaks
 from .resume import write_state
 

@@ -11,9 +11,9 @@ from solids import body_of, model_of, write_solid
 from ffrobot.common.errors import SolveError
 from ffrobot.common.locks import this_process
 from ffrobot.fe_models.modal_body.krylov_schur import KrylovSchur
-from ffrobot.fe_models.solid import factors
+from ffrobot.fe_models.solid import supports
 from ffrobot.fe_models.solid.elasticity import stiffness_matrix
-from ffrobot.fe_models.solid.factors import Factors
+from ffrobot.fe_models.solid.supports import Factors
 
 
 class Diagonal:
@@ -129,7 +129,7 @@ def test_factors_in_files(tmp_path, monkeypatch, cache):
     """Large parts keep them there: MUMPS takes the setting, modes stay, and no file does, not even of a killed run."""
     path = write_solid(tmp_path, divisions=(8, 1, 1), count=3)
     in_memory = body_of(path)
-    monkeypatch.setattr(factors, "SHARE", 0)
+    monkeypatch.setattr(supports, "SHARE", 0)
     killed = cache / "ffrobot" / "factors" / f"{this_process().replace(str(os.getpid()), str(2**22 + 1))}.x"  # no pid
     killed.mkdir(parents=True)
     (killed / "mumps").write_bytes(b"left")

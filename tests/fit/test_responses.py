@@ -14,9 +14,8 @@ from scipy.optimize import brentq
 
 import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.fit.frf_fit import fit_receptances
+from ffrobot.fit.frf_fit import fit_receptances, stacked, unstacked
 from ffrobot.fit.frf_measured import Direction, MeasuredPose, MeasuredResponse, ResponseTest, read_tests
-from ffrobot.fit.frf_model import stacked, unstacked
 
 LINES = np.linspace(2.0, 60.0, 200)  # Hz
 CHAIN = np.array([4e4, 3e4, 2e4, 8.0, 6.0, 4.0, 1.0])  # springs (N/m), dampers (N·s/m) from the wall on, last mass

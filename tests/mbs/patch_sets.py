@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.amplifiers import Amplifiers
-from ffrobot.mbs.model.hysteresis import MOST_PLAYS
+from ffrobot.mbs.model.amplifiers import MOST_PLAYS, Amplifiers
 
 N = 3  # modes of a link
 UNLIMITED = np.full(N, np.inf)

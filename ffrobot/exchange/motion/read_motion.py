@@ -13,8 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers, as_list, as_rows
 from ...common.errors import InputError, blaming_file, quoted
-from ...common.extras import extras
-from ...common.libraries import scipy
+from ...common.libraries import extras, scipy
 from ...common.tables import LARGEST, as_csv, shown
 from ...common.toml_files import read_text
 from ...mbs.fields.waypoints import Recorded, Waypoints

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_list, as_rows
 from ...common.errors import InputError, check_known, quoted
-from ...common.extras import extras
+from ...common.libraries import extras
 from ...common.tables import as_csv
 from ...results.file import Results
 

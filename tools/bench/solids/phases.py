@@ -85,7 +85,7 @@ def measured(path: Path, rounds: int) -> None:
     from ffrobot.fe_models.link_file import read_link
     from ffrobot.fe_models.modal_body.krylov_schur import KrylovSchur
     from ffrobot.fe_models.solid import link as stage
-    from ffrobot.fe_models.solid.factors import Factors
+    from ffrobot.fe_models.solid.supports import Factors
 
     began = [time.process_time()]
 
