@@ -1,4 +1,4 @@
-"""Rotations in the plane, A(θ), and in space: rotation vectors, matrices (…, 3, 3), quaternions (…, 4; scalar first).
+"""Rotations in space: rotation vectors, matrices (…, 3, 3), quaternions (…, 4; scalar first).
 
 φ~ is the matrix of the cross product. A section turns by exp φ~ (docs/theory.md), with Ω = J_l φ̇.
 """
@@ -157,12 +157,6 @@ def smallest_turn(axis: Array) -> Array:
     if square == 0.0:
         return np.diag([1.0, -1.0, -1.0])
     return np.eye(3) + S + S @ S * ((1.0 - cosine) / square)
-
-
-def rotation(theta: float) -> Array:
-    """Return the rotation matrix A(θ), (2, 2)."""
-    c, s = np.cos(theta), np.sin(theta)
-    return np.array([[c, -s], [s, c]])
 
 
 def in_3d(vectors: Array) -> Array:

@@ -18,8 +18,6 @@ from ..mbs.scene.trajectories import Trajectory
 from ..run.result import AnalysisResult
 from ..run.solution import Solution
 
-SAME = 1e-9  # of a time: what differs by less is round-off
-
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Write bodies/ of an analysis; modes of planar scenes are those that move in the plane."""

@@ -1,7 +1,7 @@
 """Joints that move along an axis: keys of the axis, of limits, motors and friction."""
 
 from collections.abc import Sequence
-from typing import Annotated, Self, TypeVar
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,8 +15,6 @@ from .twist_spring import StiffnessSteps
 
 Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
 Range = tuple[Quantity, Quantity]
-
-T = TypeVar("T")
 
 
 class MovingJoint(JointRecord):
