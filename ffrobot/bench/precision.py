@@ -83,24 +83,17 @@ UNLIMITED = 10**12  # steps: the budget ends a run
 
 @dataclass(frozen=True)
 class TimedRun:
-    """One solve: how it ended, its cost, and its histories.
+    """One solve: how it ended, its cost, and its histories."""
 
-    Attributes:
-        integrator: the one that ran; for "auto" the one chosen.
-        status: "completed", "over budget", or how the integration failed.
-        seconds: integration and outputs, of the analysis and of those whose actuation it takes.
-        histories: by kind of quantity and dataset; empty unless completed.
-        bodies: SHA-256 of the modal body file of each flexible body.
-    """
-
-    integrator: str
-    status: str
-    seconds: float
+    integrator: str  # the one that ran; for "auto" the one chosen
+    status: str  # "completed", "over budget", or how the integration failed
+    seconds: float  # integration and outputs, of the analysis and of those whose actuation it takes
     steps: int
     rejected: int
     evaluations: int
+    # by kind of quantity and dataset; empty unless completed
     histories: Mapping[str, Mapping[str, Array]] = field(repr=False)
-    bodies: Mapping[str, str] = field(repr=False)
+    bodies: Mapping[str, str] = field(repr=False)  # SHA-256 of the modal body file of each flexible body
 
     @property
     def completed(self) -> bool:
@@ -224,16 +217,13 @@ class Settings:
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """The run against which errors are measured.
-
-    Attributes:
-        error: by kind, the difference from the run with `other`: an estimate of the larger error of the two.
-    """
+    """The run against which errors are measured."""
 
     integrator: str
     tolerance: float
     other: str
     other_tolerance: float
+    # by kind, the difference from the run with `other`: an estimate of the larger error of the two
     error: Mapping[str, float]
     histories: Mapping[str, Mapping[str, Array]] = field(repr=False)
     bodies: Mapping[str, str] = field(repr=False)

@@ -25,29 +25,17 @@ VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 @dataclass(frozen=True, kw_only=True)
 class MovingBody:
-    """Motion of a body at T outputs, in global axes unless stated otherwise.
-
-    Attributes:
-        name: in the scene.
-        position: (T, 3) R, origin of its frame, in m.
-        orientation: (T, 4) of its frame, quaternions, scalar first.
-        modal: (T, n) its modal coordinates; None of a rigid body.
-        point_names: of its k points, as in the results: `link2.tip`; in the order of x.
-        points: (k, 3) where they are in the frame, undeformed, in m.
-        deflection: (T, k, 3) their Φ p, in the frame, in m.
-        sections: (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none.
-        shift: (T, 3) m, how much a unit of s moves the body as a whole, so that joints stay shut; global axes.
-    """
+    """Motion of a body at T outputs, in global axes unless stated otherwise."""
 
     name: str
-    position: Array
-    orientation: Array
-    modal: Array | None
-    point_names: tuple[str, ...]
-    points: Array
-    deflection: Array
-    sections: Array
-    shift: Array
+    position: Array  # (T, 3) R, origin of its frame, in m
+    orientation: Array  # (T, 4) of its frame, quaternions, scalar first
+    modal: Array | None  # (T, n) its modal coordinates; None of a rigid body
+    point_names: tuple[str, ...]  # of its k points, as in the results: `link2.tip`; in the order of x
+    points: Array  # (k, 3) where they are in the frame, undeformed, in m
+    deflection: Array  # (T, k, 3) their Φ p, in the frame, in m
+    sections: Array  # (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none
+    shift: Array  # (T, 3) m, how much a unit of s moves the body as a whole, so that joints stay shut; global axes
 
     @property
     def axes(self) -> Array:
@@ -204,19 +192,12 @@ def targets(results: Results, analysis: str) -> list[PointTarget]:
 
 @dataclass(frozen=True)
 class Marker:
-    """A place that moves, with directions.
+    """A place that moves, with directions."""
 
-    Attributes:
-        name: of the joint, or of the point.
-        position: (T, 3) m, global axes.
-        exaggeration: (T, 3) m, by which it moves when deflections are made larger by one.
-        directions: (T, k, 3) unit vectors in global axes.
-    """
-
-    name: str
-    position: Array
-    exaggeration: Array
-    directions: Array
+    name: str  # of the joint, or of the point
+    position: Array  # (T, 3) m, global axes
+    exaggeration: Array  # (T, 3) m, by which it moves when deflections are made larger by one
+    directions: Array  # (T, k, 3) unit vectors in global axes
 
     def exaggerated(self, s: float) -> Array:
         """Return the position (T, 3), m, with deflections times s."""

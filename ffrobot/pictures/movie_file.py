@@ -26,17 +26,11 @@ COLORS = 256  # of a frame of a GIF
 
 @dataclass(frozen=True)
 class MovieOptions:
-    """Options of a movie.
+    """Options of a movie."""
 
-    Attributes:
-        analysis: the first that goes through time if None.
-        seconds: how long it plays; the whole of the analysis is shown, faster or slower than in truth.
-        scale: of deflections; as large as can be seen well if None.
-    """
-
-    analysis: str | None = None
-    seconds: float = SECONDS
-    scale: float | None = None
+    analysis: str | None = None  # the first that goes through time if None
+    seconds: float = SECONDS  # how long it plays; the whole of the analysis is shown, faster or slower than in truth
+    scale: float | None = None  # of deflections; as large as can be seen well if None
 
 
 def _moving_analysis(results: Results, wanted: str | None) -> str:

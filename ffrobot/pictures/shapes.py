@@ -161,20 +161,13 @@ OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3
 
 @dataclass(frozen=True)
 class Shape:
-    """Points of a `body` that coordinates move: x + s Φ p.
-
-    Attributes:
-        points: (p, 3) x, in the frame, in m.
-        shapes: (p, 3, n) Φ, displacement in m per unit of coordinate.
-        coordinates: (T, n) over the outputs.
-        cells: (c, v) points that make a line (v = 2) or a facet.
-    """
+    """Points of a `body` that coordinates move: x + s Φ p."""
 
     body: MovingBody
-    points: Array
-    shapes: Array
-    coordinates: Array
-    cells: Integers
+    points: Array  # (p, 3) x, in the frame, in m
+    shapes: Array  # (p, 3, n) Φ, displacement in m per unit of coordinate
+    coordinates: Array  # (T, n) over the outputs
+    cells: Integers  # (c, v) points that make a line (v = 2) or a facet
 
     @property
     def deflection(self) -> Array:

@@ -16,19 +16,12 @@ Scene = Mapping[str, Any]
 
 
 class Coordinate(NamedTuple):
-    """One coordinate of a joint.
+    """One coordinate of a joint."""
 
-    Attributes:
-        label: what tells it from the joint's others: "" of a single one, " 1", " 2" of several.
-        column: which column of `coordinate`, `rate` and `moment` it is: "", or "[0]", "[1]".
-        unit: "rad" or "m".
-        limits: of its motor; infinite where the scene gives none.
-    """
-
-    label: str
-    column: str
-    unit: str
-    limits: MotorLimits
+    label: str  # what tells it from the joint's others: "" of a single one, " 1", " 2" of several
+    column: str  # which column of `coordinate`, `rate` and `moment` it is: "", or "[0]", "[1]"
+    unit: str  # "rad" or "m"
+    limits: MotorLimits  # of its motor; infinite where the scene gives none
 
     def of(self, values: Array) -> Array:
         """Return the column (T,) of this coordinate in `values` of a joint's dataset, (T,) or (T, coordinates)."""

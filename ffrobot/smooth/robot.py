@@ -48,16 +48,12 @@ def accelerations(path: Piecewise) -> tuple[Array, Array]:
 
 @struct
 class Modes:
-    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: m of them.
+    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: m of them."""
 
-    Attributes:
-        omega, ratio: (m,) rad/s, and damping ratios.
-        driven: (m, n) at the point, what a unit of acceleration of each motor drives.
-    """
-
+    # omega, ratio: (m,) rad/s, and damping ratios
     omega: Array
     ratio: Array
-    driven: Array
+    driven: Array  # (m, n) at the point, what a unit of acceleration of each motor drives
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
         """Return amplitudes (m, n), m, at the point at the last of `times` (T,), s, by motor `accelerations` (T, n)."""

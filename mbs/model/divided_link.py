@@ -36,25 +36,15 @@ class DividedLink:
 
 @struct
 class LinkInPieces:
-    """A link in pieces, to read the motion of the pieces as that of the link.
+    """A link in pieces, to read the motion of the pieces as that of the link."""
 
-    Attributes:
-        modal: its modal body.
-        names: of the pieces, from the root to the tip.
-        starts: where each begins, m from the root.
-        pieces: their modal bodies.
-        places: of its points by label, as "PIECE.POINT".
-        points: the same in the whole link.
-        to_own: (n_file, n) modal coordinates of the whole link in the equations, by those of its file.
-    """
-
-    modal: ModalBody
-    names: tuple[str, ...]
-    starts: Sequence[float]
-    pieces: tuple[ModalBody, ...]
-    places: Mapping[str, str]
-    points: Mapping[str, BodyPoint]
-    to_own: Array
+    modal: ModalBody  # its modal body
+    names: tuple[str, ...]  # of the pieces, from the root to the tip
+    starts: Sequence[float]  # where each begins, m from the root
+    pieces: tuple[ModalBody, ...]  # their modal bodies
+    places: Mapping[str, str]  # of its points by label, as "PIECE.POINT"
+    points: Mapping[str, BodyPoint]  # the same in the whole link
+    to_own: Array  # (n_file, n) modal coordinates of the whole link in the equations, by those of its file
 
 
 class PieceOfLink(NamedTuple):

@@ -37,30 +37,18 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ShapeIntegrals:
-    """Inertia shape integrals of a body with n modes; SI units, axes of the body.
+    """Inertia shape integrals of a body with n modes; SI units, axes of the body."""
 
-    Attributes:
-        mass: m in kg.
-        first_moment: (3,) m c in kg·m.
-        S_bar: (3, n) ∫ρ Φ dV = C_tᵀ.
-        inertia: (3, 3) J_0 about the origin, kg·m².
-        inertia_slope: (3, 3, n) J_l.
-        spin: (3, n) ∫ρ x × Φ_l dV = C_r0ᵀ.
-        spin_slope: (3, n, n) ∫ρ Φ_k × Φ_l dV at [l, k].
-        modal_mass: (n, n) M_e.
-        centrifugal_slope: (6, n, n) ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`; both orders where a ≠ b.
-        stiffness, damping: (n, n).
-    """
-
-    mass: float
-    first_moment: Array
-    S_bar: Array
-    inertia: Array
-    inertia_slope: Array
-    spin: Array
-    spin_slope: Array
-    modal_mass: Array
-    centrifugal_slope: Array
+    mass: float  # m in kg
+    first_moment: Array  # (3,) m c in kg·m
+    S_bar: Array  # (3, n) ∫ρ Φ dV = C_tᵀ
+    inertia: Array  # (3, 3) J_0 about the origin, kg·m²
+    inertia_slope: Array  # (3, 3, n) J_l
+    spin: Array  # (3, n) ∫ρ x × Φ_l dV = C_r0ᵀ
+    spin_slope: Array  # (3, n, n) ∫ρ Φ_k × Φ_l dV at [l, k]
+    modal_mass: Array  # (n, n) M_e
+    centrifugal_slope: Array  # (6, n, n) ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`; both orders where a ≠ b
+    # stiffness, damping: (n, n)
     stiffness: Array
     damping: Array
 

@@ -26,20 +26,14 @@ VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts
 
 @dataclass(frozen=True)
 class Unit:
-    """Names, variables and model of an FMU, for its description.
+    """Names, variables and model of an FMU, for its description."""
 
-    Attributes:
-        identifier: of C, in the name of the binary.
-        name: for people, with `description`.
-        guid: of the model's numbers; the binary has the same.
-        states, inputs, outputs: in the order of the rows and columns of `model`.
-    """
-
-    identifier: str
-    name: str
+    identifier: str  # of C, in the name of the binary
+    name: str  # for people, with `description`
     description: str
-    guid: str
+    guid: str  # of the model's numbers; the binary has the same
     model: StateSpace
+    # states, inputs, outputs: in the order of the rows and columns of `model`
     states: tuple[Variable, ...]
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]

@@ -27,20 +27,13 @@ Side = Literal["motor", "joint"]
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """One coordinate of a joint over T outputs.
+    """One coordinate of a joint over T outputs."""
 
-    Attributes:
-        name: of the joint; "NAME[k]" of coordinate k where it has several.
-        coordinate: (T,) rad, or m along a way.
-        rate: (T,) rad/s or m/s.
-        moment: (T,) N·m or N, at the joint, behind a gear; None of a joint without motor.
-        motor: of a compliant gear, `motor_coordinate`, `motor_rate` and `motor_moment` (T,) as in results; else none.
-    """
-
-    name: str
-    coordinate: Array
-    rate: Array
-    moment: Array | None
+    name: str  # of the joint; "NAME[k]" of coordinate k where it has several
+    coordinate: Array  # (T,) rad, or m along a way
+    rate: Array  # (T,) rad/s or m/s
+    moment: Array | None  # (T,) N·m or N, at the joint, behind a gear; None of a joint without motor
+    # of a compliant gear, `motor_coordinate`, `motor_rate` and `motor_moment` (T,) as in results; else none
     motor: Mapping[str, Array] = field(default_factory=dict)
 
     def on(self, side: Side) -> tuple[Array, Array]:

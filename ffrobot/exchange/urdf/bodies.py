@@ -16,21 +16,13 @@ from .robot import HERE, MASSLESS, Inertial, Place, Robot, UrdfJoint
 
 @dataclass(eq=False)
 class MergedLinks:
-    """Links that move as one: `top` carries the others; the body has its axes, unless it is flexible.
+    """Links that move as one: `top` carries the others; the body has its axes, unless it is flexible."""
 
-    Attributes:
-        top: name of the link.
-        stands_still: whether it is the ground.
-        flexible: whether a link file says what it is; then it has no other member.
-        members: links, and where they stand in the body's axes.
-        inertial: of all of them.
-    """
-
-    top: str
-    stands_still: bool = False
-    flexible: bool = False
-    members: dict[str, Place] = field(default_factory=dict)
-    inertial: Inertial = MASSLESS
+    top: str  # name of the link
+    stands_still: bool = False  # whether it is the ground
+    flexible: bool = False  # whether a link file says what it is; then it has no other member
+    members: dict[str, Place] = field(default_factory=dict)  # links, and where they stand in the body's axes
+    inertial: Inertial = MASSLESS  # of all of them
 
     def add(self, robot: Robot, link: str, place: Place) -> None:
         """Merge one link into the body."""

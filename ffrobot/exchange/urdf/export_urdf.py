@@ -35,19 +35,12 @@ LIMITS = {"position_limit", "moment_limit", "speed_limit", "viscous_friction", "
 
 
 class Step(NamedTuple):
-    """One joint of a URDF.
+    """One joint of a URDF."""
 
-    Attributes:
-        type: in URDF; "revolute" turns without end where the scene has no limit: then it is "continuous".
-        axis: number of the axis, of the joint's triad.
-        coordinate: number of the scene's coordinate that it has, −1 where it has none.
-        label: added to the joint's name where it has several steps.
-    """
-
-    type: str
-    axis: int = 2
-    coordinate: int = 0
-    label: str = ""
+    type: str  # in URDF; "revolute" turns without end where the scene has no limit: then it is "continuous"
+    axis: int = 2  # number of the axis, of the joint's triad
+    coordinate: int = 0  # number of the scene's coordinate that it has, −1 where it has none
+    label: str = ""  # added to the joint's name where it has several steps
 
 
 STEPS: Mapping[str, tuple[Step, ...]] = {

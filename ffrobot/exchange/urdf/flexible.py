@@ -31,23 +31,14 @@ SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of s
 
 @dataclass(frozen=True, eq=False)
 class ImportedLink:
-    """A link of the URDF that a link file describes; its interface "root" is at the carrying joint.
-
-    Attributes:
-        name: of the link.
-        file_name: of the link file beside the scene.
-        place: of the URDF's link frame in the axes of the link file.
-        keys: of that file.
-        point_of: by the name of each joint beyond, the interface that it is on.
-        remarks: on what was taken from where.
-    """
+    """A link of the URDF that a link file describes; its interface "root" is at the carrying joint."""
 
     name: str
-    file_name: str
-    place: Place
-    keys: Mapping[str, Any]
-    point_of: Mapping[str, str]
-    remarks: tuple[str, ...]
+    file_name: str  # of the link file beside the scene
+    place: Place  # of the URDF's link frame in the axes of the link file
+    keys: Mapping[str, Any]  # of the link file
+    point_of: Mapping[str, str]  # by the name of each joint beyond, the interface that it is on
+    remarks: tuple[str, ...]  # on what was taken from where
 
 
 def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str) -> ImportedLink:

@@ -140,23 +140,14 @@ TO_BE_APPENDED = """\
 
 @dataclass(frozen=True)
 class Imported:
-    """Result of an import.
+    """Result of an import."""
 
-    Attributes:
-        robot: as read.
-        scene: keys of the scene file.
-        flexible: links from link files.
-        remarks: on what is left out, renamed or odd, a line each.
-        masses: what meshes say.
-        files: all that were written.
-    """
-
-    robot: Robot
-    scene: Mapping[str, Any]
-    flexible: tuple[ImportedLink, ...]
-    remarks: tuple[str, ...]
-    masses: tuple[MeshMass, ...]
-    files: tuple[Path, ...]
+    robot: Robot  # as read
+    scene: Mapping[str, Any]  # keys of the scene file
+    flexible: tuple[ImportedLink, ...]  # links from link files
+    remarks: tuple[str, ...]  # on what is left out, renamed or odd, a line each
+    masses: tuple[MeshMass, ...]  # what meshes say
+    files: tuple[Path, ...]  # all that were written
 
 
 def import_urdf(

@@ -30,23 +30,14 @@ NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh 
 
 @dataclass(frozen=True)
 class MeshMass:
-    """Comparison of the mesh of a link with its <inertial>.
-
-    Attributes:
-        link: its name.
-        volume: m³.
-        density: that gives the mass of <inertial>, kg/m³.
-        inertia_ratio: trace of the filled mesh's inertia about its center over that of <inertial>.
-        center_distance: of the two centers, m.
-        is_closed: whether the mesh encloses a volume at all.
-    """
+    """Comparison of the mesh of a link with its <inertial>."""
 
     link: str
-    volume: float
-    density: float
-    inertia_ratio: float
-    center_distance: float
-    is_closed: bool
+    volume: float  # m³
+    density: float  # that gives the mass of <inertial>, kg/m³
+    inertia_ratio: float  # trace of the filled mesh's inertia about its center over that of <inertial>
+    center_distance: float  # of the two centers, m
+    is_closed: bool  # whether the mesh encloses a volume at all
 
 
 def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
@@ -149,15 +140,10 @@ def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
 
 @dataclass(frozen=True)
 class Filling:
-    """Material that fills the shapes of links without mass.
+    """Material that fills the shapes of links without mass."""
 
-    Attributes:
-        density: kg/m³.
-        radius: m, of a cylinder along a link that has no shape of its own; None for no cylinder.
-    """
-
-    density: float
-    radius: float | None = None
+    density: float  # kg/m³
+    radius: float | None = None  # m, of a cylinder along a link that has no shape of its own; None for no cylinder
 
 
 def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list[str]]:

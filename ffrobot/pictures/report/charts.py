@@ -78,25 +78,18 @@ SHADES = np.array([[165, 90, 200], [65, 115, 175], [33, 145, 140], [94, 201, 98]
 
 @dataclass
 class Chart:
-    """One diagram of the page.
+    """One diagram of the page."""
 
-    Attributes:
-        name: unique on the page; letters, digits, `_`.
-        title, x_label, y_label: with units.
-        traces: in Plotly's terms.
-        limits: horizontal lines; where curves would be flat beside them, they wait for a click on their name.
-        includes: values that the range of y has at least.
-        equal_axes: one meter is as long on both.
-    """
-
-    name: str
+    name: str  # unique on the page; letters, digits, `_`
+    # title, x_label, y_label: with units
     title: str
     y_label: str
     x_label: str = "time (s)"
-    traces: list[dict[str, Any]] = field(default_factory=list)
+    traces: list[dict[str, Any]] = field(default_factory=list)  # in Plotly's terms
+    # horizontal lines; where curves would be flat beside them, they wait for a click on their name
     limits: tuple[float, ...] = ()
-    includes: tuple[float, ...] = ()
-    equal_axes: bool = False
+    includes: tuple[float, ...] = ()  # values that the range of y has at least
+    equal_axes: bool = False  # one meter is as long on both
     top: float = field(default=0.0, init=False)
 
     def add(self, label: str, x: Array, y: Array, **style: Any) -> None:

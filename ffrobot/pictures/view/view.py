@@ -38,20 +38,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells on P points that move over T steps.
+    """Cells on P points that move over T steps."""
 
-    Attributes:
-        cells: blocks (c, v) of cells with v corners each, in order.
-        points: (T, P, 3) in m.
-        time: (T,) in s; None for a grid that stands still, T = 1.
-        point_data: (T, P) or (T, P, 3) by name.
-        cell_data: (C,) by name, for all cells of all blocks.
-    """
-
-    cells: Sequence[Integers]
-    points: Array
-    time: Array | None = None
-    point_data: Mapping[str, Array] = field(default_factory=dict)
+    cells: Sequence[Integers]  # blocks (c, v) of cells with v corners each, in order
+    points: Array  # (T, P, 3) in m
+    time: Array | None = None  # (T,) in s; None for a grid that stands still, T = 1
+    point_data: Mapping[str, Array] = field(default_factory=dict)  # (T, P) or (T, P, 3) by name
+    # (C,) by name, for all cells of all blocks
     cell_data: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
 
 
@@ -158,37 +151,23 @@ Place = Sequence[float]  # three
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture to be drawn, or the frames of a movie.
+    """A picture to be drawn, or the frames of a movie."""
 
-    Attributes:
-        title: above it.
-        grid: the .vtkhdf file.
-        path: of the PNG; of a movie, of a folder for one at each step, `00000.png` and so on.
-        steps: of the grid's time steps; one, but of a movie.
-        times: of these, in s; the title's `{time}`.
-        scale: of deflections; None for a modal body, whose modes are drawn.
-        length: of a modal body, in m.
-        in_space: whether z goes up, as in 3D scenes; y in planar ones.
-        color: "deflection" or "von_mises".
-        joints: for each of the steps joints: a place, exaggerated, in m, and the unit vectors of its axes.
-        tools: likewise sections that follow paths: a place and the unit vectors x, y, z.
-        ground: where joints sit on the ground, in m.
-        movie: whether it is one.
-    """
-
-    title: str
-    grid: str = ""
-    path: str = ""
-    steps: tuple[int, ...] = (0,)
-    times: tuple[float, ...] = (0.0,)
-    scale: float | None = None
-    length: float = 0.0
-    in_space: bool = False
-    color: str = "deflection"
+    title: str  # above it
+    grid: str = ""  # the .vtkhdf file
+    path: str = ""  # of the PNG; of a movie, of a folder for one at each step, `00000.png` and so on
+    steps: tuple[int, ...] = (0,)  # of the grid's time steps; one, but of a movie
+    times: tuple[float, ...] = (0.0,)  # of these, in s; the title's `{time}`
+    scale: float | None = None  # of deflections; None for a modal body, whose modes are drawn
+    length: float = 0.0  # of a modal body, in m
+    in_space: bool = False  # whether z goes up, as in 3D scenes; y in planar ones
+    color: str = "deflection"  # "deflection" or "von_mises"
+    # for each of the steps joints: a place, exaggerated, in m, and the unit vectors of its axes
     joints: Sequence[Sequence[Sequence[Place]]] = ((),)
+    # likewise sections that follow paths: a place and the unit vectors x, y, z
     tools: Sequence[Sequence[Sequence[Place]]] = ((),)
-    ground: Sequence[Place] = ()
-    movie: bool = False
+    ground: Sequence[Place] = ()  # where joints sit on the ground, in m
+    movie: bool = False  # whether it is one
 
 
 def draw_pictures(pictures: Sequence[Picture]) -> None:
@@ -224,21 +203,13 @@ FRAMES = 201  # of an animation, unless asked for otherwise
 
 @dataclass(frozen=True)
 class Options:
-    """Options of grids and pictures.
+    """Options of grids and pictures."""
 
-    Attributes:
-        analysis: of a results file; all if None.
-        frames: at most so many outputs, equally far apart.
-        time: of the picture, in s; that of the largest deflection if None.
-        scale: of deflections in the picture; as large as can be seen well if None.
-        pictures: whether to draw pictures; None: where PyVista can.
-    """
-
-    analysis: str | None = None
-    frames: int = FRAMES
-    time: float | None = None
-    scale: float | None = None
-    pictures: bool | None = None
+    analysis: str | None = None  # of a results file; all if None
+    frames: int = FRAMES  # at most so many outputs, equally far apart
+    time: float | None = None  # of the picture, in s; that of the largest deflection if None
+    scale: float | None = None  # of deflections in the picture; as large as can be seen well if None
+    pictures: bool | None = None  # whether to draw pictures; None: where PyVista can
 
 
 @dataclass(frozen=True)
