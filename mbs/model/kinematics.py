@@ -101,6 +101,15 @@ class Markers:
             marker.turns = number in turning
         return markers
 
+    def followed(self, rows: Sequence[ConstraintRow]) -> _core.TreeScene:
+        """Return the functions that `rows` and markers of the ground follow."""
+        scene = _core.TreeScene()
+        for row in rows:
+            scene.add_target(ZERO if row.target is None else row.target, row.sign)
+        for number, law in self.turning:
+            scene.turn_marker(number, law.in_core)
+        return scene
+
     def _turning_marker(self, law: OrientationLaw) -> int:
         """Number of the ground's marker that turns as `law` says; made where it is new."""
         for number, known in self.turning:
@@ -209,16 +218,12 @@ class Kinematics:
         self, nodes: Sequence[Node], sections: Sequence[Section] = (), rows: Sequence[ConstraintRow] = ()
     ) -> None:
         sections = list({_key(section): section for section in sections}.values())  # joints may share one
-        markers, self._scene = Markers(nodes), _core.TreeScene()
+        markers = Markers(nodes)
         measures = [markers.row(row) for row in rows]
         places = [_core.MarkerAt(*markers.place(section)) for section in sections]
         self.nodes, self._numbers = nodes, {_key(section): len(nodes) + k for k, section in enumerate(sections)}
         self.core = _core.SpatialModel(markers.bodies(), markers.standing(), measures, places, np.zeros(3))
-        self._signs = np.array([row.sign for row in rows])
-        for row in rows:
-            self._scene.add_target(ZERO if row.target is None else row.target, row.sign)
-        for number, law in markers.turning:
-            self._scene.turn_marker(number, law.in_core)
+        self._signs, self._scene = np.array([row.sign for row in rows]), markers.followed(rows)
 
     @classmethod
     def of_points(cls, nodes: Sequence[Node]) -> Kinematics:

@@ -14,7 +14,7 @@ from .. import _core
 from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
-from .kinematics import ZERO, CutPlace, Markers, ModelParts, Placed, rows_of
+from .kinematics import CutPlace, Markers, ModelParts, Placed, rows_of
 from .model import Model
 from .nodes import Section
 from .plane import Plane, in_plane
@@ -165,19 +165,13 @@ class MultibodySystem:
 
     def _check(self) -> None:
         """Raise `InputError` for what the core does not take."""
-        path = self.model.scene.path
         loaded = {load.joint for load in self.model.scene.load}
-        for node in self.model.tree.nodes:
-            if node.joint.type == "planar" and node.joint.frictions and node.backwards:
+        for joint in (node.joint for node in self.model.tree.nodes if node.joint.type == "planar" and node.backwards):
+            if joint.frictions or joint.name in loaded:
+                where = "a planar joint has friction" if joint.frictions else "a load acts along a planar joint"
                 raise InputError(
-                    f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a planar"
-                    " joint has friction",
-                    "it second",
-                )
-            if node.joint.type == "planar" and node.backwards and node.joint.name in loaded:
-                raise InputError(
-                    f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a load"
-                    " acts along a planar joint",
+                    f"{self.model.scene.path}: {joint.label}: between: expected the side nearer to the ground first"
+                    f" where {where}",
                     "it second",
                 )
 
@@ -197,9 +191,8 @@ class MultibodySystem:
 
     def _follow(self, plane: Plane | None) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
-        scene = _core.TreeScene()
-        for row in self.model.rows if plane is None else (self.model.rows[k] for k in plane.followed):
-            scene.add_target(ZERO if row.target is None else row.target, row.sign)
+        rows = self.model.rows if plane is None else [self.model.rows[k] for k in plane.followed]
+        scene = self._markers.followed(rows)
         for direction, magnitude in self._along:
             scene.add_load(direction, magnitude)
         for wrench, components in self._at_points:
@@ -220,8 +213,6 @@ class MultibodySystem:
         has_loops = bool(self.model.loop_rows.any())
         scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
         scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
-        for number, law in self._markers.turning:
-            scene.turn_marker(number, law.in_core)
         return scene
 
     def _act_along_cut(self, scene: _core.TreeScene, places: Sequence[CutPlace]) -> None:

@@ -176,11 +176,7 @@ FORBIDDEN = str.maketrans({"/": "_", ".": "_"})
 
 
 class Names:
-    """Unique names in one list: the same for the same original, valid by `common.keys.check_name`.
-
-    Attributes:
-        changed: originals whose name is another one now.
-    """
+    """Unique names in one list: the same for the same original, valid by `common.keys.check_name`."""
 
     def __init__(self, taken: Iterable[str] = ()) -> None:
         self._taken = set(taken)
