@@ -254,8 +254,12 @@ private:
     const double by_rounding = system_.error_size(attempt.end, method_->end(), left.data());
     if (!(by_rounding <= hopeless))
       return size;
-    by_rounding_ = scatter * by_rounding;
-    return std::max(size - by_rounding_ / allowance.error, 0.0);
+    const auto without = [&](double draws) {
+      by_rounding_ = draws * by_rounding;
+      return std::max(size - by_rounding_ / allowance.error, 0.0);
+    };
+    const double beyond_one = without(1);
+    return beyond_one <= 1 ? beyond_one : std::max(without(scatter), StepControl::target); // the step does not grow
   }
 
   // That of outputs between its ends, which no later step depends on: relative to the whole tolerance.
