@@ -53,7 +53,9 @@ def test_an_arm_whose_wrist_comes_into_line_stops_there(solved):
 def test_an_arm_that_comes_near_such_a_posture_is_told(solved):
     done, about, angle = solved("0.5005+0.4*exp(-(4*t)**2)", 0.9005)
     assert (done.returncode, about["status"]) == (0, "completed")
-    (warning,) = about["warnings"]
-    assert "nearly a singular posture (ratio" in warning
-    assert 'motions of "q4", "q6" against each other' in warning
+    posture, round_off = about["warnings"]
+    assert "nearly a singular posture (ratio" in posture
+    assert 'motions of "q4", "q6" against each other' in posture
+    assert "a tolerance of 1e-08 is below round-off here" in round_off
+    assert "nearly singular postures" in round_off
     assert abs(angle[-1] - 0.0005) < 1e-6
