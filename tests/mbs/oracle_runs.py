@@ -119,11 +119,6 @@ def point_motion(seen, point):
     return motion.point_motion(seen.motion, point).within(seen.motion.space)
 
 
-def trajectory_force(seen, trajectory):
-    """(T, components)."""
-    return path_force(seen.motion, trajectory)
-
-
 def joint_forces(seen, joint):
     wrench = reactions(seen.motion)[joint]
     moments = motor_moments(seen.motion)

@@ -51,23 +51,6 @@ def test_the_heading_of_a_tilted_hand_is_its_pan(axis, kind):
     assert np.max(found["inverse/constraint_violation"]) < 1e-9
 
 
-def test_the_section_of_a_link_that_bends_keeps_its_angle():
-    """The direction x of the section at the tip, read off its quaternion, has the heading of the trajectory."""
-    axis = np.array([1.0, 2.0, 2.0]) / 3
-    found = ffrobot.solve(
-        yaw_and_pitch(axis.tolist(), {"angle": "hand.tip", "axis": axis.tolist(), "value": TURN}, {"link": LINK},
-                      analysis=[INVERSE | {"tolerance": 1e-7}])
-    )  # fmt: skip
-    e = np.array(found["inverse/points/hand.tip/quaternion"])
-    w, v = e[:, :1], e[:, 1:]
-    x, y, n = smallest_turn(axis).T
-    s = x + 2 * np.cross(v, np.cross(v, x) + w * x)
-    heading = np.unwrap(np.arctan2(s @ y, s @ x))
-    np.testing.assert_allclose(heading, 0.4 + 2 * np.sin(3 * np.array(found["inverse/time"])), atol=1e-10)
-    assert np.abs(s @ n).max() > 0.4
-    assert np.ptp(found["inverse/bodies/hand/modal"]) > 5e-5
-
-
 def test_turns_beyond_a_full_one():
     """From rest to rest by three turns against the axis of the joint, out of the plane."""
     path = {"angle": "hand.tip", "axis": [0.0, 0.0, -1.0], "via": [-0.3, 6 * np.pi - 0.3], "duration": 1.0}

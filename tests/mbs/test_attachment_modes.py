@@ -1,4 +1,4 @@
-"""Attachment modes in mechanisms: exact statics with few modes, and few as good as many."""
+"""Attachment modes in mechanisms: exact statics with few modes."""
 
 import numpy as np
 import pytest
@@ -21,24 +21,6 @@ def errors(found, expected, name="swing"):
 def all_modes():
     """All 80 eigenmodes of the meshes; twelve kept, with the statics of the others, in the equations."""
     return ffrobot.solve(two_links(80, False, kept=12))
-
-
-@pytest.mark.parametrize("count", [2, 4])
-def test_swing_with_payload(all_modes, count):
-    """Findings of the second round: 3.6 mm and 6 % with ten modes and no attachment modes."""
-    tip, *moments = errors(ffrobot.solve(two_links(count, True)), all_modes)
-    assert tip < 2e-5
-    assert max(moments) < 2e-3
-    if count > 2:
-        assert tip < 1e-6
-        assert max(moments) < 1e-5
-
-
-def test_ten_modes_alone_are_far_off(all_modes):
-    """What the test above compares with."""
-    tip, *moments = errors(ffrobot.solve(two_links(10, False)), all_modes)
-    assert tip > 2e-3
-    assert max(moments) > 2e-2
 
 
 def test_fewer_modes_of_a_file_with_attachment_modes(all_modes):

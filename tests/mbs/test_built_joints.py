@@ -1,19 +1,17 @@
-"""Rotors behind gears and friction in joints: closed forms, energy, and the same equations written out densely."""
+"""Rotors behind gears and friction in joints: moments in closed form, and what equilibria leave out."""
 
 import numpy as np
 import pytest
-from links import ANGLES, arm, arm_links
-from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
+from links import arm
+from mechanisms import checked_scene, make_model, pcid, relative, revolute
 from oracle_runs import joint_forces, run
-from rods import rigid_body, rod
+from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.operating_points import Static
-from ffrobot.mbs.inversion.motors_only import MotorsOnly
 
 G = 9.81
-AT_REST = {"state": "static", "angles": ANGLES}
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
 FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.5, "friction_speed": 0.05}
 
@@ -24,20 +22,6 @@ def geared_arm(links=None, first=GEARED, second=GEARED, **keys):
         revolute("A", "link1.tip", "link2.root", **second),
     ]
     return arm(links, joint=joints, **keys)
-
-
-def test_swing_of_a_pendulum_with_a_geared_rotor():
-    """A small swing from rest is a cosine with ω² = (m g L/2)/(m L²/3 + N² J)."""
-    L, m, J, N, angle = 0.7, 2.0, 3e-3, 9.0, 1e-4
-    model = make_model(
-        [rod("a", L, m)],
-        joint=[revolute("O", "ground", "a.root", gear_ratio=N, rotor_inertia=J)],
-        initial={"angles": {"a": -np.pi / 2 + angle}},
-    )
-    omega = np.sqrt(m * G * L / 2 / (m * L**2 / 3 + N**2 * J))
-    outcome = run(model, forward(end=2.0, tolerance=1e-9))
-    swing = outcome.q[:, 2] + np.pi / 2
-    assert np.abs(swing - angle * np.cos(omega * outcome.time)).max() < 1e-7 * angle
 
 
 def test_geared_two_link_arm_needs_the_moments_of_spong():
@@ -70,29 +54,6 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
         for joint, expected in (("O", J1 * N1**2 * alpha + rotor), ("A", N2 * rotor)):
             added = joint_forces(geared, joint).motor - joint_forces(bare, joint).motor
             assert relative(added, expected) < 1e-9, (kind, joint)
-
-
-def test_motors_alone_carry_rotors_and_friction_along():
-    """Inverse dynamics with motors only, applied to the flexible arm, brings its tip along the path."""
-    model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION, initial=AT_REST)
-    servo = MotorsOnly(name="servo", kind="motors-only", end=1.0, output_step=0.01)
-    source = run(model, servo)
-    replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
-    outcome = run(model, replay, source)
-    assert source.q.shape == outcome.q.shape
-    assert relative(outcome.q, source.q) < 1e-5
-
-
-def test_a_prismatic_joint_moves_the_reflected_mass():
-    """A slider of mass m on rails, pulled by F: ẍ = F/(m + J N²)."""
-    J, N = 2e-3, 30.0
-    slider = rigid_body("s", 0.4, 0.01, (0.0, 0.0), {"pin": (0.0, 0.0)})
-    rail = {"name": "rail", "type": "prismatic", "between": ("ground", "s.pin"), "axis": (1.0, 0.0)}
-    model = make_model(
-        [slider], joint=[rail | {"gear_ratio": N, "rotor_inertia": J}], load=[{"point": "s.pin", "x": "3.0"}]
-    )
-    outcome = run(model, forward())
-    np.testing.assert_allclose(outcome.a[:, 0], 3.0 / (0.4 + J * N**2), rtol=1e-12)
 
 
 def test_equilibrium_knows_neither_rotors_nor_friction():

@@ -1,16 +1,13 @@
-"""Gears that give: two masses and a spring, energy, the rigid limit, and motors that carry out an inverse analysis."""
+"""Gears that give: steps of stiffness in closed form, and motors that carry out an inverse analysis."""
 
 import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
 from oracle_runs import energy_and_losses, point_motion, run
-from patch_sets import Patches
 from rods import rod
 
-from ffrobot.actuation.control.linear_model import robot_modes, state_space
 from ffrobot.common.errors import InputError
-from ffrobot.common.rotations import skew
 from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.inversion.motors_only import MotorsOnly
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
@@ -19,17 +16,12 @@ from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.quantities.supply import gear_moment, gear_motions, motor_motion
 from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
-from ffrobot.run.solve import solve_scene
-from ffrobot.scene.load import make_scene
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
 MOTOR, LINK = J * N**2, M * L**2 / 3
 GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
 RIGID = {key: GEARED[key] for key in ("gear_ratio", "rotor_inertia")}
-
-
-SLIDES = {"type": "prismatic", "axis": (1.0, 0.0)}
 
 
 def pendulum(load="0", trajectory=(), **keys):
@@ -51,21 +43,6 @@ def geared_arm(first, second=None, **keys):
 def linearised(robot, q, v, a):
     """With compliant gears."""
     return LinearEquations(with_compliance(robot.model.without_paths()), q).at(0.0, q, v, a)
-
-
-@pytest.mark.parametrize(("keys", "link"), [({}, LINK), (SLIDES, M)])
-def test_linear_model_has_the_closed_form_resonance_and_response(keys, link):
-    mechanism = linearised(pendulum(damping=C, **keys), *np.zeros((3, 2)))
-    assert mechanism.names == ("motor/O", "joint/O")
-    robot = state_space(mechanism, {})
-    omega, damping = np.sqrt(K * (1 / MOTOR + 1 / link)), C * (1 / MOTOR + 1 / link)
-    modes = robot_modes(robot)
-    np.testing.assert_allclose(modes.frequency, [0.0, omega / (2 * np.pi)], atol=1e-9)
-    np.testing.assert_allclose(modes.damping_ratio[1], damping / (2 * omega), rtol=1e-9)
-    w = np.array([3.0, 0.9 * omega, 40.0])
-    spring = K + 1j * w * C
-    expected = spring / (MOTOR * link * w**4 - (MOTOR + link) * w**2 * spring)
-    np.testing.assert_allclose(robot.frequency_response(w, "joint/O", "joint/O")[:, 0, 0], expected, rtol=1e-9)
 
 
 def rigid_arm(first, second, **keys):
@@ -93,20 +70,6 @@ def nonic(start, end):
     return f"{float(start)!r}+{float(end - start)!r}*(126*t**5-420*t**6+540*t**7-315*t**8+70*t**9)"
 
 
-@pytest.mark.parametrize(("between", "sign"), [(["ground", "a.root"], 1.0), (["a.root", "ground"], -1.0)])
-def test_slide_behind_a_spring_follows_its_path(between, sign):
-    """Of M ẍ = K (θ − x), the motor needs (J N² + M) ẍ + J N² M x⁗/K; a forward simulation follows."""
-    path = {"name": "tip", "joint": "O", "value": nonic(0.0, 0.3 * sign)}
-    model = pendulum(trajectory=[path], between=between, **SLIDES)
-    error, source, _ = carried_out(model)
-    x = np.polynomial.Polynomial([0.0] * 5 + [126.0, -420.0, 540.0, -315.0, 70.0]) * 0.3
-    t = source.time
-    needed = (MOTOR + M) * x.deriv(2)(t) + MOTOR * M / K * x.deriv(4)(t)
-    found = sign * gear_motions(source.motion)["O"].moment
-    assert np.abs(found - needed).max() < 1e-5 * np.abs(needed).max()
-    assert error.max() < 1e-8
-
-
 @pytest.mark.parametrize(("second", "left"), [(RIGID, 1e-6), (GEARED, 2e-5)])
 def test_motors_alone_carry_flexible_links_behind_gears_that_give(second, left):
     """By stable inversion: 7e-7 and 9e-6 m are left, where moments of rigid gears leave 1.3e-3 and 1.9e-3 m.
@@ -121,21 +84,6 @@ def test_motors_alone_carry_flexible_links_behind_gears_that_give(second, left):
     outcome = run(model, replay, source)
     error = point_motion(outcome, "link2.tip").position - point_motion(source, "link2.tip").position
     assert np.linalg.norm(error, axis=1).max() < left
-
-
-def test_patches_help_motors_behind_gears_that_give():
-    """Of flexible links, with all modal forces: 1e-8 m are left, by splines between outputs; without them 1e-2 m."""
-    path = {"name": "tip", "point": "link2.tip", "x": nonic(TIP[0], 0.4), "y": nonic(TIP[1], 1.5)}
-    model = geared_arm(GEARED, RIGID, initial={"state": "static", "angles": ANGLES}, trajectory=[path])
-    source, left = run(model, pcid(tolerance=1e-8, output_step=0.0025)), []
-    patches = {body.name: Patches(body.name, np.eye(2), np.full(2, 1e9)) for body in model.bodies}
-    for apply in ("joints", "joints+pzt"):
-        replay = forward(actuation="inverse", apply=apply, limits=True, tolerance=1e-8, output_step=0.0025)
-        outcome = run(model, replay, source, patches)
-        error = point_motion(outcome, "link2.tip").position - point_motion(source, "link2.tip").position
-        left.append(np.linalg.norm(error, axis=1).max())
-    assert left[0] > 1e-3
-    assert left[1] < 1e-7
 
 
 def test_coarse_outputs_are_told_of():
@@ -164,27 +112,6 @@ def test_equilibrium_winds_the_gears():
     expected = [gear_motions(about.motion)[joint].moment[0] for joint in "OA"]
     np.testing.assert_allclose(mechanism.force[along], expected, rtol=1e-9)
     assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
-
-
-def test_base_on_six_springs():
-    """Three slides and three hinges in a row: the compliance of a point off them is J diag(1/k) Jᵀ."""
-    k, bodies, joints, side = np.array([2e7, 3e7, 5e7, 4e5, 6e5, 8e5]), [], [], "ground"
-    r = np.array([0.1, 0.2, 0.5])
-    for number, stiffness in enumerate(k):
-        points = {"o": [0.0, 0.0, 0.0], "top": r.tolist()}
-        rigid = {"mass": 1.0, "inertia": [0.01] * 3, "center": [0.0] * 3, "points": points}
-        bodies.append({"name": f"b{number}", "rigid": rigid})
-        kind = "revolute" if number > 2 else "prismatic"
-        keys = {"axis": np.eye(3)[number % 3].tolist(), "rotor_inertia": 1e-6, "stiffness": float(stiffness)}
-        joints.append({"name": f"j{number}", "type": kind, "between": [side, f"b{number}.o"]} | keys)
-        side = f"b{number}.o"
-    rest = {"name": "rest", "kind": "static", "points": ["b5.top"]}
-    scene = make_scene(name="base", space="spatial", gravity=[0.0] * 3, body=bodies, joint=joints, analysis=[rest])
-    details = solve_scene(scene).outcomes["rest"].details
-    J = np.block([[np.eye(3), -skew(r)], [np.zeros((3, 3)), np.eye(3)]])
-    expected = J @ np.diag(1 / k) @ J.T
-    compliance = details.conditions[0]["compliant"].compliance["b5.top"]
-    np.testing.assert_allclose(compliance, expected, atol=1e-12 * expected.max())
 
 
 @pytest.mark.parametrize(

@@ -103,51 +103,6 @@ def test_a_pendulum_without_motors_hangs_on_its_weight():
     np.testing.assert_allclose(f, [np.sqrt(stiffness / (J + m * 0.25)) / (2 * np.pi)], rtol=1e-9)
 
 
-def test_frequencies_of_a_rigid_arm_of_six_axes_on_compliant_gears():
-    """M = Σ m JᵥᵀJᵥ + JωᵀI Jω of the links assembled here, K of the gears: rotors stand still, gravity is off."""
-    rng = np.random.default_rng(6)
-    axes = np.eye(3)[[2, 1, 1, 0, 1, 0]]
-    offsets, angles = rng.uniform(-0.3, 0.5, (6, 3)), rng.uniform(-1.2, 1.2, 6)
-    masses, centers = rng.uniform(1.0, 6.0, 6), rng.uniform(-0.1, 0.2, (6, 3))
-    stiffness, inertias = rng.uniform(2e3, 3e4, 6), []
-    for k in range(6):
-        turn = Rotation.random(random_state=k).as_matrix()
-        inertias.append(turn @ np.diag(masses[k] * np.array([2e-3, 3e-3, 4e-3])) @ turn.T)
-    robot = in_space(
-        {
-            f"b{k}": {"mass": float(masses[k]), "center": centers[k].tolist(), "inertia": inertias[k].tolist(),
-                      "points": {"root": [0.0, 0.0, 0.0], "tip": offsets[k].tolist()}}
-            for k in range(6)
-        },
-        [
-            pin(f"j{k}", f"b{k - 1}.tip" if k else "ground", f"b{k}.root", axis=axes[k].tolist(), gear_ratio=80.0,
-                rotor_inertia=3e-5, stiffness=float(stiffness[k]))
-            for k in range(6)
-        ],
-        initial={"joints": {f"j{k}": angle for k, angle in enumerate(angles.tolist())}},
-        analysis=[REST | {"points": ["b5.tip"]}],
-    )  # fmt: skip
-    R, place, joints, M = np.eye(3), np.zeros(3), [], np.zeros((6, 6))
-    for k in range(6):
-        axis = R @ axes[k]
-        R = R @ Rotation.from_rotvec(angles[k] * axes[k]).as_matrix()
-        joints.append((place, axis))
-        center, inertia = place + R @ centers[k], R @ inertias[k] @ R.T
-        J_v, J_w = np.zeros((3, 6)), np.zeros((3, 6))
-        for i, (at, about) in enumerate(joints):
-            J_v[:, i], J_w[:, i] = np.cross(about, center - at), about
-        carrier = axis @ J_w - np.eye(6)[k]  # the rotor turns with the body before, about its own axis, too
-        M += masses[k] * J_v.T @ J_v + J_w.T @ inertia @ J_w + 3e-5 * np.outer(carrier, carrier)
-        place = place + R @ offsets[k]
-    J = np.array([np.concatenate([np.cross(about, place - at), about]) for at, about in joints]).T
-    expected = np.sqrt(eigh(np.diag(stiffness), M, eigvals_only=True)) / (2 * np.pi)
-    with solve(robot) as results:
-        np.testing.assert_allclose(results["rest/joints_compliant/frequency"][0], expected, rtol=1e-10)
-        C = results["rest/joints_compliant/compliance/b5.tip"][0]
-        assert results["rest/joints_locked/frequency"].shape == (1, 0)
-    np.testing.assert_allclose(C, J @ np.diag(1 / stiffness) @ J.T, atol=1e-10 * np.abs(C).max())
-
-
 def thin(length, elements, count, **keys):
     """EI = 1 N·m², ρA = 0.2 kg/m."""
     modes = {"count": count, "family": "in-plane-bending"} | keys.pop("modes", {})

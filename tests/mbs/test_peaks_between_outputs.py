@@ -178,15 +178,6 @@ def test_rms_of_motors_alone_is_that_of_the_path():
     assert "over the path" in str(results.verdict)
 
 
-@pytest.mark.parametrize("kind", ["pcid", "fcid"])
-@pytest.mark.parametrize("step", [0.1, 1e-3])
-def test_a_jolt_of_a_path_between_outputs(step, kind):
-    """θ = A sin⁴ φ, φ = π (t − 0.1001 s)/0.6 ms, for 0.6 ms alone: |θ̈| is at most 4 A φ̇²."""
-    rate = np.pi / 6e-4
-    jolt = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({rate}*(t - 0.1001))**4, 0))"
-    assert motor(solve(rod({"value": jolt}, step, kind))).moment == pytest.approx(4e-6 * rate**2 * J, rel=1e-3)
-
-
 def test_a_jolt_of_a_joint_that_only_motors_move():
     """A path of joints leaves links to themselves, as inverse dynamics does; collocation has a break at the jolt."""
     rate = np.pi / 6e-4

@@ -239,18 +239,6 @@ def test_mistake_is_named(folder, old, new, start, says):
     assert any(line.startswith(prefix + start) and says in line for line in lines), str(caught.value)
 
 
-def test_joints_and_pzt_need_patches(folder):
-    start, rest = SCENE.split("[[pzt]]")
-    with pytest.raises(InputError, match=r'apply: expected at least one \[\[pzt\]\] for "joints\+pzt", found none'):
-        load(folder, start + "[[payload]]" + rest.split("[[payload]]")[1])
-
-
-def test_pcid_needs_a_trajectory(folder):
-    start, rest = SCENE.split("[[trajectory]]")
-    with pytest.raises(InputError, match=r"kind: expected at least one \[\[trajectory\]\]"):
-        load(folder, start + "[[pzt]]" + rest.split("[[pzt]]")[1])
-
-
 @pytest.mark.parametrize("value", ["true", '"auto"'])
 @pytest.mark.parametrize(
     ("old", "new", "says"),

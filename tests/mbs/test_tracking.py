@@ -17,17 +17,15 @@ from patch_sets import amplifiers
 import ffrobot
 from ffrobot.common.arrays import as_list
 from ffrobot.fe_models.link_source import link_keys
-from ffrobot.mbs.analysis.fcid import sampled
 from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.stable_inversion import invert
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise, shape_along
-from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.tracking.advice import bounds_of_zeros, price_of_tolerance
 from ffrobot.mbs.tracking.intervals import SETTLED, graded, settled
 from ffrobot.mbs.tracking.path_error import Tolerance, displaced_at, forces_off_path
 from ffrobot.mbs.tracking.problem import track
 from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
-from ffrobot.run.solve import prepare_scene, solve_scene
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 SEPTIC = "(35*{s}**4 - 84*{s}**5 + 70*{s}**6 - 20*{s}**7)"
@@ -350,41 +348,6 @@ def test_least_voltage_within_a_path_tolerance_settles():
     fine = track(problem, graded(0.0, 0.6, 300), None, 1e-3)
     assert found.converged
     assert found.share * (1 - found.doubt) < fine.share < found.share
-
-
-def test_least_voltage_where_steps_wander():
-    """T = 0.45 s within 2 N·m, which torques reach: from the first mesh's motion the steps on the next one wander."""
-    servo, Phi_V = strip(4, 0.45)
-    problem = asked(servo, Phi_V, (0.0, 0.45), "least-voltage", 200.0)
-    problem = replace(problem, rate=SLOWEST, limits=replace(problem.limits, torque=np.full(1, 2.0)))
-    breaks = graded(0.0, 0.45, 32)
-    found, coarse = settled(problem, breaks, lambda: True), track(problem, breaks)
-    fine = track(problem, graded(0.0, 0.45, 128))
-    assert found.converged
-    assert fine.converged
-    assert found.share * (1 - found.doubt) < fine.share < found.share < coarse.share
-
-
-@pytest.mark.parametrize(
-    ("count", "by_shape", "least"),
-    [(4, 620, 140), *(pytest.param(*of_one, marks=pytest.mark.nightly) for of_one in ((3, 764, 195), (6, 445, 91)))],
-)
-def test_prescribed_shape_is_feasible(count, by_shape, least):
-    """Section 3, T = 0.6 s, as many patches as modes: FCID with the static shape is one motion, far from the best."""
-    servo, Phi_V = strip(count, 0.6, count)
-    scene = strip_scene(count, 0.6, count, kind="fcid", shape="static", output_step=0.01)
-    shape = solve_scene(scene, Watcher()).analyses["carried"]
-    (voltages,) = shape.actuation.voltages.values()
-    V_max = np.abs(voltages.required).max()
-    assert V_max == pytest.approx(by_shape, rel=5e-3)
-    times = shape.run.time
-    r, tau = servo.forces(times, *sampled(shape.run.prescribed.shape, times))
-    assert np.abs(r - voltages.required @ Phi_V.T).max() < 1e-9 * np.abs(r).max()
-    assert np.abs(tau - motor_moments(shape.run)["O"]).max() < 1e-9 * np.abs(tau).max()
-    problem = asked(servo, Phi_V, (0.0, 0.6), "least-voltage", 200.0, is_free=True)
-    share = track(problem, graded(0.0, 0.6, 64)).share
-    assert 200.0 * share == pytest.approx(least, rel=1e-2)
-    assert 200.0 * share < V_max / 3
 
 
 def test_least_effort():

@@ -23,47 +23,6 @@ def on(t):
     return True
 
 
-def test_rows_are_kept_along_a_motion_in_3d():
-    """A loop with flexible links, one joint driven: rows and rates at every output within rounding."""
-    rng = np.random.default_rng(5)
-    bodies = [
-        random_body(rng, 2, J.revolute),
-        random_body(rng, 2, J.spherical, parent=0, parent_marker=1),
-    ]
-    rows = [row(r.ConstraintKind.point, (-1, 1), (1, 2), axis) for axis in np.eye(3)[:2]]
-    mechanism = Mechanism(bodies, ground(rng, 2), np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
-    model = mechanism.model()
-    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
-    q[model.first[1][0]] = 1
-    value, _ = model.measure(q, v)
-    scene = _core.TreeScene()
-    for k in range(2):
-        scene.add_target(parse_expression(f"{float(value[k])!r}+0.05*(1-cos(3*t))-0.1*t**2"))
-    times = list(np.linspace(0, 0.5, 6))
-    run = _core.tree_motion(model, scene, times, q, v, controls(1e-8), on)
-    assert run.status == _core.IntegrationStatus.completed
-    for t, y in zip(times, run.states, strict=True):
-        at, rate = model.measure(y[: model.n_q], y[model.n_q :])
-        assert np.abs(at - value - (0.05 * (1 - np.cos(3 * t)) - 0.1 * t**2)).max() < 1e-9  # dense output
-        assert np.abs(rate - (0.15 * np.sin(3 * t) - 0.2 * t)).max() < 1e-6
-
-
-def test_a_flexible_tree_keeps_momentum_and_energy():
-    rng = np.random.default_rng(7)
-    bodies = three_links(rng)
-    bodies[0].joint = J.free
-    for body in bodies:
-        body.damping *= 0
-    mechanism = Mechanism(bodies, ground(rng), np.zeros(3))
-    model = mechanism.model()
-    q, v = state_near_rest(rng, mechanism, model, 0.02, 0.3)
-    scene = _core.TreeScene()
-    states = _core.tree_motion(model, scene, [0.0, 1.0], q, v, controls(1e-11), on).states
-    totals = model.states_totals(scene, *np.split(states, [model.n_q], axis=1))
-    kept = np.column_stack([totals[:, 0] + totals[:, 1], totals[:, 4:]])
-    assert relative(kept[-1], kept[0]) < 1e-9
-
-
 def test_laws_that_share_parts():
     """A mass on sines and cosines of one angle: place, rate and, opposite to multipliers, m (a - g), by calculus."""
     body, data = r.SpatialBody(), r.SpatialData()
