@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from checkpoints import check_column, peak, readme_table, reference
 
-from ffrobot import Results
-
 RELATIVE = 1e-6  # of each quantity's peak
 ARM_RUNS = [("line", "static"), ("circle", "static"), ("circle", "undeformed")]  # the other one: test_scenes.py
 ARM_LENGTHS = {"upper": 0.7, "fore": 0.6}  # m
@@ -57,27 +55,6 @@ def test_arm_is_on_its_path_and_in_one_piece(arm):
         along, *across = group[f"points/{link}.tip/deflection"][()].T
         chord = np.linalg.norm(at[f"{link}.tip"] - at[f"{link}.root"], axis=1)
         np.testing.assert_allclose(chord, np.hypot(length + along, np.hypot(*across)), atol=1e-12)
-
-
-@pytest.mark.parametrize("arm", ARM_RUNS[:2], indirect=True, ids="-".join)
-def test_work_of_force_and_moments_is_the_change_of_energy(arm):
-    """Of the static start: power of the force on the tip, less what 0.5 % of damping takes, is the rate of the energy.
-
-    The damping is that of the link files: 2 ζ ω ṗ² for each mode.
-    """
-    *_, case = arm
-    with Results(case.file.filename) as results:
-        t, force = results["inverse/time"], results["inverse/trajectories/tool/force"]
-        target = results["inverse/trajectories/tool/target"]
-        power = np.sum(force * np.gradient(target, t, axis=0, edge_order=2), axis=1)
-        for name in ARM_LENGTHS:
-            body, rates = results.modal_body(name), results[f"inverse/bodies/{name}/modal_velocity"]
-            power -= (rates**2) @ (2 * body.damping_ratio * 2 * np.pi * body.frequency)
-        energy = sum(results[f"inverse/energy/{kind}"] for kind in ("kinetic", "strain", "gravitational"))
-    work = np.append(0.0, np.cumsum(0.5 * np.diff(t) * (power[1:] + power[:-1])))
-    change = energy - energy[0]
-    # trapezia over steps of 5 ms under forces that ring at up to 15 Hz: (ω h)²/12 of each swing
-    assert np.abs(work - change).max() < 0.02 * np.abs(change).max()
 
 
 def test_loop_is_closed(slider_crank_3d):

@@ -162,35 +162,6 @@ def test_inverse_analyses_account_for_what_gears_store_and_lose(kind, followed, 
         assert np.ptp(energy) > 1.0
 
 
-def test_motors_that_follow_paths_drive_the_robot_along_them():
-    """Torques of motors on prescribed paths supply the energy, and a forward run under them moves alike.
-
-    The first gear is rigid, the second compliant: two motors for three coordinates.
-    """
-    joints = [
-        revolute("O", "ground", "a.root", **FIRM),
-        revolute("A", "b.root", "a.tip", **SOFTER, coulomb_friction=0.1, friction_speed=0.3),
-    ]
-    bodies = [tables_3d.rigid(name, 1.5, [0.03] * 3, [0.2, 0.05, 0.0], tip=[0.4, 0.0, 0.0]) for name in "ab"]
-    paths = [
-        {"name": "o", "joint": "O", "value": "0.8*sin(pi*t)**4"},
-        {"name": "a", "motor": "A", "value": "0.5-0.6*sin(pi*t)**4"},
-    ]
-    inverse = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 2e-3, "tolerance": 1e-10}
-    replay = {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints", "tolerance": 1e-10}
-    start = {"state": "static", "joints": {"A": 0.5}}
-    tables = scene(bodies, joints, inverse, replay, trajectory=paths, gravity=[3.0, -9.0, 0.0], initial=start)
-    with solve(tables) as found:
-        of = {key: found[f"inverse/joints/{key}"] for key in ("O/moment", "O/rate", "A/moment", "A/motor_rate")}
-        power = of["O/moment"] * of["O/rate"] + of["A/moment"] * of["A/motor_rate"]
-        left = power - found["inverse/energy/dissipated_power"]
-        energy = sum(found[f"inverse/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
-        assert simpson(left, x=found["inverse/time"]) == pytest.approx(energy[-1] - energy[0], abs=1e-8)
-        assert np.ptp(energy) > 1.0
-        for key in ("O/coordinate", "A/coordinate", "A/motor_angle"):
-            np.testing.assert_allclose(found[f"replay/joints/{key}"], found[f"inverse/joints/{key}"], atol=1e-8)
-
-
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_a_body_starts_twisted_or_turning_behind_a_motor_on_a_path(turned, space):

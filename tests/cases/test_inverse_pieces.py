@@ -1,4 +1,4 @@
-"""Links in pieces in 3D whose shape is prescribed, that motors alone move, or that get patches elsewhere.
+"""Links in pieces in 3D whose shape is prescribed, or that motors alone move.
 
 They are compared with links cut by hand and welded, which no code for links in pieces touches.
 """
@@ -25,9 +25,6 @@ RUN = {"end": 0.8, "output_step": 0.04}
 STATIC = {"name": "static", "kind": "fcid", "shape": "static", **RUN}
 ZERO = {"name": "zero", "kind": "fcid", "shape": "zero", **RUN}
 ALONE = {"name": "alone", "kind": "motors-only", "tolerance": 1e-7, "output": "redefined", "factor": 0.0, **RUN}
-PATCHES = {"body": "fore", "count": 4, "length": 0.1, "width": 0.02, "thickness": 5e-4, "modulus": 63e9} | {
-    "d31": 1.1e-10, "allocation": "least-squares"
-}  # fmt: skip
 
 
 def arm(bodies, welds, ends, analyses, **tables):
@@ -95,18 +92,3 @@ def test_a_shape_is_given_in_the_modes_of_the_whole_link(count, share):
         wanted[:, 0], wanted[:, 1] = 1e-3 * np.sin(5 * t), 1e-4 * t
         agree(found, wanted, share)
         assert np.abs(results["given/bodies/upper/modal"]).max() < 1e-12
-
-
-def test_patches_are_placed_as_on_the_whole_link():
-    """By what they reach of the robot's modes, which two pieces have to 1 %, and by voltages for a straight link."""
-    reach = {"name": "reach", "kind": "placement", "placement": {"body": "fore", "count": 2, "spacing": 0.1}}
-    volts = {"name": "volts", "kind": "placement", "about": "zero"} | {
-        "placement": {"body": "fore", "count": 2, "spacing": 0.1, "criterion": "voltage"}
-    }
-    shown = "best/centers", "best/reach", "frequency", "share", "largest_voltage"
-    whole, pieces = (solved(in_pieces([ZERO, reach, volts], count, pzt=[PATCHES])) for count in (None, 2))
-    with whole, pieces:
-        for name in ("reach", "volts"):
-            for key in shown:
-                found, expected = (of[f"{name}/placement/{key}"] for of in (pieces, whole))
-                np.testing.assert_allclose(found, expected, rtol=2e-2, err_msg=key)

@@ -99,29 +99,6 @@ def on_a_plane(of_slides, body, *analyses, gains=False, **tables):
     )
 
 
-def test_planar_joints_under_control_are_two_slides_and_a_turn():
-    """Also beyond half a turn."""
-    paths = [
-        {"name": "turn", "angle": "b", "axis": Z, "value": "2*(1 - cos(4*t))"},
-        {"name": "place", "point": "b.root", "x": "0.2*sin(5*t)", "y": "0.1*(1 - cos(4*t))"},
-    ]
-    inverse = {"name": "inverse", "kind": "pcid", "end": 0.8, "output_step": 0.02, "tolerance": 1e-9}
-    loop = {"kind": "closed-loop", "actuation": "inverse", "sample_time": 0.005, "tolerance": 1e-9}
-    push = {"disturbance": [{"point": "b.tip", "x": 1.0, "y": -0.5}]}
-    torque = loop | push | {"name": "torque", "controller": [{"kind": "computed-torque", "bandwidth": 20.0}]}
-    found = []
-    for of_slides in (False, True):
-        pd = loop | push | {"name": "pd"}
-        body = {"name": "b", "rigid": BODY}
-        with on_a_plane(of_slides, body, inverse, torque, pd, gains=True, trajectory=paths) as run:
-            joints = SLIDES if of_slides else ["plane"]
-            found.append([np.column_stack([run[f"{name}/joints/{j}/{key}"] for j in joints])
-                          for name in ("torque", "pd") for key in ("moment", "coordinate")])  # fmt: skip
-    assert found[0][1][-1, 2] > np.pi
-    for one, other in zip(*found, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-7 * np.abs(other).max())
-
-
 def test_motors_of_planar_joints_hold_a_link_that_vibrates():
     """Frequencies of the robot with its motors locked are those of two slides and a turn, locked."""
     link = beam_link(0.5, rectangle(0.01, 0.015), 6, modes={"count": 4})

@@ -65,34 +65,6 @@ def test_the_script_draws_the_parts(tmp_path):
             )
 
 
-def test_the_load_keeps_to_its_line(arm):
-    """Inverse dynamics: the tip is on the straight line from (0.45, 0.20) to (0.65, 0.45) m, and at rest at its end."""
-    group = arm.file["inverse"]
-    tip = group["points/forearm.tip/position"][()]
-    along = (tip - [0.45, 0.20]) @ [0.25, -0.20]
-    assert np.abs(along).max() < 1e-12
-    np.testing.assert_allclose(tip[group["time"][()] >= 0.5], np.tile([0.65, 0.45], (201, 1)), rtol=0, atol=1e-12)
-
-
-def test_force_on_the_path_holds_the_weight_at_rest(arm, bodies):
-    """Statics at the end of inverse dynamics: the tip's force and the joints' reactions carry all weights.
-
-    Without patches or motors among the constraints, the path's force −λ_s alone holds the arm up; the motors' moments
-    that are reported are its equivalent: about the shoulder, the moment of that force.
-    """
-    group = arm.file["inverse"]
-    force, tip = group["trajectories/tip/force"][-1], group["points/forearm.tip/position"][-1]
-    turning = 9.81 * 1.0 * tip[0]
-    for name, body in bodies.items():
-        angle = group[f"bodies/{name}/angle"][-1]
-        x, y, _ = body.first_moment
-        lever = body.mass * group[f"bodies/{name}/position"][-1, 0] + x * np.cos(angle) - y * np.sin(angle)
-        turning += 9.81 * lever
-    # To 1e-5: deflections shift the weights a little.
-    assert tip[0] * force[1] - tip[1] * force[0] == pytest.approx(turning, rel=1e-5)
-    assert group["joints/shoulder/moment"][-1] == pytest.approx(turning, rel=1e-5)
-
-
 def test_stress_is_that_of_bending_beside_a_hole(arm):
     """Motors alone, at rest: the forearm bends under the load; beside a hole the net section carries more.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from four_bar import SIDES, closed, in_3d, planar
+from four_bar import SIDES, in_3d, planar
 from scipy.interpolate import CubicSpline
 
 import ffrobot
@@ -15,16 +15,6 @@ ROUGH = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.0
 LOADS = [{"joint": "C", "moment": "0.7*sin(5*t)"}, {"joint": "B", "moment": "0.4 + t"}]
 TIMES = {"end": 0.5, "output_step": 0.01, "tolerance": 1e-10}
 INVERSE = {"name": "inverse", "kind": "pcid"} | TIMES
-ANALYSES = [
-    INVERSE,
-    {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints"} | TIMES,
-    {"name": "released", "kind": "forward"} | TIMES,
-    {"name": "implicit", "kind": "forward", "integrator": "radau"} | TIMES | {"tolerance": 1e-8},
-    {"name": "rest", "kind": "static"},
-    {"name": "about rest", "kind": "linear", "points": ["coupler.tip"]},
-    {"name": "in motion", "kind": "linear", "about": "inverse", "times": [0.0, 0.3], "points": ["coupler.tip"]},
-]
-ORDERS = ("ABDC", "CABD", "CDAB")  # cut at the last; A has a motor and a rotor
 
 
 def of_joints(order):
@@ -33,31 +23,6 @@ def of_joints(order):
 
 def close(found, expected, share=1e-9):
     np.testing.assert_allclose(found, expected, rtol=0, atol=share * max(np.abs(expected).max(), 1e-3))
-
-
-def same_motion(expected, found, analysis):
-    """Also forces."""
-    for joint in SIDES:
-        name = f"{analysis}/joints/{joint}"
-        close(found[f"{name}/coordinate"], expected[f"{name}/coordinate"])
-        close(found[f"{name}/reaction"][:, :2], expected[f"{name}/reaction"])
-        if analysis != "rest":
-            close(found[f"{name}/rate"], expected[f"{name}/rate"])
-    if analysis in ("inverse", "rest"):
-        close(found[f"{analysis}/joints/A/moment"], expected[f"{analysis}/joints/A/moment"])
-    if analysis != "rest":
-        for key in ("kinetic", "dissipated_power"):
-            close(found[f"{analysis}/energy/{key}"], expected[f"{analysis}/energy/{key}"])
-
-
-def same_models(results, analysis):
-    """Also in motion, where friction changes with the posture by way of the axes' rates."""
-    for expected, found in zip(*(of.linear(analysis) for of in results), strict=True):
-        assert found.state_names == expected.state_names
-        close(found.A, expected.A, 1e-8)
-        close(found.B[:, found.inputs("joint/A")], expected.B[:, expected.inputs("joint/A")], 1e-8)
-        names = [*(f"joint/{joint}" for joint in SIDES), "point/coupler.tip/x"]
-        close(found.C[found.outputs(names)], expected.C[expected.outputs(names)], 1e-8)
 
 
 @pytest.mark.parametrize("name", SIDES)
@@ -106,30 +71,6 @@ def test_motors_without_a_rotor_and_compliant_gears_in_all_joints_are_refused(ke
 
 
 BUILT = ROUGH | {"rotor_inertia": 0.05, "gear_ratio": 3.0}
-
-
-@pytest.mark.parametrize(
-    ("followed", "bare"),
-    [*(pytest.param(*of, marks=pytest.mark.nightly) for of in (("A", ""), ("C", ""), ("D", "D"))), ("C", "C")],
-)
-def test_rotors_and_trajectories_in_all_joints(followed, bare):
-    """The numbers of the plane, wherever the loop is cut: at a joint with a rotor, a trajectory or both."""
-    start = closed(1.0)[followed]
-    path = [{"name": "turn", "joint": followed, "value": f"{start!r} + 0.2*(1 - cos(3*t))"}]
-    along = {"name": "along", "kind": "forward", "actuation": "inverse", "apply": "trajectory"} | TIMES
-
-    def solved(tables, order):
-        built = {name: ROUGH if name == bare else BUILT for name in order}
-        return ffrobot.solve(ffrobot.make_scene(**tables(built, [*ANALYSES, along], load=LOADS, trajectory=path)))
-
-    expected = solved(planar, "ABDC")
-    for order in ORDERS:
-        found = solved(in_3d, order)
-        close(found["inverse/trajectories/turn/force"].ravel(), expected["inverse/trajectories/turn/force"].ravel())
-        for analysis in ("inverse", "replay", "along", "released", "implicit", "rest"):
-            same_motion(expected, found, analysis)
-        for analysis in ("about rest", "in motion"):
-            same_models((expected, found), analysis)
 
 
 @pytest.mark.parametrize(("limits", "is_told"), [([0.0, 1.0], True), ([0.0, 1.5], False)])

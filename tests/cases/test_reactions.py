@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from beam_links import beam_link, rectangle
 from scipy.spatial.transform import Rotation
-from tables_3d import revolute, rigid, scene
+from tables_3d import rigid
 
 import ffrobot
 
@@ -132,21 +131,6 @@ def test_a_screw_jack_in_closed_form(unit):
             results[f"{name}/joints/jack/reaction_moment"][:, 2], -h * force, atol=1e-9 * h * size
         )
         np.testing.assert_allclose(results[f"{name}/joints/jack/moment"], J * alpha + h * force, atol=1e-8 * J * 24)
-
-
-def test_motors_only_keeps_motors_out_of_reactions():
-    """A beam on a hub: what the motor does there is no part of the reaction, as in the replay."""
-    keys = {"modes": {"count": 2, "family": "in-plane-bending"}, "damping": {"ratio": 0.02}}
-    bodies = [{"name": "arm", "link": beam_link(0.5, rectangle(0.01, 0.02), 8, **keys)}]
-    path = {"name": "t", "joint": "hub", "value": "0.4*(10*(t/0.4)**3-15*(t/0.4)**4+6*(t/0.4)**5)"}
-    only = {"name": "only", "kind": "motors-only", "end": 0.4, "output_step": 0.02, "tolerance": 1e-6}
-    again = {"name": "again", "kind": "forward", "actuation": "only", "apply": "joints", "tolerance": 1e-8}
-    tables = scene(bodies, [revolute("hub", "ground", "arm.root")], only, again, trajectory=[path])
-    results = ffrobot.solve(ffrobot.make_scene(**tables))
-    for name in ("only", "again"):
-        assert np.abs(results[f"{name}/joints/hub/moment"]).max() > 0.1
-        assert np.abs(results[f"{name}/joints/hub/reaction_moment"][:, 2]).max() < 1e-6
-        assert np.abs(results[f"{name}/joints/hub/reaction"][:, 2]).min() > 1.0
 
 
 ROUGH = {"viscous_friction": 3.0, "coulomb_friction": 2.0, "friction_speed": 0.05}

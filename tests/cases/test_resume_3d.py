@@ -1,8 +1,7 @@
 """Runs in 3D that were stopped go on from their results file as if they had never been."""
 
-import numpy as np
 import pytest
-from stopped_runs import SAME, Stops, differences, edit, go_on, stop
+from stopped_runs import SAME, Stops, differences, go_on
 
 import ffrobot
 
@@ -46,30 +45,6 @@ def arm(case_copy):
     return copy
 
 
-def inverse_alone(scene):
-    text = scene.read_text(encoding="utf-8")
-    scene.write_text(text[: text.index('[[analysis]]\nname = "forward"')], encoding="utf-8")
-
-
-def test_joints_that_leave_their_ranges_are_told_as_of_a_whole_run(arm):
-    """The elbow has left its own before the run is stopped."""
-    joint = 'between = ["upper.tip", "fore.root"]'
-    scene = arm()
-    inverse_alone(scene)
-    plain = ffrobot.solve(scene)
-    t, q = plain.time("inverse"), plain["inverse/joints/elbow/coordinate"]
-    early = np.interp([0.0, 0.015], t, q)
-    lowest, highest = (-9.0, early[1]) if early[1] > early[0] else (early[1], 9.0)
-    edit(scene, {joint: f"{joint}\nposition_limit = [{lowest}, {highest}]"})
-    expected = [text for text in ffrobot.solve(scene).warnings["inverse"] if "leaves its position_limit" in text]
-    assert len(expected) == 1
-    stop(scene, "inverse", 0.02)
-    found = go_on(scene)
-    assert [text for text in found.warnings["inverse"] if "leaves its position_limit" in text] == expected
-    for name, values in plain.columns("inverse").items():
-        np.testing.assert_array_equal(found.columns("inverse")[name], values, err_msg=name)
-
-
 def test_a_body_that_tumbles_goes_on(tmp_path):
     """Where q has a quaternion, which is brought to length one once more: the same to rounding."""
     scene = ffrobot.make_scene(
@@ -91,17 +66,6 @@ def test_a_body_that_tumbles_goes_on(tmp_path):
     found = dict(differences(results, expected))
     for name in ("bodies/top/quaternion[0]", "bodies/top/angular_velocity[2]", "joints/pivot/reaction[2]"):
         assert found[name] < 1e-10, name
-
-
-def test_runs_behind_gears_that_give_go_on(arm):
-    gear = "gear_ratio = 50.0\nrotor_inertia = 1e-4\nstiffness = 5e3\ndamping = 5.0"
-    joint = 'between = ["upper.tip", "fore.root"]'
-    scene = arm((joint, f"{joint}\n{gear}"), ('apply = "joints+pzt"', 'apply = "joints"'))
-    expected = ffrobot.solve(scene)
-    stop(scene, "forward", 0.02)
-    found = dict(differences(go_on(scene), expected))
-    assert found["joints/elbow/motor_angle"] < 1e-12
-    assert found["joints/elbow/moment"] < 1e-12
 
 
 def test_outputs_that_fail_leave_the_integration(arm, monkeypatch):

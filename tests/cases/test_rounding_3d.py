@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle, tube
-from tables_3d import rigid
 
 import ffrobot
 
@@ -87,57 +86,6 @@ def test_a_tolerance_below_rounding_is_named(four_bar):
     would_do = float(re.search(r"tolerance = ([\d.e-]+)", text)[1])
     assert TIGHT < would_do < 1e-4
     assert relative(rates(tight), rates(other)) < would_do
-
-
-def arm_of_six_joints(tolerance):
-    """Two tubes between rigid parts; the pose of the last one is prescribed, from the equilibrium on."""
-
-    def part(name, mass, size, end):
-        return rigid(name, mass, [size] * 3, [0, 0.02, 0.01], end=end)
-
-    def tube(name, length, outer, inner):
-        section = {"shape": "tube", "outer": outer, "inner": inner}
-        return {"name": name, "link": beam_link(length, section, 16, damping={"rayleigh": [0.0, 1.5e-4]})}
-
-    axes = [[0, 0, 1], [0.1, 1, 0.05], [0.05, 1, -0.12], [1, 0.1, 0.2], [0.1, 0.9, 0.3], [1, -0.2, 0.15]]
-    turns = [[0, 0, 0], [0.1, -1.2, 0.2], [-0.2, 1.4, 0.1], [0.3, 0.2, -0.4], [0, 0.1, 0.7], [0.2, 0, 0]]
-    ends = ["ground", "t.root", "t.end", "up.root", "up.tip", "e.root", "e.end", "fo.root", "fo.tip", "w.root", "w.end"]
-    ends.append("f.root")
-    joints = [
-        {"name": f"j{k + 1}", "type": "revolute", "between": ends[2 * k : 2 * k + 2], "axis": axes[k], "rpy": turns[k]}
-        for k in range(6)
-    ]
-    guess = [0.3, -0.2, 0.5, -0.4, 0.6, 0.2]
-    way = "where(t < 0.7, 10*(t/0.7)**3 - 15*(t/0.7)**4 + 6*(t/0.7)**5, 1)"
-    ways = [("0.359", -0.11), ("0.226", 0.14), ("0.356", 0.09), ("0.922", 0.35), ("0.968", -0.3), ("1.233", 0.6)]
-    x, y, z, *rpy = (f"{start} + {change}*{way}" for start, change in ways)
-    return ffrobot.make_scene(
-        name="pose",
-        space="spatial",
-        gravity=[0.0, 0.3, -9.8],
-        body=[
-            part("t", 4.1, 0.022, [-0.0392, -0.0088, 0.0007]),
-            tube("up", 0.43, 0.03, 0.025),
-            part("e", 1.7, 0.005, [0.0667, 0.0207, 0.0023]),
-            tube("fo", 0.36, 0.023, 0.019),
-            part("w", 0.9, 0.0012, [0.0016, 0.0555, 0.0224]),
-            part("f", 0.55, 0.0007, [-0.0193, 0.0766, 0.0144]),
-        ],
-        joint=joints,
-        initial={"state": "static", "joints": {f"j{k + 1}": angle for k, angle in enumerate(guess)}},
-        trajectory=[{"name": "p", "point": "f.end", "x": x, "y": y, "z": z, "rpy": rpy}],
-        analysis=[
-            {"name": "inv", "kind": "pcid", "end": 0.85, "output_step": 0.05, "tolerance": tolerance, "max_steps": 9000}
-        ],
-    )
-
-
-@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
-def test_a_pose_at_the_default_tolerance():
-    """Steps of 1e-9 s went on for ever, by two integrators in turn; a run that is 100 times as loose bounds errors."""
-    loose, found = (ffrobot.solve(arm_of_six_joints(tolerance)) for tolerance in (1e-4, 1e-6))
-    for name in ("j2/moment", "j5/moment", "j3/reaction"):
-        assert relative(loose[f"inv/joints/{name}"], found[f"inv/joints/{name}"]) < 1e-4, name
 
 
 def chain(count, link, path, *, space="planar", load=None, **keys):

@@ -337,15 +337,3 @@ def test_brief_load_on_the_tip(lasts):
     with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
         off = results["replay/points/arm.tip/position"] - results["carried/points/arm.tip/position"]
     assert np.abs(off).max() < 1e-6
-
-
-def test_least_voltage_of_unequal_limits_is_a_share():
-    """That of a patch is its limit times the share, and the largest one belongs to no other patch."""
-    limits = np.array([200.0, 150.0, 400.0, 300.0])
-    tables = in_plane(patches("arm", 0.02, limit=limits.tolist()))
-    tables["analysis"] = [tables["analysis"][0] | {"objective": "least-voltage", "tolerance": 1e-4}]
-    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
-        share, answer = results.attributes("carried/tracking")["least_share"], results.verdict["carried"].answer
-        most = np.abs(results["carried/pzt/arm/required_voltage"]).max(axis=0)
-    assert f"least voltage {100 * share:.3g} % of limits" in answer
-    assert (most / limits).max() == pytest.approx(share, rel=1e-3)

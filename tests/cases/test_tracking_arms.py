@@ -221,25 +221,6 @@ def test_least_voltage_is_an_answer(scene):
         assert not any("no actuator provides" in text for text in results.warnings["carried"])
 
 
-def test_time_before_and_after_lowers_voltages(scene):
-    """By e^{−s t} with the slowest zero, about 65 1/s, as far as voltages that begin at zero are free to."""
-    shares = []
-    for time in (0.0, 0.02):
-        keys = f'objective = "least-voltage"\npre_actuation = {time}\npost_actuation = {time}\ntolerance = 1e-4'
-        path = scene(("tolerance = 1e-4", keys), alone=True)
-        with ffrobot.solve(path) as results:
-            shares.append(float(results.attributes("carried/tracking")["least_share"]))
-            assert off_path_of_first(results) < 1e-9
-    assert shares[1] / shares[0] == pytest.approx(np.exp(-65 * 0.02), rel=0.25)
-
-
-def off_path_of_first(results):
-    """m, of the tip from where the path begins, while actuators act before it."""
-    time = results.time("carried/points/arm.tip/position")
-    y = results["carried/points/arm.tip/position"][time <= 0, 1]
-    return float(np.abs(y - np.sin(-np.pi / 8)).max())
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -266,18 +247,6 @@ def off_path_of_first(results):
 def test_what_does_not_fit(scene, changes, message):
     with pytest.raises(InputError, match=message):
         ffrobot.solve(scene(*changes))
-
-
-@pytest.mark.nightly
-def test_steps_of_the_effort_that_grow(scene):
-    """Jerk that jumps, eight modes: full steps wander on the finest intervals, damped ones end on the path."""
-    quintic, limit = "10*(t/0.6)**3 - 15*(t/0.6)**4 + 6*(t/0.6)**5", 600.0
-    changes = [(SEPTIC, quintic), ("limit = 200.0 ", f"limit = {limit} "), ("tolerance = 1e-4", "tolerance = 1e-3")]
-    with ffrobot.solve(scene(*changes, link=[("count = 2", "count = 8")])) as results:
-        about = results.attributes("carried/tracking")
-        assert about["objective"] == "effort"
-        assert results.peak("carried/pzt/arm/required_voltage")[0] <= limit
-        assert off_path(results, "replay") < 1e-5
 
 
 def test_motors_that_are_too_weak(scene):
@@ -308,37 +277,6 @@ def test_a_mesh_that_is_too_coarse(scene, monkeypatch):
             assert all(f"up to {left[-1]:.2g} of the largest elastic one" in text for text in said)
     assert left[0] > 1e-4 > left[1]
     assert off[0] > 10 * off[1]
-
-
-SAMPLED = """
-[[analysis]]
-name = "loop{k}"
-kind = "closed-loop"
-actuation = "carried"
-feed_forward = "{given}"
-sample_time = {step}
-"""
-
-
-def test_feed_forward_of_a_closed_loop(scene):
-    """Held for 2, 1 and 0.5 ms torques and voltages leave 80, 40 and 3 µm; what the summary says is the distance."""
-    path = scene()
-    kinds = [("joints+pzt", 2e-3), ("joints+pzt", 1e-3), ("joints+pzt", 5e-4), ("joints", 5e-4)]
-    more = [SAMPLED.format(k=k, given=given, step=step) for k, (given, step) in enumerate(kinds)]
-    path.write_text(path.read_text(encoding="utf-8") + "".join(more), encoding="utf-8")
-    off = []
-    with ffrobot.solve(path) as results:
-        wanted = results["carried/points/arm.tip/position"]
-        for k in range(len(kinds)):
-            found = results[f"loop{k}/points/arm.tip/position"]
-            off.append(float(np.linalg.norm(found - wanted, axis=1).max()))
-            about = results.attributes(f"loop{k}/control")
-            assert about["tip_error_max"] == pytest.approx(off[-1], rel=0.05)
-            assert about["verdict"] == "stable"
-        assert off[0] < 1e-4
-        assert off[1] < 0.6 * off[0]
-        assert off[2] < 0.2 * off[1]
-        assert off[3] > 100 * off[2]
 
 
 def carried_alone(path, *changes):
