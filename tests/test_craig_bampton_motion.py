@@ -104,29 +104,3 @@ def test_sag_under_loads_at_interfaces_is_exact(tmp_path):
     EI = E * B * H**3 / 12
     expected = 2.0 * 0.6**3 / (3 * EI) + 0.5 * 0.6**2 / (2 * EI)
     assert results["rest/points/l1.tip/deflection"][0, 1] == pytest.approx(expected, rel=1e-7)
-
-
-def slider_crank(folder, condition):
-    """A crank at constant speed, connecting rod and rigid slider, two loops around."""
-    joints = [
-        {"name": "main", "type": "revolute", "between": ["ground", "l1.root"], "motor": True},
-        {"name": "pin", "type": "revolute", "between": ["l1.tip", "l2.root"]},
-        {"name": "wrist", "type": "revolute", "between": ["l2.tip", "slider.center"]},
-        {"name": "rail", "type": "prismatic", "between": ["ground", "slider.center"], "axis": [1.0, 0.0]},
-    ]
-    rigid = {"mass": 0.8, "inertia": 1e-3, "center": [0.0, 0.0], "points": {"center": [0.0, 0.0]}}
-    return solved(
-        folder,
-        body=[*bodies((condition,) * 2, [0.15, 0.4]), {"name": "slider", "rigid": rigid}],
-        joint=joints,
-        initial={"state": "static", "angles": {"l1": 0.5, "l2": -0.18}},
-        trajectory=[{"name": "turn", "joint": "main", "value": law(0.5, 2.0)}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.04, "output_step": 0.002, "tolerance": 1e-6}],
-    )
-
-
-def test_slider_crank(tmp_path):
-    found, *others = (slider_crank(tmp_path, condition) for condition in CONDITIONS)
-    names = ["inverse/joints/main/moment", "inverse/joints/pin/reaction", "inverse/points/slider.center/position"]
-    for other in others:
-        assert difference(found, other, names) < 1e-5

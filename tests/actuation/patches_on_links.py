@@ -38,11 +38,6 @@ def bent(planar, of_link, voltage):
     return planar.modal_transform.T @ of_link.Phi_V @ voltage / planar.stiffness
 
 
-def tip_deflection(planar, of_link, voltage):
-    """Along y, m, of the tip."""
-    return planar.points["tip"].translation[1] @ bent(planar, of_link, voltage)
-
-
 def modes_in_the_plane(body):
     """Numbers of the modes of a modal body that move in the plane."""
     return np.flatnonzero(planar_body(body).modal_transform.any(axis=1))

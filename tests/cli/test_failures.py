@@ -152,31 +152,6 @@ def test_ctrl_c_before_any_analysis_writes_nothing(two_link_copy, ffrobot, tmp_p
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize(
-    "number",
-    [
-        pytest.param(signal.SIGINT, marks=pytest.mark.nightly),
-        pytest.param(signal.SIGTERM, marks=pytest.mark.nightly),
-        signal.SIGKILL,
-    ],
-)
-def test_a_link_after_one_that_was_ended_while_it_compiled(two_link_copy, ffrobot, tmp_path, number):
-    """Half a form in the cache holds nobody up: FFCx itself would wait for its compiler for ever."""
-    folder = two_link_copy()
-    shutil.copy(SOLID, folder)
-    options = {"cwd": folder, "env": ffrobot.environment | {"XDG_CACHE_HOME": str(tmp_path / "cache")}}
-    process = subprocess.Popen([ffrobot.path, "link", "link1.toml"], **options, stdout=subprocess.PIPE)
-    while not any((tmp_path / "cache").rglob("libffcx_*.c")):
-        assert process.poll() is None
-        time.sleep(0.002)
-    process.send_signal(number)
-    process.communicate(timeout=30)
-    if process.returncode == 0:
-        pytest.skip("the signal came too late")
-    done = subprocess.run([ffrobot.path, "link", "link1.toml"], **options, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-
-
 def _mapped(pid):
     with open(f"/proc/{pid}/maps") as maps:
         return maps.read()

@@ -231,14 +231,6 @@ def test_bodies_named_like_paths_write_nothing(ffrobot, short_scene, tmp_path, c
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
-def test_a_body_named_scene_has_its_own_file(ffrobot, short_scene):
-    """In the folder of a run, where the scene has one of this name."""
-    text = short_scene.read_text(encoding="utf-8").replace('"rod', '"scene').replace("rod = ", "scene = ")
-    short_scene.write_text(text.replace('link = "scene.toml"', 'link = "rod.toml"'), encoding="utf-8")
-    ffrobot.ok("sweep", short_scene, "--vary", HEIGHTS.replace("links.rod", "links.scene"))
-    assert [row["status"] for row in table(short_scene)] == ["completed"] * 3
-
-
 def test_spectra(ffrobot, tmp_path):
     """`first` is the lowest frequency, not the largest of all: of a double pendulum both are known.
 

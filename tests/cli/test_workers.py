@@ -128,16 +128,6 @@ def datasets(path):
         return found
 
 
-def test_runs_find_nothing_of_earlier_ones(sweep, scene):
-    rows = sweep("careless", "constant", "careless", "constant")
-    assert [row["status"] for row in rows] == ["completed"] * 4
-    workers, processes, texts = zip(*notes(scene), strict=True)
-    assert texts == ("clean",) * 4
-    assert len(set(workers)) == 1
-    assert len(set(processes)) == 4
-    assert len({row["loop/joints/O/coordinate last"] for row in rows}) == 1
-
-
 def test_random_numbers_are_others_in_every_run(sweep, scene):
     """As of single runs: where nobody seeds them, the system does."""
     sweep("careless", "drawing", "drawing")
@@ -163,16 +153,6 @@ def test_crashes_cost_their_own_run(sweep, scene):
     assert [row["status"] for row in rows] == ["completed", "crashed", "crashed", "completed"]
     assert [row["message"] for row in rows[1:3]] == ["ended by SIGKILL", "ended by SIGABRT"]
     assert len({worker for worker, _, _ in notes(scene)}) == 1
-
-
-def test_a_worker_that_is_killed_costs_its_run(sweep, scene):
-    """The run ends with it, and does not write into what another may write later."""
-    rows = sweep("constant", "worker_killed", "constant")
-    assert [row["status"] for row in rows] == ["completed", "crashed", "completed"]
-    time.sleep(1.2)
-    found = notes(scene)
-    assert [text for _, _, text in found] == ["clean", "kills", "clean"]
-    assert found[1][0] == found[0][0] != found[2][0]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.nightly)])

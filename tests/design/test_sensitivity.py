@@ -153,40 +153,6 @@ def test_the_derivative_of_a_peak_that_rings(write, key):
         assert found.error[0, 0] < 1e-3 * abs(expected)
 
 
-def test_peaks_between_outputs_are_followed_with_repeated_steps(write):
-    """The second mode rings three times between outputs: the same derivative as by peaks of dense runs."""
-    key, h, tops = "payload.0.mass", 1e-3, {}
-    scene = SWING | {"initial": {"state": "undeformed"}}
-    scene |= {"analysis": [scene["analysis"][0] | {"end": 8.0, "output_step": 0.1}]}
-    found = ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], [key])
-    assert {one.method for row in found.entries for one in row} == {"repeated steps"}
-    assert any("between them, which counts" in line for line in found.remarks())
-    for n in (-2, -1, 1, 2):
-        new = changed(scene, key, value_at(scene, key) * (1 + n * h))
-        new["analysis"][0] |= {"tolerance": 1e-10, "output_step": 1e-3}
-        with ffrobot.solve(ffrobot.make_scene(**new)) as results:
-            tops[n] = results.peak("inverse/joints/shoulder/moment")[0]
-    expected = (8 * (tops[1] - tops[-1]) - (tops[2] - tops[-2])) / (12 * h * value_at(scene, key))
-    assert found.derivative[0, 0] == pytest.approx(expected, rel=1e-5)
-
-
-def test_frequencies_of_a_cantilever(write):
-    """f ∝ √E/L², whatever the width, also on the mesh: to 1e-9."""
-    section = {"shape": "rectangle", "height": 0.02, "width": 0.03}
-    link = TUBE | {"geometry": {"kind": "beam", "length": 0.6, "section": section}}
-    scene = PLANE | {"body": [{"name": "arm", "link": link}]} | STILL
-    keys = {
-        "links.arm.geometry.section.width": 0.0,
-        "links.arm.geometry.length": -2.0,
-        "links.arm.material.youngs_modulus": 0.5,
-    }
-    found = ffrobot.sensitivity(write(scene), ["frequency 1 arm", "frequency 2 arm"], list(keys))
-    np.testing.assert_allclose(found.logarithmic, [list(keys.values())] * 2, atol=1e-9)
-    beta = 1.875104068711961  # of cos β cosh β = −1
-    frequency = beta**2 / (2 * np.pi * 0.6**2) * np.sqrt(70e9 * 0.02**2 / 12 / 2700.0)
-    assert found.value[0] == pytest.approx(frequency, rel=1e-5)
-
-
 def test_moment_of_a_rigid_arm(write):
     """M = 2 (J + m c² + m_p a²) + (m c + m_p a) g cos t²: largest at the start, where its angle is 0."""
     keys = ["payload.0.mass", "body.arm.rigid.center.0", "body.arm.rigid.inertia"]

@@ -1,7 +1,5 @@
 """Gradients in a search: one run for each number with the steps of the design's own, against `ffrobot sensitivity`."""
 
-from copy import deepcopy
-
 import numpy as np
 import pytest
 import tomli_w
@@ -51,14 +49,3 @@ def test_one_run_for_each_number(tmp_path):
     assert np.all(slopes.error <= 1e-3 * scale)
     assert found.slopes(first).gradient == pytest.approx(slopes.gradient, rel=0, abs=0)
     assert found.evaluations.designs.count == 4
-
-
-def test_integrators_that_cannot_repeat_steps(tmp_path):
-    """Radau IIA chooses its own steps: central pairs."""
-    scene = deepcopy(SWING)
-    scene["analysis"][0]["integrator"] = "radau"
-    found, first = differentiation(tmp_path, scene)
-    slopes = found.slopes(first)
-    assert found.evaluations.designs.count == 1 + 4
-    assert np.isfinite(slopes.gradient).all()
-    assert np.isfinite(found.curvature).all()

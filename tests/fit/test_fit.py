@@ -96,18 +96,6 @@ def spring_beam(k, count, free=False):
     return np.array(roots[:count]) ** 2 * np.sqrt(E * I / (RHO * AREA * 0.6**4)) / (2 * np.pi)
 
 
-def test_stiffness_of_a_joint_from_the_closed_form(write, tmp_path):
-    """The motor is held: the spring of the gear is between the arm and the ground."""
-    write()
-    scene = tmp_path / "scene.toml"
-    scene.write_text(ROBOT, encoding="utf-8")
-    measured = table(tmp_path / "robot.csv", spring_beam(820.0, 3), uncertainty=1e-3)
-    fit = ffrobot.fit_measured(scene, measured, ["joint.shoulder.stiffness"], motors="locked")
-    assert fit.value[0] == pytest.approx(820.0, rel=1e-4)  # elements and modes leave 1e-5 of the frequencies
-    (joint,) = tomllib.loads((tmp_path / "scene.fitted.toml").read_text())["joint"]
-    assert joint["stiffness"] == pytest.approx(fit.value[0], rel=1e-7)
-
-
 def test_frequencies_of_held_and_free_motors(write, tmp_path):
     """Held, without a spring in the gear: the cantilever's. Free, without rotor: those of a pinned beam."""
     write()

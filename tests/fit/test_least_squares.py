@@ -50,23 +50,6 @@ def test_uncertainty_is_that_of_a_monte_carlo(is_known):
         assert np.mean([fit.misfit**2 for fit in fits]) == pytest.approx(1.0, abs=0.16)
 
 
-@pytest.mark.parametrize("is_known", [True, False], ids=["uncertainty given", "uncertainty from the residuals"])
-def test_ranges_hold_the_true_values_as_often_as_said(is_known):
-    """600 measurements, two degrees of freedom: the share of true values within is known to 2 % (one σ), bound 4 σ."""
-    spread, count, rng = 0.002, 600, np.random.default_rng(36)
-    exact = chain(TRUE)
-    inside = {0.6827: [], 0.95: []}
-    for noisy in exact * (1.0 + spread * rng.standard_normal((count, 5))):
-        fit = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy, spread * exact if is_known else None)
-        assert fit.degrees_of_freedom == (None if is_known else 2)
-        error = np.abs(np.log(fit.value / TRUE))
-        for probability, found in inside.items():
-            found.append(error <= fit.coverage_factor(probability) * fit.relative_deviation)
-    for probability, found in inside.items():
-        bound = 4 * np.sqrt(probability * (1 - probability) / count)
-        np.testing.assert_allclose(np.mean(found, axis=0), probability, rtol=0, atol=bound)
-
-
 def test_few_degrees_of_freedom_are_named():
     """t of two degrees of freedom in closed form: p √(2/(1 − p²))."""
     noisy = chain(TRUE) * [1.001, 0.999, 1.0, 1.002, 0.999]

@@ -1,7 +1,6 @@
 """`ffrobot fit --frf`: parameters from FRFs that closed forms and an assembly in NumPy have made."""
 
 import copy
-import time
 import tomllib
 
 import numpy as np
@@ -219,20 +218,6 @@ def test_frfs_without_motion_and_keys_that_are_there_twice(tmp_path):
     table.write_text(table.read_text().replace("/y", "/z"))
     with pytest.raises(InputError, match=r'test "0": arm.tip z → arm.tip -y: expected an FRF of directions'):
         ffrobot.fit_responses(*files, ["joint.a.stiffness"])
-
-
-@pytest.mark.slow
-def test_six_poses_of_nine_frfs_with_ten_parameters_take_twenty_seconds(tmp_path):
-    start = copy.deepcopy(ARM)
-    for joint in start:
-        joint.k *= 1.2
-    start[2].d, start[3].d = 1.3 * start[2].d, 0.7 * start[3].d
-    keys = [*(f"joint.{joint.name}.stiffness" for joint in ARM), "joint.waist.damping", "joint.shoulder.damping"]
-    rng = np.random.default_rng(6)
-    poses = [[0.0, 0.0, *rng.uniform(-1.0, 1.0, 6)] for _ in range(6)]
-    files, began = robot_tests(tmp_path, start, poses, 800), time.process_time()
-    ffrobot.fit_responses(*files, keys)
-    assert time.process_time() - began < 20.0
 
 
 def universal(path, H, lines, ends, kind=12, **keys):

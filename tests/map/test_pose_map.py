@@ -1,11 +1,6 @@
 """Maps over the workspace: closed forms, single runs of the same poses, branches, limits, resuming."""
 
-import os
 import re
-import signal
-import subprocess
-import sys
-import time
 from io import StringIO
 
 import h5py
@@ -161,30 +156,6 @@ def test_round_off_is_no_result(arm, tmp_path):
         assert tested["torque"].values[-1] == 0.0
         assert tested["frequency_locked"].everywhere
     assert not re.search(r"e[+-]\d\d", console.getvalue())
-
-
-def test_a_killed_map_goes_on_and_is_the_same(arm, tmp_path):
-    over = ("shoulder=-1:1:12", "elbow=0.2:1.4:16")
-    whole = mapped(arm, tmp_path / "whole", *over)
-    folder = tmp_path / "killed"
-    command = [sys.executable, "-m", "ffrobot", "map", str(arm), "-o", str(folder), "--no-figures", "-j", "1"]
-    for axis in over:
-        command += ["--over", axis]
-    run = subprocess.Popen(command, start_new_session=True)
-    parts = folder / "parts"
-    while run.poll() is None and not list(parts.glob("*.npz")):
-        time.sleep(0.02)
-    if run.poll() is None:
-        os.killpg(run.pid, signal.SIGKILL)
-    run.wait()
-    before = {file.name: file.stat().st_mtime_ns for file in parts.glob("*.npz")}
-    assert before
-    again = mapped(arm, folder, *over)
-    after = {file.name: file.stat().st_mtime_ns for file in parts.glob("*.npz")}
-    assert before.items() <= after.items()
-    for name, values in whole.values.items():
-        # Postures found in two processes can differ in their last bit.
-        np.testing.assert_allclose(again.values[name], values, rtol=0, atol=1e-12 * np.nanmax(np.abs(values)))
 
 
 def test_poses_judged_before_stay_where_inverse_kinematics_rounds_otherwise(arm, tmp_path, monkeypatch):

@@ -113,11 +113,3 @@ def test_faces_of_two_prongs_count_together(solid, mesh_part, step_file):
     part = mesh_part(solid(file=step_file(prongs), unit="mm"))
     assert face_area(part, "root") == pytest.approx(2 * 0.02 * 0.02)
     assert face_area(part, "tip") == pytest.approx(0.06 * 0.02)
-
-
-def test_gmsh_starts_afresh_after_an_error(solid, mesh_part, step_file):
-    before = mesh_part(solid())
-    with pytest.raises(InputError):
-        mesh_part(solid(file=step_file(fork), unit="mm", x_axis=(0.0, 1.0, 0.0), y_axis=(1.0, 0.0, 0.0)))
-    after = mesh_part(solid())
-    np.testing.assert_array_equal(before.points, after.points)

@@ -94,13 +94,6 @@ def test_holes_that_leave_the_part_are_refused(solid, mesh_part, hole, key):
         mesh_part(solid(section=rectangle(0.02, 0.01), hole=(Hole(**hole),)))
 
 
-def test_the_same_drawing_gives_the_same_mesh(solid, mesh_part):
-    tube = solid(section=TubeSection(shape="tube", outer=0.05, inner=0.03))
-    first, second = mesh_part(tube, size=0.02), mesh_part(tube, size=0.02)
-    np.testing.assert_array_equal(first.points, second.points)
-    np.testing.assert_array_equal(first.cells, second.cells)
-
-
 @pytest.mark.parametrize("faces", ["top", "bottom", "both"])
 def test_patches_lie_on_whole_facets(solid, mesh_part, faces):
     outlines = Outlines(tuple((x - 0.025, x + 0.025) for x in (0.125, 0.375, 0.625, 0.875)), 0.02, faces)

@@ -209,19 +209,6 @@ def test_controllers_whose_zeros_ring_for_ever_are_not_inverted(tmp_path):
     assert not any(one.name.startswith("inverted") for one in found.candidates)
 
 
-def test_set_points_beyond_limits_of_positions_come_last(tmp_path):
-    """θ + 2ζ θ̇/ω + θ̈/ω² is beyond the end of a motion while it brakes, where ζ² > 5/6 and θ comes as t⁶."""
-    path = table(tmp_path / "path.csv", TIMES, hub=WAY * LAWS["trapezoid"].sample(TIMES)[:, 0])
-    for most in (2 * WAY, WAY):
-        file = axis(tmp_path, position_limit=[-WAY, most])
-        found = smooth_motion(file, path, servo=5.0, damping_ratio=1.5, settled=1e-5).candidates
-        inverted = next(one for one in found if one.name.startswith("inverted"))
-        beyond = float(inverted.command.max()) - WAY
-        assert beyond > 1e-3  # rad
-        assert inverted.excess == pytest.approx(1.0 + beyond if most == WAY else 0.0, abs=1e-12)
-        assert (inverted is found[0]) == (most > WAY)
-
-
 @pytest.mark.parametrize(
     ("columns", "expected"),
     [
