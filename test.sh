@@ -10,6 +10,9 @@ mkdir -p build/types/ffrobot/mbs
 ln -s "$PWD"/ffrobot/* "$PWD"/{common,mesh,fe_models,actuation} build/types/ffrobot/
 ln -s "$PWD"/mbs/{*.py,fields,joints,scene,model,posture,linear,run,quantities,inversion,analysis,tracking} "$PWD"/.venv/lib/python3*/site-packages/ffrobot/mbs/_core.pyi build/types/ffrobot/mbs/
 mapfile -t cpp < <(find mbs -name '*.h' -o -name '*.cpp')
+# It takes a minute of one core: beside the first tests.
+nice env -C build/types ../../.venv/bin/mypy --config-file ../../pyproject.toml --no-error-summary -p ffrobot >build/types.txt 2>&1 &
+mypy=$!
 
 failed=()
 check() {
@@ -19,7 +22,6 @@ check() {
 }
 check "ruff check" .venv/bin/ruff check --quiet .
 check "ruff format" .venv/bin/ruff format --diff --quiet .
-check "mypy" env -C build/types ../../.venv/bin/mypy --config-file ../../pyproject.toml --no-error-summary -p ffrobot
 check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 
 status=0
@@ -27,6 +29,8 @@ status=0
 # build/tests.xml keeps what each test took.
 .venv/bin/python -m pytest -n auto --dist loadfile --junitxml build/tests.xml "$@" || status=$?
 .venv/bin/python scripts/test_costs.py build/tests.xml
+check "mypy" wait "$mypy"
+cat build/types.txt
 
 if ((${#failed[@]})); then
   printf 'failed, see above: %s\n' "${failed[@]}" >&2
