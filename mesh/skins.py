@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.errors import InputError, is_own_fault
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,14 +22,23 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
     """The mesh in `path`, m, its coordinates times `scale` (3,), then turned by C (3, 3) and moved by d (3,).
 
-    Raises `ModuleNotFoundError` without trimesh, else what a reader of damaged or unknown files raises.
+    Raises `ModuleNotFoundError` without trimesh, `InputError` if the file is missing, damaged or of another format.
     """
     import trimesh
 
     if path.suffix.lower() not in READ:
-        raise ValueError(f"expected one of {', '.join(READ)}, found {path.name}")
-    loaded = trimesh.load(path, force="mesh")
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
+        raise InputError(f"expected a mesh in one of {', '.join(READ)}", path.name)
+    try:
+        loaded = trimesh.load(path, force="mesh")
+        loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
+    except ModuleNotFoundError:
+        raise
+    except Exception as error:  # whatever a reader of damaged or missing files raises
+        if is_own_fault(error):
+            raise
+        raise InputError("expected a mesh that trimesh can read", path.name) from error
+    if not len(loaded.faces):
+        raise InputError("expected a mesh with facets", f"{path.name} without any")
     return _moved(loaded, C @ np.diag(scale), d)
 
 

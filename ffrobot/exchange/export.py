@@ -238,6 +238,7 @@ def _print_masses(imported: Imported, console: Console) -> None:
         inertial = imported.robot.links[each.link].inertial
         mass = inertial.mass if inertial is not None else 0.0
         ratios = f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}"
+        ratios = ratios if each.volume else ("–", "–", "–")
         rows.append((each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}", *ratios))
     headers = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
     console.print()

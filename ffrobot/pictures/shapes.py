@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..common.arrays import Array, Indices, Integers, as_floats
-from ..common.errors import InputError, is_own_fault
+from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.rotations import of_rpy, smallest_turn
 from ..common.tables import shown
@@ -135,9 +135,7 @@ def visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array
     except ModuleNotFoundError:
         notes.append("bodies are drawn without their meshes, which need trimesh: pip install trimesh pycollada")
         return None
-    except Exception as error:  # whatever a reader of damaged or missing files raises
-        if is_own_fault(error):
-            raise
+    except InputError as error:
         logger.warning("mesh of %s", name, exc_info=error)
         notes.append(f"{name} is drawn without its mesh: {shown(str(error))}")
         return None

@@ -51,16 +51,29 @@ def test_shapes_against_their_meshes(shape, tmp_path):
         np.testing.assert_allclose(one, other, rtol=0, atol=5e-4 * np.abs(one).max())
 
 
-def test_open_meshes_count_with_their_hull(tmp_path):
+@pytest.mark.parametrize("damage", ["hole", "inside out"])
+def test_meshes_without_an_inside_count_with_their_hull(damage, tmp_path):
+    """The integrals over a box change by a sixth of its volume for each facet of the wrong orientation."""
     box = trimesh.creation.box((0.1, 0.2, 0.3))
-    box.update_faces(np.arange(len(box.faces)) > 0)
+    if damage == "hole":
+        box.update_faces(np.arange(len(box.faces)) > 0)
+    else:
+        box.faces[5] = box.faces[5][::-1]
     box.export(tmp_path / "shape.stl")
     found = imported(
         tmp_path, link("base"), shaped("arm", '<mesh filename="shape.stl"/>', kind="visual"), joint("j", "base", "arm"),
         filling=Filling(RHO),
     )  # fmt: skip
     assert body_of(found)[0] == pytest.approx(RHO * 0.006, rel=1e-6)
-    assert any("convex hulls of open meshes" in remark for remark in found.remarks)
+    assert any("convex hulls of meshes that are open or" in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize("content", ["", "solid a\nendsolid a\n", "\0" * 84 + "half a file"])
+def test_meshes_that_cannot_be_read_are_named(content, tmp_path):
+    (tmp_path / "shape.stl").write_text(content)
+    parts = link("base"), shaped("arm", '<mesh filename="shape.stl"/>'), joint("j", "base", "arm")
+    with pytest.raises(InputError, match=r'"arm": <collision>: expected a mesh .*, found shape.stl'):
+        imported(tmp_path, *parts, filling=Filling(RHO))
 
 
 def test_cylinders_where_meshes_are_missing(tmp_path):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError, is_own_fault
+from ...common.errors import InputError
 from ...common.rotations import rpy_of, smallest_turn
 from ...common.tables import shown
 from ...fe_models.modal_body import ModalBody
@@ -56,11 +56,9 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
             continue
         try:
             parts = [_loaded(mesh, urdf) for mesh in meshes]
-        except Exception as error:  # whatever a reader of damaged or unknown files raises
-            if is_own_fault(error):
-                raise
+        except InputError as error:
             logger.warning("mesh of %s", link.name, exc_info=error)
-            remarks.append(f'link "{shown(link.name)}": mesh not read: {type(error).__name__}: {shown(str(error))}')
+            remarks.append(f'link "{shown(link.name)}": {error}')
             continue
         masses.append(_mass_of(link.name, trimesh.util.concatenate(parts), link.inertial))
     if missing:
@@ -83,7 +81,7 @@ def mesh_path(filename: str, urdf: Path) -> Path | None:
 
 
 def _loaded(mesh: MeshFile, urdf: Path) -> trimesh.Trimesh:
-    """The mesh in the axes of its link, m. Raises `ModuleNotFoundError` without trimesh, else what a reader raises."""
+    """The mesh in the axes of its link, m; raises as `loaded_skin` does."""
     place, path = mesh.origin.place, mesh_path(mesh.filename, urdf)
     assert path is not None
     return loaded_skin(path, mesh.scale, place.d, place.C)
@@ -96,7 +94,12 @@ def _mass_of(name: str, mesh: trimesh.Trimesh, inertial: Inertial) -> MeshMass:
     unit = mesh.moment_inertia / mesh.volume  # per unit of mass
     ratio = float(np.trace(unit) * inertial.mass / max(np.trace(inertial.inertia), np.finfo(float).tiny))
     distance = float(np.linalg.norm(mesh.center_mass - inertial.center))
-    return MeshMass(name, volume, inertial.mass / volume, ratio, distance, bool(mesh.is_watertight))
+    return MeshMass(name, volume, inertial.mass / volume, ratio, distance, _is_closed(mesh))
+
+
+def _is_closed(mesh: trimesh.Trimesh) -> bool:
+    """Whether the facets enclose a volume, all with the same side out: otherwise their integrals are wrong."""
+    return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
 SLENDER = 40.0  # bars: length of the longest by their radius
@@ -186,8 +189,10 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
             continue
         label = f'link "{shown(link.name)}": <{kind}>'
         parts = [_of_shape(shape, urdf, filling.density, label) for shape in shapes]
-        hulls = ", convex hulls of open meshes" if any(is_hull for _, is_hull in parts) else ""
-        return reduce(add, (part for part, _ in parts)), f"its <{kind}> filled {with_density}{hulls}"
+        what = f"its <{kind}> filled {with_density}"
+        if any(is_hull for _, is_hull in parts):
+            what += ", convex hulls of meshes that are open or have facets inside out"
+        return reduce(add, (part for part, _ in parts)), what
     beyond = max(robot.joints_of(link.name), key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
     if filling.radius is None or beyond is None or not any(beyond.origin.xyz):
         return None, ""
@@ -197,7 +202,7 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
 
 
 def _of_shape(shape: MeshFile | Primitive, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
-    """Of a filled shape in axes of the link, and whether it is the convex hull of an open mesh."""
+    """Of a filled shape in axes of the link, and whether it is a convex hull."""
     if isinstance(shape, Primitive):
         name, inertial, is_hull = f"a {shape.shape}", _of_primitive(shape, density), False
     else:
@@ -239,15 +244,15 @@ def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[I
         )
     try:
         mesh = _loaded(shape, urdf)
-        is_hull = not mesh.is_watertight
-        solid = mesh.convex_hull if is_hull else mesh
-        mass = density * float(solid.volume)
-        inertia = density * np.array(solid.moment_inertia)
     except ModuleNotFoundError:
         raise InputError(f"{label}: masses of meshes need trimesh: pip install trimesh pycollada") from None
-    except Exception as error:  # whatever a reader of damaged or unknown files raises
-        if is_own_fault(error):
-            raise
-        raise InputError(f"{label}: mesh not read: {type(error).__name__}: {shown(str(error))}") from error
+    except InputError as error:
+        raise InputError(f"{label}: {error}") from error.__cause__
+    is_closed = _is_closed(mesh)
+    try:
+        solid = mesh if is_closed else mesh.convex_hull
+    except (RuntimeError, ValueError):  # Qhull's, of points in one plane or without numbers
+        return Inertial(0.0, np.zeros(3), np.zeros((3, 3))), True
+    mass = density * float(solid.volume)
     sign = np.sign(mass)  # of a mesh whose faces look inward
-    return Inertial(sign * mass, np.array(solid.center_mass), sign * inertia), is_hull
+    return Inertial(sign * mass, np.array(solid.center_mass), sign * density * solid.moment_inertia), not is_closed
