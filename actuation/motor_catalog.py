@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,8 +13,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.keys import NotNegative, Positive
 from ..common.peaks import root_mean_square
-from ..common.tables import parse_csv
-from ..common.toml_files import load_toml, read_text
+from ..common.toml_files import load_toml, read_csv
 from ..common.validation import Record, validate
 
 
@@ -82,15 +80,12 @@ class MotorChoice(NamedTuple):
 def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
     """Read motors from a TOML file with [[motor]] tables, or a CSV file with their keys as columns.
 
-    Several gear ratios of a CSV line are separated by spaces; see `parse_csv`. Raises `InputError` for wrong keys or
+    Several gear ratios of a CSV line are separated by spaces; see `read_csv`. Raises `InputError` for wrong keys or
     numbers.
     """
     if path.suffix.lower() == ".toml":
         return validate(_Catalog, load_toml(path, "catalog of motors"), path).motor
-    try:
-        header, rows = parse_csv(read_text(path, "catalog of motors"))
-    except csv.Error as error:
-        raise InputError(f"{path}: cannot read the catalog of motors: {error}") from None
+    header, rows = read_csv(path, "catalog of motors")
     if not rows:
         raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below", "none")
     for number, row in rows:

@@ -1,7 +1,8 @@
-"""TOML files: whatever is wrong with one that is read comes as an `InputError` in its name; text for readers."""
+"""TOML and CSV files: whatever is wrong with one that is read comes as an `InputError` in its name."""
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import tomllib
@@ -11,7 +12,7 @@ from typing import Any
 
 from .errors import InputError
 from .outputs import check_regular
-from .tables import DEEPEST, beyond_limits
+from .tables import DEEPEST, CsvTable, beyond_limits, parse_csv
 
 # The key that makes a file one of its kind, and the command for it.
 _KINDS: Mapping[str, tuple[str, str]] = {
@@ -28,8 +29,18 @@ def read_text(path: Path, kind: str) -> str:
     try:
         text = read_bytes(path, kind).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: cannot read the {kind}: {error}") from None
+        line = error.object.count(b"\n", 0, error.start) + 1
+        found = f"the byte {error.object[error.start]:#x}: save the file as UTF-8"
+        raise InputError(f"{path}: line {line}: expected a {kind} in UTF-8", found) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_csv(path: Path, kind: str) -> CsvTable:
+    """The cells of the CSV file at `path`: see `parse_csv`; messages call it `kind`."""
+    try:
+        return parse_csv(read_text(path, kind))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot read the {kind}: {error}") from None
 
 
 def read_bytes(path: Path, kind: str) -> bytes:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 
 from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
-from ...common.tables import LARGEST, parse_csv, shown
-from ...common.toml_files import read_text
+from ...common.tables import LARGEST, shown
+from ...common.toml_files import read_csv
 from ...common.validation import InputFile, Record
 
 COLUMNS = ("mode", "family", "frequency", "damping_ratio", "uncertainty")
@@ -46,10 +45,7 @@ def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMo
 
     Raises `InputError` naming file and line.
     """
-    try:
-        header, table = parse_csv(read_text(path, "table of measured modes"))
-    except csv.Error as error:
-        raise InputError(f"{path}: cannot read the table of measured modes: {error}") from None
+    header, table = read_csv(path, "table of measured modes")
     _check_header(path, header)
     rows = [_row(path, line, header, row, families) for line, row in table]
     if not rows:

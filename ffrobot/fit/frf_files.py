@@ -1,6 +1,5 @@
 """Files of measured FRFs: universal files (dataset 58), CSV tables and .mat files."""
 
-import csv
 import io
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,8 +10,8 @@ import numpy as np
 from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError, check_known, quoted
 from ..common.libraries import extras, scipy
-from ..common.tables import parse_csv, shown
-from ..common.toml_files import read_bytes, read_text
+from ..common.tables import shown
+from ..common.toml_files import read_bytes, read_csv
 
 ENDS = ("force", "response")
 COLUMNS = ("frequency", "force", "response", "real", "imaginary", "coherence")
@@ -84,10 +83,7 @@ def _axis(path: Path, code: float) -> str:
 
 def _of_csv(path: Path) -> Iterator[Column]:
     """FRFs of a table with a line for each frequency of each function."""
-    try:
-        header, table = parse_csv(read_text(path, "table of FRFs"))
-    except csv.Error as error:
-        raise InputError(f"{path}: expected a table with the columns {quoted(COLUMNS)}, found: {error}") from None
+    header, table = read_csv(path, "table of FRFs")
     for name in header:
         check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
     if missing := [name for name in COLUMNS[:-1] if name not in header]:

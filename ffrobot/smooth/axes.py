@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from functools import partial, reduce
 from pathlib import Path
 
@@ -12,8 +11,7 @@ from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.structs import struct
-from ..common.tables import parse_csv
-from ..common.toml_files import read_text
+from ..common.toml_files import read_csv
 from ..mbs.fields.waypoints import numbers_of
 
 APART = 1e-4  # of a pole: nearer ones are moved so far apart, which changes G by 1e-8
@@ -90,10 +88,7 @@ def axis_of(servo: float | str, ratio: float) -> Axis:
 
 def _measured(path: Path) -> Axis:
     """Fitted to a CSV table. Raises `InputError` naming file and line."""
-    try:
-        header, rows = parse_csv(read_text(path, "table of a frequency response"))
-    except csv.Error as error:
-        raise InputError(f"{path}: cannot read the table of a frequency response: {error}") from None
+    header, rows = read_csv(path, "table of a frequency response")
     if header != COLUMNS or len(rows) < LEAST:
         expected = f"columns {','.join(COLUMNS)} and at least {LEAST} rows"
         raise InputError(f"{path}: expected {expected}", f"{','.join(header)!r} and {len(rows)}")

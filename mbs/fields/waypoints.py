@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -15,8 +14,8 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ...common.libraries import scipy
-from ...common.tables import LARGEST, parse_csv, shown
-from ...common.toml_files import read_text
+from ...common.tables import LARGEST, shown
+from ...common.toml_files import read_csv
 from .._core import TimeFunction
 from .paths import Piecewise
 
@@ -299,10 +298,7 @@ def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
 
 def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
     """Column names, numbers (rows, columns) and lines (rows,) of the CSV table at `path`."""
-    try:
-        header, rows = parse_csv(read_text(path, "waypoint table"))
-    except csv.Error as error:
-        raise InputError(f"{path}: cannot read the waypoint table: {error}") from None
+    header, rows = read_csv(path, "waypoint table")
     if len(header) > 2 and not header[0] and TIME.fullmatch(header[1]):  # row numbers, as pandas writes them
         header, rows = header[1:], [(line, row[1:]) for line, row in rows]
     if header and header[0].startswith(("{", "[")):
@@ -328,7 +324,8 @@ def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]
         numbers = []
     if len(numbers) != count or not all(abs(number) <= LARGEST for number in numbers):  # False of NaN
         text = shown(",".join(row))
-        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}", f"{text!r}")
+        hint = ": decimal commas need semicolons between columns" if text.count(",") == 2 * count - 1 else ""
+        raise InputError(f"{path}: line {line}: expected {count} numbers of at most {LARGEST:g}", f"{text!r}{hint}")
     return numbers
 
 

@@ -30,7 +30,7 @@ def test_mistake_in_a_link_of_its_own(two_link_copy, refused, link):
     [
         (("solve", "nowhere.toml"), "nowhere.toml: scene file not found"),
         (("solve", "folder"), "folder: cannot read the scene file: Is a directory"),
-        (("solve", "latin1.toml"), "latin1.toml: cannot read the scene file: 'utf-8' codec"),
+        (("solve", "latin1.toml"), "latin1.toml: line 1: expected a scene file in UTF-8, found the byte 0xfc"),
         (("link", "nowhere.toml"), "nowhere.toml: link file not found"),
         (("info", "nowhere.h5"), "nowhere.h5: expected a modal body file or a results file, found no such file"),
         (("info", "folder"), "folder: expected a modal body file or a results file, found a folder"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import re
 from pathlib import Path
@@ -14,8 +13,8 @@ from pydantic import Field, field_validator, model_validator
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ...common.keys import Positive
-from ...common.tables import parse_csv, shown
-from ...common.toml_files import load_toml, read_text
+from ...common.tables import shown
+from ...common.toml_files import load_toml, read_csv
 from ...common.validation import InputFile, Record, validate
 from ...mbs.joints.joint import MotorLimits
 from ...results.file import Results
@@ -187,10 +186,7 @@ def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, A
 
 def read_points(path: Path, column: str) -> tuple[Array, Array]:
     """Times and values of one column of a CSV file whose first column is the time; lines with # are comments."""
-    try:
-        header, rows = parse_csv(read_text(path, "table of points"))
-    except csv.Error as error:
-        raise InputError(f"{path}: cannot read the points: {error}") from None
+    header, rows = read_csv(path, "table of points")
     if column not in header:
         raise InputError(f'{path}: expected the column "{column}"', quoted(map(shown, header)))
     k = header.index(column)
