@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..common.errors import SolveError
 from ..present.logs import logging_options, python_option
 from .options import protect, runs_options, scene_argument
 
@@ -53,7 +54,7 @@ def sweep(
     --vary gravity.1=-9.81,0                                 an entry of a list by its number, from 0
 
     Entries of lists of tables are selected by name or body. The same command resumes a stopped sweep. -j runs in
-    parallel on one machine, mpirun and --scheduler on several.
+    parallel on one machine, mpirun and --scheduler on several. The exit code is 1 if no run completes.
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
@@ -74,3 +75,5 @@ def sweep(
     if not keep:
         drop_results(plan)
     print_table(plan.table, plan.keys, rows, plan.collected, summary_console())
+    if not any(row.status == "completed" for row in rows):
+        raise SolveError(f"{plan.table}: no run completed")

@@ -80,6 +80,9 @@ def test_failures_are_rows(ffrobot, short_scene):
     assert [row["status"] for row in rows] == ["failed", "completed", "wrong input", "wrong input"]
     assert "too many steps" in rows[0]["message"]
     assert "expected a number greater than 0, found -1" in rows[2]["message"]
+    ended = ffrobot("sweep", short_scene, "--vary", "analysis.inverse.max_steps=5", "-o", short_scene.with_name("none"))
+    assert ended.returncode == 1
+    assert "no run completed" in ended.stderr
 
 
 def test_taken_up_again(ffrobot, short_scene):
