@@ -32,12 +32,12 @@ for line in sys.stdin:
     seconds = time.process_time() - before
     print(json.dumps([seconds, statistics.evaluations, _core.build]), flush=True)
 """
-HELPERS = Path(__file__).parents[2] / "tests" / "mbs"
+TESTS = Path(__file__).parents[2] / "tests"
 
 
 def started(core, folder):
     """A process that makes runs with the core of that name, from a wheel unpacked in `folder` where one is given."""
-    paths = [str(HELPERS), *([folder] if folder else [])]
+    paths = [str(TESTS / "mbs"), str(TESTS / "checkpoints" / "spatial"), *([folder] if folder else [])]
     code = MEASURED
     if folder:  # an editable install would come first
         code = "import sys; sys.meta_path[:] = [f for f in sys.meta_path if 'ditable' not in repr(f)]\n" + code
