@@ -116,13 +116,12 @@ def test_limits_that_are_too_small(scene):
         (warning,) = [text for text in results.warnings["carried"] if "would do" in text]
         assert f"{about['least_voltage']:.3g} V instead of 100 V" in warning
     more = float(re.search(r"; (\S*) ms more", warning)[1]) / 1e3
-    longer = re.search(r"the same path in (\S*) s", warning)[1]
+    assert re.search(r"the same path in \S* s", warning)
     wider = float(re.search(r"; (\S*) mm of path_tolerance", warning)[1]) / 1e3
     keys = f"tolerance = 1e-4\npre_actuation = {more}\npost_actuation = {more}\noutput_step = 1e-4"
     for changes in (
         [("output_step = 0.002\ntolerance = 1e-4", keys)],
         [("tolerance = 1e-4", f"tolerance = 1e-4\npath_tolerance = {wider}")],
-        [("/0.6", f"/{longer}"), ("end = 0.6", f"end = {longer}"), ("output_step = 0.002", f"output_step = {longer}")],
     ):
         with ffrobot.solve(scene(("limit = 200.0", "limit = 100.0"), *changes, alone=True)) as results:
             about = results.attributes("carried/tracking")

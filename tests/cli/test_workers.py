@@ -74,13 +74,6 @@ def aborting(setup):
     os.abort()
 
 
-def worker_killed(setup):
-    note("kills")
-    os.kill(os.getppid(), signal.SIGKILL)
-    time.sleep(1.0)
-    note("lives on")
-
-
 def waiting(setup):
     def act(k, y):
         if k == 0:
