@@ -16,9 +16,10 @@ from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
 from ...mbs.model.body import Body
 from ...mbs.model.build import build_model
+from ...mbs.model.constraints import MET
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
 from ...mbs.model.kinematics import ZERO
-from ...mbs.model.model import MET, Model
+from ...mbs.model.model import Model
 from ...mbs.model.nodes import rows_of_joint
 from ...mbs.model.system import MultibodySystem
 from ...mbs.posture.posture import mobility
@@ -64,7 +65,6 @@ class RigidArm:
         ]
         self._model = replace(free, rows=(*free.rows, *motors))
         self._motors = np.arange(len(free.rows), len(free.rows) + len(motors))
-        self._search = self._model.posture_search
         self._system = MultibodySystem(self._model)
         self._q: Array = np.zeros(free.tree.n_q)
         for own, node in zip(free.tree.nodes, model.tree.nodes, strict=True):
@@ -72,7 +72,7 @@ class RigidArm:
 
     def angles(self) -> Array:
         """Return current motor coordinates (motors,), rad or m."""
-        return self._model.constraint_values(self._q[None], np.zeros(1))[0][0, self._motors]
+        return self._model.constraints.values(self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Coordinates q (n_q,) and C_v at motor angles gamma, from the last place.
@@ -81,7 +81,7 @@ class RigidArm:
         """
         beside, now = np.zeros((1, len(self._model.rows))), np.zeros(1)
         beside[0, self._motors] = gamma
-        q, left = self._model.constraints.postures(self._q[None], now, self._search, beside)
+        q, left = self._model.constraints.moved(self._q[None], now, beside)
         if not left[0] <= MET:
             raise SolveError(
                 f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have",
@@ -89,7 +89,7 @@ class RigidArm:
                 " or a loop that stays nearer to it",
             )
         self._q = q[0]
-        return self._q, self._model.constraint_values(q, now)[1][0]
+        return self._q, self._model.constraints.values(q, now)[1][0]
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
         """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""

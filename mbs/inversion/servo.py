@@ -202,7 +202,7 @@ def make_servo(
     rest = np.zeros_like(modes)
     near: Array = replace(servo, factor=1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q
     for k in np.flatnonzero(~np.isfinite(near).all(axis=1)):  # where rates have no limits, as in singular postures
-        q = held.posture(float(times[k]), near[k - 1] if k else start)
+        q = held.constraints.posture(near[k - 1] if k else start, float(times[k]))
         if q is None:
             far = out_of_reach(held, times)
             raise InputError(

@@ -141,7 +141,7 @@ class LinearEquations:
         H[s, np.arange(len(s))] = 1.0
         others = np.setdiff1d(np.arange(n_v), s)
         rows, sizes = self.model.row_sizes, self.model.natural_sizes
-        (C_v,) = self.model.natural_gradients(state.q, np.array([t]), sizes)
+        (C_v,) = self.model.constraints.natural_gradients(state.q, np.array([t]), sizes)
         if not len(others):
             return H, np.zeros((0, len(C_v)))
         values = np.linalg.svd(C_v[:, others], compute_uv=False)
@@ -247,7 +247,7 @@ def _independent(model: Model, q: Array) -> Indices:
     modes = np.flatnonzero(~model.tree.joint_columns)
     motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
-    (left,) = model.natural_gradients(q[None], np.zeros(1), model.natural_sizes)
+    (left,) = model.constraints.natural_gradients(q[None], np.zeros(1), model.natural_sizes)
     size, free = np.abs(left).max(initial=0.0), []
     for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
         rank, order = 0, np.arange(len(group))

@@ -24,7 +24,6 @@ from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.posture import with_rates
 from ..posture.start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
@@ -303,7 +302,8 @@ def _step(at: Balance, K: Array, free: Indices) -> Array:
 
 def static_equilibrium(model: Model, start: State) -> State:
     """The equilibrium at t = 0 near `start`; v is kept on Ċ = 0. Raises `SolveError` where there is none near it."""
-    return with_rates(model, Statics(model, 0.0).equilibrium(start.q), start.v, 0.0)
+    q = Statics(model).equilibrium(start.q)
+    return State(q, model.constraints.velocities(q, start.v))
 
 
 def static_shapes(

@@ -51,7 +51,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     still, sizes = np.zeros(model.tree.n_v), model.natural_sizes
     both = np.outer(sizes, sizes)
     M = np.linalg.inv(unconstrained.derivatives(t, q, still, still).a_f / both)
-    (C_v,), (K, D) = model.natural_gradients(q[None], np.array([t]), sizes), _springs(model, q)
+    (C_v,), (K, D) = model.constraints.natural_gradients(q[None], np.array([t]), sizes), _springs(model, q)
     squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
     omega, shape = np.sqrt(squares), sizes[:, None] * shape
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
@@ -111,7 +111,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     unconstrained = without_rows(model)
     state, spectra = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
-        q = model.posture(float(t), state.q)
+        q = model.constraints.posture(state.q, float(t))
         if q is None:
             raise InputError(
                 f"{model.scene.path}: trajectory: expected paths within reach",

@@ -203,14 +203,6 @@ class Motion(NamedTuple):
     omega: Array
 
 
-class PostureSearch(NamedTuple):
-    """Settings of the posture search."""
-
-    scales: Array  # (n_v,) natural sizes of coordinates; those of size 0 stay
-    sizes: Array  # (rows,) natural sizes of C
-    largest_step: float  # of any coordinate in one iteration, in natural sizes: keeps to the branch of the guess
-
-
 class Kinematics:
     """Kinematic model of a tree in the core, without loads, for given sections and constraint rows."""
 
@@ -223,7 +215,7 @@ class Kinematics:
         places = [_core.MarkerAt(*markers.place(section)) for section in sections]
         self.nodes, self._numbers = nodes, {_key(section): len(nodes) + k for k, section in enumerate(sections)}
         self.core = _core.SpatialModel(markers.bodies(), markers.standing(), measures, places, np.zeros(3))
-        self._signs, self._scene = np.array([row.sign for row in rows]), markers.followed(rows)
+        self.signs, self.scene = np.array([row.sign for row in rows]), markers.followed(rows)
 
     @classmethod
     def of_points(cls, nodes: Sequence[Node]) -> Kinematics:
@@ -246,33 +238,14 @@ class Kinematics:
             self._numbers, self.core.motions(q, rates).reshape(len(q), len(self.nodes) + len(self._numbers), MOTION)
         )
 
-    def constraints(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and C_v (T, rows, n_v)."""
-        values, gradients = self.core.constraints(self._scene, as_list(times), q)
-        return self._signs * values, self._signs[:, None] * gradients.reshape(len(q), len(self._signs), self.core.n_v)
+    def values(self, q: Array, times: Array) -> tuple[Array, Array]:
+        """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
+        values, gradients = self.core.constraints(self.scene, as_list(times), q)
+        return self.signs * values, self.signs[:, None] * gradients.reshape(len(q), len(self.signs), self.core.n_v)
 
-    def constraint_rates(self, q: Array, v: Array, times: Array) -> Array:
+    def rates(self, q: Array, v: Array, times: Array) -> Array:
         """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
-        return self._signs * self.core.constraint_rates(self._scene, as_list(times), q, v)
-
-    def postures(
-        self, q: Array, times: Array, search: PostureSearch, beside: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Project q (T, n_q) onto C = `beside` (T, rows), default 0, at `times` (T,); returned with residuals (T,).
-
-        By Newton's method with the least steps; what is left is in terms of the sizes, NaN where it is not finite.
-        """
-        more = np.zeros((0, 0)) if beside is None else self._signs * beside
-        return self.core.postures(self._scene, as_list(times), q, more, **search._asdict())
-
-    def mobilities(
-        self, q: Array, times: Array, is_path: Sequence[bool], length: float, loop_rank: int = -1
-    ) -> list[_core.Mobility]:
-        """Return the mobility with rigid links at q (T, n_q) and `times` (T,); `length` (m) scales displacements.
-
-        Rows that are of no path close loops, of `loop_rank`; by default of the rank that they have there.
-        """
-        return self.core.mobilities(self._scene, as_list(times), q, is_path, length, loop_rank)
+        return self.signs * self.core.constraint_rates(self.scene, as_list(times), q, v)
 
 
 class Places:

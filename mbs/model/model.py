@@ -1,4 +1,4 @@
-"""A robot as analyses share it: tree and constraint rows, their values and natural sizes, postures that meet them."""
+"""A robot as analyses share it: tree and constraint rows, with their natural sizes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,11 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans
 from ...common.structs import struct
-from .. import _core
 from ..scene.mechanism import MechanismScene
+from .constraints import Constraints
 from .drives import Drive
-from .kinematics import Kinematics, PostureSearch
 from .nodes import ConstraintRow, Node
 from .tree import AlongCut, CutCoordinate, KinematicTree
-
-TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
-MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
-LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
 
 
 @struct
@@ -41,24 +36,9 @@ class Model:
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 
     @cached_property
-    def constraints(self) -> Kinematics:
-        """The tree with the rows, in the core."""
-        return Kinematics(self.tree.nodes, rows=self.rows)
-
-    @cached_property
-    def senses(self) -> tuple[list[str], Kinematics]:
-        """Cosines that distinguish parallel from opposite axes of "dot" rows, positive if parallel, with row owners.
-
-        Of z of b against z of a and, of joints that do not turn, x against x. An owner's rows are of x and y of a with
-        z of b and, of such joints, of x of a with y of b.
-        """
-        aligned, turning = dict[str, list[ConstraintRow]](), list[ConstraintRow]()
-        for row in (row for row in self.rows if row.kind == "dot"):
-            aligned.setdefault(row.owner, []).append(row)
-        for first, second, *still in (rows for rows in aligned.values() if len(rows) > 1):
-            turning.append(replace(first, f=np.cross(first.f, second.f)))
-            turning += [replace(row, g=np.cross(row.g, first.g)) for row in still]
-        return [row.owner for row in turning], Kinematics(self.tree.nodes, rows=turning)
+    def constraints(self) -> Constraints:
+        """The constraint rows in the core."""
+        return Constraints(self.tree, self.rows, self.size, self.row_sizes, self.joint_sizes)
 
     @cached_property
     def along_cut(self) -> AlongCut:
@@ -154,80 +134,10 @@ class Model:
             sizes[node.p_v] = np.sqrt(node.body.largest_moment)
         return sizes
 
-    def constraint_values(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
-        if not self.rows:
-            return np.zeros((len(q), 0)), np.zeros((len(q), 0, self.tree.n_v))
-        return self.constraints.constraints(q, times)
-
-    def constraint_rates(self, q: Array, v: Array, times: Array) -> Array:
-        """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
-        return self.constraints.constraint_rates(q, v, times) if self.rows else np.zeros((len(q), 0))
-
-    def natural_gradients(self, q: Array, times: Array, sizes: Array) -> Array:
-        """Return C_v (T, rows, n_v) at q (T, n_q) and `times` (T,), rows in natural sizes and coordinates in `sizes`.
-
-        Its rank does not depend on units.
-        """
-        return self.constraint_values(q, times)[1] * sizes / self.row_sizes[:, None]
-
-    def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
-        """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
-
-        Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
-        """
-        owners, senses = self.senses
-        if not owners:
-            return {}
-        against = senses.constraints(q, times)[0] < 0.0
-        return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
-
     def path_errors(self, times: Array, q: Array) -> dict[str, Array]:
         """Return path errors (T, m), m or rad, by trajectory, at `times` (T,), s, and q (T, n_q)."""
-        C, owners = self.constraint_values(q, times)[0], [row.owner if row.is_trajectory else "" for row in self.rows]
+        C, owners = self.constraints.values(q, times)[0], [row.owner if row.is_trajectory else "" for row in self.rows]
         return {path.name: C[:, [owner == path.name for owner in owners]] for path in self.scene.trajectory}
-
-    @property
-    def posture_search(self) -> PostureSearch:
-        """A search by joint coordinates; modal coordinates stay constant."""
-        # Coordinates by themselves have no branches
-        farthest = np.inf if all(row.kind == "coordinate" for row in self.rows) else LARGEST_TURN
-        return PostureSearch(self.joint_sizes, self.row_sizes, farthest)
-
-    def posture(self, t: float, q: Array, locked: Booleans | None = None) -> Array | None:
-        """Move q (n_q,) onto C(q, t) = 0 by least steps of joints not `locked` (n_v,); None without convergence."""
-        solved, is_met = self.postures(np.array([t]), q[None], locked)
-        return solved[0] if is_met[0] else None
-
-    def postures(self, times: Array, q: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
-        """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s, as `posture`; with flags (T,) of convergence.
-
-        A solution with a joint or tool axis turned by π does not count as converged.
-        """
-        if not self.rows:
-            return np.array(q), np.ones(len(q), dtype=bool)
-        search = self.posture_search
-        if locked is not None:
-            search = search._replace(scales=np.where(locked, 0.0, search.scales))
-        moved, left = self.constraints.postures(q, times, search)
-        is_met = left <= MET
-        for is_turned_over in self.turned_over(moved, times).values():
-            is_met &= ~is_turned_over
-        return moved, is_met
-
-    def mobilities(self, times: Array, q: Array, loop_rank: int = -1) -> list[_core.Mobility]:
-        """Return the mobility with rigid links and gears at `times` (T,), s, and q (T, n_q).
-
-        Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
-        `loop_rank` is their rank with straight ones.
-        """
-        is_path = [row.is_trajectory for row in self.rows]
-        return self.constraints.mobilities(q, times, is_path, self.size, loop_rank)
-
-    def row_ratios(self, times: Array, q: Array, rank: int) -> Array:
-        """Return smallest over largest nonzero singular value (T,) of all rows, by their `rank`, as in `mobilities`."""
-        motions = self.constraints.mobilities(q, times, [False] * len(self.rows), self.size, rank)
-        return np.array([at.loop_ratio for at in motions])
 
 
 def _in_order(node: Node) -> Array:

@@ -246,7 +246,7 @@ class AlongCut:
         """γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v)."""
         if self._kinematics is None:
             return np.zeros((len(q), 0)), np.zeros((len(q), 0, self._n_v))
-        return self._kinematics.constraints(q, np.zeros(len(q)))
+        return self._kinematics.values(q, np.zeros(len(q)))
 
     def resistance(self, q: Array, v: Array) -> Array:
         """Generalized forces (T, n_v) by which friction resists at q (T, n_q) and v (T, n_v)."""
@@ -272,7 +272,7 @@ class AlongCut:
         motions = list[CutMotion]()
         if self._kinematics is None:
             return motions
-        values, rates = self.measured(q)[0], self._kinematics.constraint_rates(q, v, np.zeros(len(q)))
+        values, rates = self.measured(q)[0], self._kinematics.rates(q, v, np.zeros(len(q)))
         for one, value, rate in zip(self._all, values.T, rates.T, strict=True):
             turns = one.row.kind == "turn"
             coordinate, is_counted = _unwound(value, rate, times, one.guess) if turns else (value, True)

@@ -12,7 +12,6 @@ from ...common.arrays import Array, Booleans, as_floats
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from .._core import TimeFunction
-from ..model.known_motion import State
 from ..model.model import Model
 
 SINGULAR = 4e-6  # ratio of singular values below which a posture counts as singular: round-off leaves 1e-5 of forces
@@ -21,18 +20,6 @@ BRANCHING = 0.05  # ratio below which bent links may take redundant loops from o
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
 BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where equations of loops are distinguished
-
-
-def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, locked: Booleans | None = None) -> State:
-    """The state at q, rates of joints not `locked` (n_v,) moved onto Ċ = 0 at time t by the least change, ṗ kept."""
-    if not model.rows:
-        return State(q, v)
-    scales, now = model.joint_sizes, np.array([t])
-    if locked is not None:
-        scales = np.where(locked, 0.0, scales)
-    (C_v,) = model.natural_gradients(q[None], now, scales)
-    left = -model.constraint_rates(q[None], v[None], now)[0] / model.row_sizes
-    return State(q, v + scales * np.linalg.lstsq(C_v, left, rcond=1e-10)[0])
 
 
 @struct
@@ -49,7 +36,7 @@ class Mobility:
 
 def mobility(model: Model, q: Array) -> Mobility:
     """Return the mobility with rigid links and gears at q (n_q,)."""
-    at = model.mobilities(np.zeros(1), q[None])[0]
+    at = model.constraints.mobilities(q[None], np.zeros(1))[0]
     freedom, left = at.free.shape[1] - len(model.tree.gears), _joints(model, _largest(at.left) > MOVES)
     return Mobility(freedom, at.followed, at.ratio, left, at.loop_rank)
 
@@ -73,8 +60,8 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
     is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
         return 0, ()
-    (C_v,) = model.natural_gradients(q[None], now, model.joint_sizes)
-    moving = _largest(model.mobilities(now, q[None])[0].free) > MOVES
+    (C_v,) = model.constraints.natural_gradients(q[None], now)
+    moving = _largest(model.constraints.mobilities(q[None], now)[0].free) > MOVES
     rows = C_v[~is_loop][:, model.tree.joint_columns]
     is_locked = (_largest(rows[:, moving]) <= MOVES) & (_largest(rows) > MOVES)
     return int(np.count_nonzero(is_locked)), _joints(model, ~moving)
@@ -82,7 +69,7 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
 
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
     """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and its time; `loop_rank` as in `mobilities`."""
-    ratios = [at.ratio for at in model.mobilities(times, q, loop_rank)]
+    ratios = [at.ratio for at in model.constraints.mobilities(q, times, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
 
 
@@ -93,7 +80,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
-    least = np.abs(model.mobilities(np.array([t]), q[None], loop_rank)[0].hardest)
+    least = np.abs(model.constraints.mobilities(q[None], np.array([t]), loop_rank)[0].hardest)
     moving = quoted(_joints(model, least > MOVING * least.max()))
     how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
@@ -104,7 +91,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
     `loop_rank` as in `mobilities`.
     """
-    ratios = np.array([at.loop_ratio for at in model.mobilities(times, q, loop_rank)])
+    ratios = np.array([at.loop_ratio for at in model.constraints.mobilities(q, times, loop_rank)])
     worst = int(ratios.argmin())
     if not ratios[worst] < BRANCHING or worst in (0, len(times) - 1):
         return ""
@@ -121,11 +108,11 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
     "" where they do, or did not before.
     """
     loops = model.without_paths()
-    before = loops.posture(0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
+    before = loops.constraints.posture(model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v), 0.0)
     if not loops.rows or before is None:
         return ""
     freedom = mobility(model, before)
-    ratio = loops.row_ratios(np.array([t]), q[None], freedom.loop_rank)[0]
+    ratio = loops.constraints.ratios(q[None], np.array([t]), freedom.loop_rank)[0]
     if ratio < NEARLY_SINGULAR:
         return (
             f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
@@ -133,7 +120,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
             " and coupler in a line. No finite force determines the further motion. Avoid this posture or drive a joint"
             " instead"
         )
-    ratio = model.row_ratios(np.array([t]), q[None], freedom.loop_rank + freedom.followed)[0]
+    ratio = model.constraints.ratios(q[None], np.array([t]), freedom.loop_rank + freedom.followed)[0]
     if ratio < NEARLY_SINGULAR:
         paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
         return (

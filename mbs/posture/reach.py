@@ -125,7 +125,7 @@ def _angles(node: Node) -> list[int]:
 
 def regular_postures(model: Model, q: Array) -> Array:
     """Return postures (…, n_q) near q (T, n_q) that satisfy all rows at t = 0 and are regular."""
-    postures, is_met = model.postures(np.zeros(len(q)), q)
+    postures, is_met = model.constraints.postures(q, np.zeros(len(q)))
     postures = postures[is_met]
     return postures[are_regular(model, postures, np.zeros(len(postures)))]
 
@@ -133,7 +133,7 @@ def regular_postures(model: Model, q: Array) -> Array:
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
     """Return (T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q)."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
-    return np.asarray(model.row_ratios(times, q, rank) > REGULAR)
+    return np.asarray(model.constraints.ratios(q, times, rank) > REGULAR)
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -120,8 +120,8 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
 
     def rates(t: float, way: Array) -> Array:
         at, now, q_dot = (q + way)[None], np.array([t]), np.zeros_like(q)
-        C_v = model.natural_gradients(at, now, scales)[0][:, model.tree.joint_columns]
-        left = model.constraint_rates(at, rest, now)[0] / model.row_sizes
+        C_v = model.constraints.natural_gradients(at, now)[0][:, model.tree.joint_columns]
+        left = model.constraints.rates(at, rest, now)[0] / model.row_sizes
         least = -np.linalg.pinv(C_v, rcond=RANK) @ left
         if np.abs(C_v @ least + left).max() > RANK * np.abs(left).max():
             raise ends_at(t)
@@ -166,7 +166,7 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float, bo
     places, scales, seen = joint_places(model), model.joint_sizes, slice(None, None, STRIDE)
     weights = np.sqrt(scipy.integrate.simpson(np.eye(len(times[seen])), x=times[seen]))[:, None] * scales
     still = np.zeros((3, len(weights), int(np.count_nonzero(~of_joints))))
-    free = [null_space(C_v[:, of_joints], RANK) for C_v in model.natural_gradients(q, times, scales)]
+    free = [null_space(C_v[:, of_joints], RANK) for C_v in model.constraints.natural_gradients(q, times)]
     for k in range(1, len(free)):  # the least turned from one time to the next
         U, _, V = np.linalg.svd(free[k].T @ free[k - 1])
         free[k] = free[k] @ U @ V
@@ -175,7 +175,7 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float, bo
     def moved(shares: Array, at: slice) -> tuple[Array, Booleans]:
         best = q[at].copy()
         best[:, places] += np.einsum("tjk,tk->tj", ways[at], basis[at] @ shares.reshape(count, -1))
-        return model.postures(times[at], best)
+        return model.constraints.postures(best, times[at])
 
     def moments(c: Array) -> Array:
         best, is_met = moved(c - 1.0, seen)
@@ -202,7 +202,7 @@ def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[
     """
     scales = model.joint_sizes
     joints = np.eye(len(scales))[:, scales > 0]
-    free = [joints @ null_space(C_v @ joints, RANK) for C_v in model.natural_gradients(q, times, scales)]
+    free = [joints @ null_space(C_v @ joints, RANK) for C_v in model.constraints.natural_gradients(q, times)]
     single = [node for node in model.tree.nodes if len(node.joint.units) == 1]
     best: tuple[float, tuple[Node, ...]] = (0.0, ())
     for nodes in combinations(single, count):

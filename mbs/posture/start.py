@@ -10,10 +10,11 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
+from ..model.constraints import MET
 from ..model.known_motion import State, mass_matrices
-from ..model.model import MET, Model
+from ..model.model import Model
 from ..scene.bodies import ROUND_OFF, tensor
-from .posture import mobility, paths_by_bending, with_rates
+from .posture import mobility, paths_by_bending
 from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
 
 LEAST = 1e-13  # of inertia, relative
@@ -32,14 +33,14 @@ def undeformed_posture(model: Model) -> State:
     named, behind = _named(model, "joints"), _behind_known_motors(model)
     if behind.any():
         guess = _with_gears_as_asked(model, State(guess, np.zeros(tree.n_v))).q
-    q = model.posture(0.0, guess, named | behind) if (named | behind).any() else None
-    q = model.posture(0.0, guess) if q is None else q
+    q = model.constraints.posture(guess, 0.0, named | behind) if (named | behind).any() else None
+    q = model.constraints.posture(guess, 0.0) if q is None else q
     if q is None:
         check_reach(model, 0.0)
         works, scene = working_start(model, guess), model.scene
         follows = any(path.point is not None for path in scene.trajectory)  # a note then says from where
         if works is not None and follows and not scene.initial.named("joints"):
-            q = model.posture(0.0, works)
+            q = model.constraints.posture(works, 0.0)
     if q is None:
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), list(turned_guesses(model.scene))
         advice += _turned_over(model, guess)
@@ -51,19 +52,19 @@ def undeformed_posture(model: Model) -> State:
             f"none by Newton's method ({'; '.join(advice) or 'out of reach, or on another branch?'})",
         )
     v, named = _guessed_rates(model), _named(model, "joint_rates") | behind
-    start = with_rates(model, q, v)
+    start = State(q, model.constraints.velocities(q, v))
     if named.any():
         v = _with_gears_as_asked(model, State(q, v)).v if behind.any() else v
-        kept = with_rates(model, q, with_rates(model, q, v, locked=named).v)
-        start = kept if np.allclose(kept.v[named], v[named], atol=SAME * np.abs(v[named]).max()) else start
+        kept = model.constraints.velocities(q, model.constraints.velocities(q, v, locked=named))
+        start = State(q, kept) if np.allclose(kept[named], v[named], atol=SAME * np.abs(v[named]).max()) else start
     return _twisted_gears(model, start, relaxed_gears(model, start))
 
 
 def _with_gears_as_asked(model: Model, guess: State) -> State:
     """The guess with motors on their paths, and joints behind them as [initial] has them, else without a twist."""
     alone = replace(model, rows=tuple(row for row in model.rows if row.is_trajectory))
-    q = alone.posture(0.0, guess.q)
-    at = guess if q is None else with_rates(alone, q, guess.v)
+    q = alone.constraints.posture(guess.q, 0.0)
+    at = guess if q is None else State(q, alone.constraints.velocities(q, guess.v))
     return _twisted_gears(model, guess, relaxed_gears(model, at))
 
 
@@ -118,9 +119,9 @@ def check_turning(model: Model) -> None:
 def _turned_over(model: Model, guess: Array) -> Iterator[str]:
     """What is turned by π in the posture next to the guess that would meet all rows but for that."""
     times = np.zeros(1)
-    q = model.postures(times, guess[None])[0]
-    if np.abs(model.constraint_values(q, times)[0] / model.row_sizes).max() <= MET:
-        for owner, is_so in model.turned_over(q, times).items():
+    q = model.constraints.postures(guess[None], times)[0]
+    if np.abs(model.constraints.values(q, times)[0] / model.row_sizes).max() <= MET:
+        for owner, is_so in model.constraints.turned_over(q, times).items():
             if is_so[0]:
                 yield f'next to it "{owner}" is turned over: axes that it aligns point against each other'
 
@@ -189,7 +190,7 @@ def _with_slides(model: Model, q: Array) -> Array:
     slides = [node for node in model.tree.nodes if node.joint.type == "prismatic" and node.joint.name not in guesses]
     if not (slides and model.scene.is_planar and is_loop.any()):
         return q
-    values, gradients = model.constraint_values(q[None], np.zeros(1))
+    values, gradients = model.constraints.values(q[None], np.zeros(1))
     dv, along = np.zeros(model.tree.n_v), [node.v.start for node in slides]
     dv[along] = np.linalg.lstsq(gradients[0, is_loop][:, along], -values[0, is_loop], rcond=1e-10)[0]
     return model.tree.integrate(q, dv)

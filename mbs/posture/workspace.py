@@ -68,7 +68,7 @@ def grid_postures(
     measured = np.zeros(len(axes))
     is_row = np.array([axis.name != TURN for axis in axes])
     along = replace(model, rows=tuple(rows))
-    measured[is_row] = along.constraint_values(start[None], np.zeros(1))[0][0] + values[0, is_row]
+    measured[is_row] = along.constraints.values(start[None], np.zeros(1))[0][0] + values[0, is_row]
     if turned_about is not None:
         kept = set("xyz") - {axis.name for axis in axes}
         place = model.tree.places(start[None]).at(model.tree.section(point)).r[0]
@@ -142,7 +142,7 @@ def _elsewhere(
 
 def _solved(model: Model, numbers: Indices, guess: Array) -> tuple[Array, Booleans]:
     parts = [slice(k, k + TOGETHER) for k in range(0, len(numbers), TOGETHER)]
-    solved = [model.postures(numbers[part].astype(float), guess[part]) for part in parts]
+    solved = [model.constraints.postures(guess[part], numbers[part].astype(float)) for part in parts]
     return np.concatenate([q for q, _ in solved]), np.concatenate([met for _, met in solved])
 
 

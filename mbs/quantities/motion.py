@@ -45,7 +45,7 @@ def acting_forces(run: Run) -> MotionForces:
 @kept
 def constraint_rows(run: Run) -> tuple[Array, Array]:
     """C (T, rows) and C_v (T, rows, n_v)."""
-    return run.model.constraint_values(run.q, run.time)
+    return run.model.constraints.values(run.q, run.time)
 
 
 @kept
@@ -59,7 +59,7 @@ def constraint_violation(run: Run) -> Array:
     """Return (T, 3) of C, Ċ, C̈: largest row over 1 + that of q, v, a; of an equilibrium, C alone."""
     levels = [(constraint_rows(run)[0], run.q)]
     if not run.is_at_rest:
-        C_dot = run.model.constraint_rates(run.q, run.v, run.time)
+        C_dot = run.model.constraints.rates(run.q, run.v, run.time)
         levels += [(C_dot, run.v), (row_accelerations(system_of(run), run, run.time), run.a)]
     off = np.zeros((len(run.time), 3))
     for k, (values, size) in enumerate(levels):

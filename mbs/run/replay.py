@@ -183,7 +183,7 @@ def left_paths(source: Run, run: Run) -> Iterator[str]:
     model, times, q = source.model, run.time[now], run.q[now]
     if not len(times):
         return
-    share = np.abs(model.constraint_values(q, times)[0]) / model.row_sizes
+    share = np.abs(model.constraints.values(q, times)[0]) / model.row_sizes
     for path in dict.fromkeys(row.owner for row in model.rows if row.is_trajectory):
         off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
         if off.max() > OFF_PATH:

@@ -25,7 +25,7 @@ def model_of(name):
 def test_rates_of_rows_are_those_of_their_values(name):
     """What C_v v has to be, against differences of C in time at the posture of t = 0.01 s."""
     model, h, t = model_of(name), 1e-6, 0.01
-    q = model.posture(t, undeformed_posture(model).q)
+    q = model.constraints.posture(undeformed_posture(model).q, t)
     values = row_values(model, np.array([q, q]), np.array([t - h, t + h]))[0]
     rates = target_rates(model, q[None], np.array([t]))[0]
     assert np.abs(row_values(model, q[None], np.array([t]))[0]).max() < 1e-12
@@ -78,4 +78,4 @@ def test_a_search_that_leaves_all_bounds_ends_in_silence():
     q[model.tree.nodes[model.tree.carried["q2"]].q] = 3e10
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert model.posture(0.0, q) is None
+        assert model.constraints.posture(q, 0.0) is None

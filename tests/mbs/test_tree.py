@@ -146,11 +146,11 @@ def assert_core_is_the_oracle(rng, model):
     moved = tree_oracle.integrate(tree, q, 0.3 * v)
     np.testing.assert_allclose(tree.integrate(q, 0.3 * v), moved, rtol=0, atol=CLOSE * np.abs(moved).max())
     model, times = replace(model, rows=(*model.rows, *every_row(rng, model))), np.array([0.0, 0.2, 0.5])
-    C, C_v = model.constraint_values(q, times)
+    C, C_v = model.constraints.values(q, times)
     for ours, numpys in zip((C, C_v), row_values(model, q, times), strict=True):
         np.testing.assert_allclose(ours, numpys, rtol=0, atol=CLOSE * np.abs(numpys).max())
     rates = np.einsum("tij,tj->ti", C_v, v) - target_rates(model, q, times)
-    np.testing.assert_allclose(model.constraint_rates(q, v, times), rates, rtol=0, atol=CLOSE * np.abs(rates).max())
+    np.testing.assert_allclose(model.constraints.rates(q, v, times), rates, rtol=0, atol=CLOSE * np.abs(rates).max())
     assert_joints_carry_what_does_no_work(rng, model, q, frames)
 
 
@@ -175,7 +175,7 @@ def test_postures_keep_to_loops(types):
     model = tree_model(plain, tables)
     q = np.tile(model.tree.at_rest(coordinates(model, plain, turned=False)), (5, 1))
     q = tree_oracle.integrate(model.tree, q, 0.1 * rng.standard_normal((5, model.tree.n_v)))
-    found, is_met = model.postures(np.zeros(5), q)
+    found, is_met = model.constraints.postures(q, np.zeros(5))
     assert is_met.any()
     np.testing.assert_allclose(row_values(model, found[is_met], np.zeros(5)[is_met])[0], 0.0, atol=1e-11)
     for node in model.tree.nodes:
@@ -196,7 +196,7 @@ def test_mobility_is_that_of_numpys_gradients(seed):
             for e in np.eye(3)[:2]]  # fmt: skip
     model, (q, _), times = replace(model, rows=(*model.rows, *path)), states_of(rng, model), np.array([0.0, 0.2, 0.5])
     scaled = row_values(model, q, times)[1] * model.joint_sizes / model.row_sizes[:, None]
-    for J, at in zip(scaled[:, :, model.tree.joint_columns], model.mobilities(times, q), strict=True):
+    for J, at in zip(scaled[:, :, model.tree.joint_columns], model.constraints.mobilities(q, times), strict=True):
         _, of_loops, V = np.linalg.svd(J[model.loop_rows])
         rank = np.count_nonzero(of_loops > 1e-6 * max(of_loops[0], 1.0))
         free, followed = V[rank:].T, J[~model.loop_rows]

@@ -15,7 +15,6 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.model.body import Body
 from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.posture.posture import with_rates
 from ffrobot.mbs.posture.start import undeformed_posture
 
 State = tuple[MultibodySystem, Array, Array]
@@ -106,7 +105,6 @@ def general_state(model: Model) -> State:
     bend = iter(1e-4 / (1 + np.arange(model.tree.n_v)))
     for node in model.tree.nodes:
         q[node.p_q] = [next(bend) for _ in range(node.body.n_modes)]
-    found = model.posture(TIME, q)
+    found = model.constraints.posture(q, TIME)
     assert found is not None
-    start = with_rates(model, found, v, TIME)
-    return MultibodySystem(model), start.q, start.v
+    return MultibodySystem(model), found, model.constraints.velocities(found, v, TIME)
