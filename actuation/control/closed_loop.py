@@ -21,6 +21,7 @@ from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model
+from ...mbs.posture.start import undeformed_posture
 from ...mbs.quantities.settling import commanded_rest
 from ...mbs.run.context import place_of
 from ...mbs.run.drive import Control, drive_robot
@@ -306,7 +307,7 @@ def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: 
     q, v = moved.q[0].copy(), moved.v[0].copy()
     if analysis.start == "actuation":
         return State(q, v)
-    first = initial_state(context.model)
+    first = initial_state(context.model, undeformed_posture(context.model))
     twists = [[part[0] for part in gear.twist(q[None], v[None])] for gear in plant.tree.gears]
     q[: len(first.q)], v[: len(first.v)] = first.q, first.v
     for gear, (way, rate) in zip(plant.tree.gears, twists, strict=True):

@@ -15,6 +15,7 @@ import numpy as np
 from ..actuation.context import ActuatedContext
 from ..actuation.points import forces_at_points
 from ..common.errors import FfrobotError, SolveError, of_file
+from ..mbs.posture.path_start import path_start
 from ..mbs.posture.reach import turned_guesses
 from ..mbs.posture.start import check_turning
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
@@ -240,6 +241,7 @@ def _context(
     return ActuatedContext(
         model=solution.model,
         outcomes={name: result.run for name, result in results.items()},
+        path=path_start(solution.model, analysis.last_time) if analysis.starts_on_path else None,
         progress=lambda t: interruption.advance(t, analysis.last_time),
         is_replayed=analysis.is_checked or any(other.source == analysis.name for other in others),
         earlier=solution.earlier.get(analysis.name),

@@ -24,11 +24,8 @@ from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.system import MultibodySystem
-from ..posture.posture import check_path, mobility
 from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_by, prescribed_motion
-from ..posture.reach import check_reach
-from ..posture.redundancy import resolved
-from ..posture.start import shape_in_redundant_loops, undeformed_posture
+from ..posture.start import shape_in_redundant_loops
 from ..run.context import Context
 from ..run.record import Prescription, Run, Statistics
 from ..scene.analysis import Check, TimedAnalysis
@@ -53,6 +50,7 @@ class Fcid(TimedAnalysis):
     check: Check = None
     """Forward simulation under the result with twice the modes ("finer")."""
 
+    starts_on_path = True
     is_algebraic = True
     allocates_patches = True
     applicable = ("joints", "joints+pzt", "points")
@@ -75,15 +73,14 @@ class Fcid(TimedAnalysis):
     def run(self, context: Context) -> Run:
         """Motion and forces for the trajectories and the prescribed shape.
 
-        Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
-        `SolveError` where no posture, or no static shape, is found.
+        Raises `InputError` where the trajectories do not fix the motion of the mechanism, `SolveError` where no
+        posture, or no static shape, is found.
         """
         refuse_prescribed_motors(context.model, self)
-        model = resolved(context.model, self.last_time)
-        check_reach(model, self.last_time)
-        q = undeformed_posture(model).q
-        warnings = tuple(check_path(model, q, self.last_time))
-        freedom, rows = mobility(model, q).freedom, int(np.count_nonzero(~model.loop_rows))
+        path = context.path
+        assert path is not None
+        model, q, freedom = path.model, path.state.q, path.mobility.freedom
+        rows = int(np.count_nonzero(~model.loop_rows))
         if rows != freedom:
             raise InputError(
                 f'{model.scene.path}: analysis "{self.name}": kind: expected as many trajectory components as the'
@@ -100,14 +97,14 @@ class Fcid(TimedAnalysis):
 
         def at(times: Array) -> Run:
             states = prescribed_motion(model, motion, sampled(shape, times), times, q[None])._asdict()
-            how, prescribed = Statistics(warnings=warnings), Prescription(equations, shape, q)
+            how, prescribed = Statistics(warnings=path.warnings), Prescription(equations, shape, q)
             return Run(analysis=self, model=model, time=times, **states, statistics=how, prescribed=prescribed)
 
         try:
             shape = _shape(context, self, model, motion, q)
             run = at(self.times)
         except SolveError as error:
-            cause = shape_in_redundant_loops(model, MultibodySystem(model).integrated.rows)
+            cause = shape_in_redundant_loops(model, q, MultibodySystem(model).integrated.rows)
             if not cause:
                 raise
             raise SolveError(f"{error}; {cause}") from None

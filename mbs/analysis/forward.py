@@ -22,7 +22,7 @@ from ..model.known_motion import State
 from ..model.model import Model
 from ..model.motors import motor_commands
 from ..posture.posture import mobility
-from ..posture.start import displaced_joints
+from ..posture.start import displaced_joints, undeformed_posture
 from ..run.context import Context, PatchedLink
 from ..run.drive import drive_robot
 from ..run.gears import DEGREE, with_motor_coordinates
@@ -73,8 +73,9 @@ class Forward(ActuatedAnalysis):
         """
         model, progress = with_compliance(context.model.without_paths()), context.progress
         if self.actuation is None:
-            start = initial_state(model)
-            texts = (*displaced_joints(model), *hanging_joints(model, start))
+            undeformed = undeformed_posture(model)
+            start = initial_state(model, undeformed)
+            texts = (*displaced_joints(model, undeformed), *hanging_joints(model, undeformed, start))
             return drive_robot(model, self, start, progress, warnings=texts, earlier=context.earlier)
         source = context.outcomes[self.actuation]
         if model.tree.gears and not source.model.tree.gears:

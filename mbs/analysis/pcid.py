@@ -5,11 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from ..linear.statics import hanging_joints, initial_state
-from ..model.gears import with_prescribed_motors
-from ..posture.posture import check_path, mobility
-from ..posture.reach import check_reach
-from ..posture.redundancy import resolved
-from ..posture.start import displaced_joints, undeformed_posture
+from ..posture.start import displaced_joints
 from ..run.context import Context
 from ..run.drive import drive_robot
 from ..run.record import Run
@@ -26,6 +22,7 @@ class Pcid(IntegratedAnalysis):
     check: Check = None
     """Forward simulation under the result with twice the modes ("finer")."""
 
+    starts_on_path = True
     is_resumable = True
     allocates_patches = True
     applicable = ("joints", "joints+pzt", "trajectory", "points")
@@ -33,18 +30,15 @@ class Pcid(IntegratedAnalysis):
     def run(self, context: Context) -> Run:
         """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.
 
-        Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to
-        start from.
+        Raises `SolveError` where there is no equilibrium to start from.
         """
-        rigid = resolved(context.model, self.last_time)
-        check_reach(rigid, self.last_time)
-        posture = undeformed_posture(rigid).q
-        warnings, way = tuple(check_path(rigid, posture, self.last_time)), mobility(rigid, posture)
-        model = with_prescribed_motors(rigid)
-        start = initial_state(model)
-        warnings += tuple(displaced_joints(model, {gear.joint.joint.name for gear in model.tree.gears}))
-        if way.followed < way.freedom:
-            warnings += tuple(hanging_joints(model, start))
+        path = context.path
+        assert path is not None
+        model, start = path.model, initial_state(path.model, path.state)
+        gears = {gear.joint.joint.name for gear in model.tree.gears}
+        warnings = (*path.warnings, *displaced_joints(model, path.state, gears))
+        if path.mobility.followed < path.mobility.freedom:
+            warnings += tuple(hanging_joints(model, path.state, start))
         return drive_robot(
             model,
             self,
@@ -53,4 +47,5 @@ class Pcid(IntegratedAnalysis):
             warnings=warnings,
             earlier=context.earlier,
             is_recorded=context.is_replayed,
+            undeformed=path.state.q,
         )

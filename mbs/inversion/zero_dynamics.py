@@ -76,7 +76,7 @@ def cause_in_posture(servo: Servo) -> str:
     """Return why bent links leave the output without a posture, and a remedy; "" for other causes."""
     if servo.doubt:
         return f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
-    return shape_in_redundant_loops(servo.model, MultibodySystem(servo.model).integrated.rows)
+    return shape_in_redundant_loops(servo.model, servo.near[0], MultibodySystem(servo.model).integrated.rows)
 
 
 def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:

@@ -24,7 +24,7 @@ from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.start import AWAY, undeformed_posture
+from ..posture.start import AWAY
 
 MOST_ITERATIONS = 60
 FEW_ITERATIONS = 12  # from a posture next to it
@@ -46,23 +46,22 @@ SLACKEST = 1e-12  # of the largest stiffness over its natural size: less is roun
 TINY = 1e-300
 
 
-def initial_state(model: Model) -> State:
-    """The state that the scene starts from: links undeformed, or in equilibrium.
+def initial_state(model: Model, undeformed: State) -> State:
+    """The state that the scene starts from: links undeformed, or in equilibrium near that.
 
-    Raises `InputError` where no posture meets the rows, `SolveError` where there is no equilibrium near it.
+    Raises `SolveError` where there is no equilibrium near it.
     """
-    start = undeformed_posture(model)
-    return static_equilibrium(model, start) if model.scene.initial.state == "static" else start
+    return static_equilibrium(model, undeformed) if model.scene.initial.state == "static" else undeformed
 
 
-def hanging_joints(model: Model, start: State) -> Iterator[str]:
+def hanging_joints(model: Model, undeformed: State, start: State) -> Iterator[str]:
     """Warnings where the equilibrium `start` has joints elsewhere than [initial], as nothing keeps them there.
 
     And where it is unstable.
     """
     if model.scene.initial.state != "static":
         return
-    away, scales, moved = np.abs(start.q - undeformed_posture(model).q), model.joint_sizes, []
+    away, scales, moved = np.abs(start.q - undeformed.q), model.joint_sizes, []
     for node in model.tree.nodes:
         sizes = np.append(scales[node.v], np.ones(node.joint.q_count - node.joint.freedoms))
         if (away[node.q] / sizes).max(initial=0.0) > AWAY:

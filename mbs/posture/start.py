@@ -135,22 +135,21 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
     return named
 
 
-def rank_of_redundant_loops(model: Model, rows: Indices) -> int | None:
-    """Return the rank of loop constraints among `rows` if straight links make some redundant; else None.
+def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None:
+    """Return the rank of loop constraints among `rows` if straight links, at q (n_q,), make some redundant; else None.
 
     Bent links raise it: joints seem to be locked that the links let move. So does a path by which links bend.
     """
     count = int(np.count_nonzero(model.loop_rows[rows]))
     if not count:
         return None
-    q = undeformed_posture(model).q
     rank = mobility(model, q).loop_rank
     return rank - paths_by_bending(model, q)[0] if rank < count else None
 
 
-def shape_in_redundant_loops(model: Model, rows: Indices) -> str:
+def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
     """Why links in such loops cannot be given a shape; "" where there are none."""
-    if rank_of_redundant_loops(model, rows) is None:
+    if rank_of_redundant_loops(model, q, rows) is None:
         return ""
     owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
     return (
@@ -159,11 +158,14 @@ def shape_in_redundant_loops(model: Model, rows: Indices) -> str:
     )
 
 
-def displaced_joints(model: Model, joints: Container[str] | None = None) -> Iterator[str]:
-    """A warning where loops cannot be closed with all values of [initial], and joints, or any of `joints`, move."""
+def displaced_joints(model: Model, start: State, joints: Container[str] | None = None) -> Iterator[str]:
+    """A warning where loops cannot be closed with all values of [initial], and joints, or any of `joints`, move.
+
+    `start` is the undeformed robot.
+    """
     if not model.loop_rows.any():
         return
-    initial, start, scales = model.scene.initial, undeformed_posture(model), model.joint_sizes
+    initial, scales = model.scene.initial, model.joint_sizes
     guess, moved = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model)), []
     fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
     for node in (node for node in model.tree.nodes if node.joint.units):

@@ -13,6 +13,7 @@ from ..model.amplifiers import Amplifiers
 from ..model.divided_link import DividedLink
 from ..model.known_motion import State
 from ..model.model import Model
+from ..posture.path_start import PathStart
 from .drive import Progress
 from .record import Run
 
@@ -76,6 +77,7 @@ class Context:
     progress: Progress  # see `drive.Progress`
     model: Model  # the robot, with the constraint equations of all joints that close loops and of all trajectories
     outcomes: Mapping[str, Run]  # of the analyses before, by name
+    path: PathStart | None = None  # of analyses that start on it
     is_replayed: bool = False  # whether a later analysis takes its actuation
     earlier: Run | None = None  # an earlier run of the same analysis, to go on with; None from the start
     patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # of links by body

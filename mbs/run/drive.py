@@ -63,15 +63,17 @@ def drive_robot(
     control: Control | None = None,
     earlier: Run | None = None,
     is_recorded: bool = False,
+    undeformed: Array | None = None,
 ) -> Run:
     """The run of an integration from `start`, with outputs at `times` (T,), s; by default those of the analysis.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
     `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
     `earlier` run of the same analysis. `is_recorded`: with its steps, for a replay.
+    `undeformed` (n_q,): posture with straight links where a path begins.
     """
     this = _Integration(model, analysis, analysis.times if times is None else times, drives, control)
-    this.begin(start, earlier, is_recorded=is_recorded)
+    this.begin(start, earlier, undeformed, is_recorded=is_recorded)
     run = this.run(start, progress)
     motion = this.motion(run, this.times)
     motion = motion if earlier is None else motion.after(earlier)
@@ -105,7 +107,7 @@ class _Integration:
         self.is_followed = any(row.is_trajectory for row in model.rows)
         self.is_rigid = not any(node.body.n_modes for node in model.tree.nodes)
 
-    def begin(self, start: State, earlier: Run | None, *, is_recorded: bool) -> None:
+    def begin(self, start: State, earlier: Run | None, undeformed: Array | None, *, is_recorded: bool) -> None:
         """Choose the integrator, go on from an `earlier` run, and have the core watch limits and postures."""
         is_sampled = self.control is not None
         choose = partial(choose_integrator, self.system, self.analysis, start, self.times, is_sampled=is_sampled)
@@ -118,8 +120,9 @@ class _Integration:
             samples = new_samples(self.times, self.analysis, len(start.q) + len(start.v))
             continuation = Continuation(_core.TreeCheckpoint(), _core.Recording() if is_recorded else None, samples)
         model, (_, scene, rows) = self.system.model, self.system.integrated
-        is_watched = self.is_rigid or not self.is_followed
-        self.continuation, self.loop_rank = continuation, None if is_watched else rank_of_redundant_loops(model, rows)
+        self.continuation, self.loop_rank = continuation, None
+        if undeformed is not None and not self.is_rigid:
+            self.loop_rank = rank_of_redundant_loops(model, undeformed, rows)
         if self.loop_rank is None:
             scene.watch_posture([model.rows[k].is_trajectory for k in rows], model.size)
         watch_limits(scene, model.tree)

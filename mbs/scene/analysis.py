@@ -54,6 +54,7 @@ class Analysis(Referring):
     """Requested error of each result, relative to its peak."""
 
     follows_trajectories: ClassVar[bool] = True  # whether targets have to have values at all its `times`
+    starts_on_path: ClassVar[bool] = False  # whether it takes the `path` of its context
     is_motion: ClassVar[bool] = True  # whether it finds a motion, at whose instants other analyses may look
     is_integrated: ClassVar[bool] = False  # whether that comes from an integration over time
     is_algebraic: ClassVar[bool] = False  # whether each output is solved for by itself

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from ffrobot.actuation.context import ActuatedContext
+from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.run.solve import prepare_scene
 from ffrobot.scene.load import make_scene
 
@@ -51,8 +52,10 @@ ON_MOTORS = {"kind": "joint-pid", "side": "motor", "proportional": {"O": 200.0},
 
 def moving_at(rates, scene):
     """The closed loop of a wheel's scene about an inverse analysis that is to have found these rates (T,)."""
-    context = ActuatedContext(model=prepare_scene(scene).model, outcomes={}, progress=lambda _: True, is_replayed=True)
-    inverse, analysis = scene.analysis
+    model, (inverse, analysis) = prepare_scene(scene).model, scene.analysis
+    context = ActuatedContext(
+        model=model, outcomes={}, progress=lambda _: True, path=path_start(model, inverse.last_time), is_replayed=True
+    )
     source = inverse.run(context)
     source = replace(source, v=rates(source.v), look_closer=None)
     return analysis.run(replace(context, outcomes={"inverse": source}))

@@ -17,6 +17,7 @@ import pytest
 from bench.hand_written import STEPS, TIME, HandWritten, evaluation_seconds, general_state, targets
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.pcid import Pcid
+from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
@@ -79,7 +80,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
 @pytest.mark.nightly
 def test_pcid_ratio(benchmark, two_link, program):
     analysis = Pcid(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
-    context = Context(model=two_link, outcomes={}, progress=lambda t: True)
+    context = Context(model=two_link, outcomes={}, progress=lambda t: True, path=path_start(two_link, 1.0))
     outcomes, hand_written = [], []
 
     def both():

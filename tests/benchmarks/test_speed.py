@@ -29,6 +29,7 @@ from scipy.optimize import lsq_linear
 from bench.hand_written import TIME, evaluation_seconds, general_state
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.fcid import Fcid
+from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
@@ -49,7 +50,7 @@ def evaluation(model):
 def context_of(scene):
     """What analyses of the scene start from."""
     model = prepare_scene(scene, Watcher()).model
-    return Context(model=model, outcomes={}, progress=lambda t: True)
+    return Context(model=model, outcomes={}, progress=lambda t: True, path=path_start(model, 1.0))
 
 
 def used():

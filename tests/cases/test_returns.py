@@ -17,6 +17,7 @@ from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.fields.steps import Steps
 from ffrobot.mbs.model.motors import motor_commands
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
 from ffrobot.mbs.run.replay import motor_forces_of
 from ffrobot.run.solve import prepare_scene
@@ -76,7 +77,9 @@ def always(t):
 
 def inverse_of(model, tolerance, **keys):
     analysis = Pcid(name="inverse", kind="pcid", end=END, output_step=END / 50, tolerance=tolerance, **keys)
-    return analysis.run(Context(model=model, outcomes={}, progress=always, is_replayed=True))
+    return analysis.run(
+        Context(model=model, outcomes={}, progress=always, path=path_start(model, END), is_replayed=True)
+    )
 
 
 def replay_of(model, inverse, apply, tolerance, patches=None, repeat_steps=None, **keys):
@@ -131,7 +134,8 @@ def test_loads_that_jump(solution):
 def test_a_prescribed_shape(solution, shape):
     """Links that ring in PCID keep it, held by forces on their modes."""
     analysis = Fcid(name="inverse", kind="fcid", shape=shape, end=END, output_step=END / 50)
-    inverse = analysis.run(Context(model=solution.model, outcomes={}, progress=always))
+    path = path_start(solution.model, END)
+    inverse = analysis.run(Context(model=solution.model, outcomes={}, progress=always, path=path))
     back = replay_of(solution.model, inverse, "joints+pzt", 1e-7)
     assert departure(inverse, back) < 1e-6
     modes = ~solution.model.tree.joint_columns

@@ -12,6 +12,7 @@ from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.mbs.quantities import motion
 from ffrobot.mbs.quantities.motion import acting_forces, body_motion, node_of, plane_angle
@@ -109,6 +110,7 @@ def run(robot, analysis, source=None, patches=None, progress=always, earlier=Non
     outcomes = {} if source is None else {source.analysis.name: source.outcome}
     context = Context(
         model=robot.model, outcomes=outcomes, progress=progress, earlier=earlier, patches=patches or {},
+        path=path_start(robot.model, analysis.last_time) if analysis.starts_on_path else None,
         is_replayed=isinstance(analysis, IntegratedAnalysis) and analysis.kind != "forward",
     )  # fmt: skip
     return Seen(robot, analysis.run(context))

@@ -51,7 +51,7 @@ def test_robot_without_equilibrium_is_refused():
     rail = {"name": "rail", "type": "prismatic", "between": ("ground", "link1.root"), "axis": (0.0, 1.0)}
     model = make_model(arm_links()[:1], joint=[rail], initial={"state": "static"})
     with pytest.raises(SolveError, match="no static equilibrium"):
-        initial_state(model.model)
+        initial_state(model.model, undeformed_posture(model.model))
 
 
 def test_a_guess_of_a_way_places_what_slides():

@@ -32,6 +32,7 @@ def first(*names):  # older programs have them elsewhere
             pass
 
 drive, statics = first("run.drive", "analysis.drive"), first("linear.statics", "solve.statics")
+begin = first("posture.start", "solve.start")
 of, name = (drive._Integration, "run") if hasattr(drive, "_Integration") else (drive, "_integrated")
 integrated = getattr(of, name)
 
@@ -45,8 +46,9 @@ setattr(of, name, timed)
 
 def run(scene):
     model, before = prepare_scene(scene).model, time.process_time()
+    takes_start = statics.initial_state.__code__.co_argcount == 2
     for _ in range(STARTS):
-        statics.initial_state(model)
+        statics.initial_state(model, *([begin.undeformed_posture(model)] if takes_start else []))
     seconds.append(("start", (time.process_time() - before) / STARTS, 0))
     before = time.process_time()
     solve(scene)

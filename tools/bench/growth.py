@@ -17,6 +17,7 @@ from ffrobot.mbs.model.body import Body, BodyPoint
 from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.projection import projected
+from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
@@ -118,7 +119,8 @@ def output_timer(outputs: int) -> Callable[[], float]:
     model = chain(2, MODES_IN_CHAINS, outputs=outputs)
     assert isinstance(model.scene, Scene)
     analysis = model.scene.analysis[0]
-    context = Context(model=model, outcomes={}, progress=lambda t: True)
+    path = path_start(model, analysis.last_time) if analysis.starts_on_path else None
+    context = Context(model=model, outcomes={}, progress=lambda t: True, path=path)
     return lambda: analysis.run(context).statistics.wall_seconds
 
 

@@ -15,6 +15,7 @@ from ...mbs.linear.statics import hanging_joints
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model
+from ...mbs.posture.start import undeformed_posture
 from ...run.mode_choice import mode_levels
 from ...run.prepare import with_bodies
 from ...run.solve import prepare_scene
@@ -109,7 +110,7 @@ def _remarks(scene: Scene, model: Model, unit: ForwardUnit, folder: str) -> list
     silent = [node.joint for node in model.tree.nodes if not has_own_coordinates(node)] + list(model.tree.loops)
     if names := [joint.name for joint in silent if joint.units]:
         remarks.append(f"{quoted(names)}: no outputs of their coordinates, as they are none of the state")
-    remarks += hanging_joints(model, State(unit.data.q, unit.data.v))
+    remarks += hanging_joints(model, undeformed_posture(model), State(unit.data.q, unit.data.v))
     if any(layout.amplifier or layout.hysteresis for layout in scene.pzt):
         remarks.append("voltages are those on the patches: amplifiers and hysteresis do not act")
     return [*remarks, "limits of motors and patches do not act"]

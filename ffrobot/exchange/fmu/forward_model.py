@@ -21,6 +21,7 @@ from ...mbs.linear.statics import initial_state
 from ...mbs.model.model import Model
 from ...mbs.model.nodes import Node
 from ...mbs.model.system import MultibodySystem
+from ...mbs.posture.start import undeformed_posture
 from ...mbs.run.integrator_choice import integrator_of
 from ...mbs.run.integrators import METHODS
 
@@ -164,7 +165,7 @@ def forward_unit(
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
-    data, start = MultibodySystem(model).forward_model(), initial_state(model)
+    data, start = MultibodySystem(model).forward_model(), initial_state(model, undeformed_posture(model))
     data.q, data.v = start.q, start.v
     data.method = METHODS[integrator_of(model, analysis.integrator)]
     data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance

@@ -11,6 +11,7 @@ from ffrobot.mbs.linear.statics import initial_state
 from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.limits import watch_limits, watched
+from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
 
 METHODS = {"dop853": 1e-11, "dopri5": 1e-11, "radau": 1e-11, "generalized_alpha": 1e-7}  # with tolerances
@@ -28,7 +29,7 @@ def system_of(joints, bodies, joints_at=None, rates=None, turn=None):
         analysis=[{"name": "free", "kind": "forward", "end": 1.0, "output_step": 0.1}],
     )  # fmt: skip
     model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
-    return MultibodySystem(model), initial_state(model)
+    return MultibodySystem(model), initial_state(model, undeformed_posture(model))
 
 
 def controls(name="dop853", tolerance=1e-11, max_steps=0, keep_steps=False):

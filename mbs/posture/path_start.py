@@ -1,0 +1,36 @@
+"""The undeformed robot where its path begins: what inverse analyses start from."""
+
+from __future__ import annotations
+
+from ...common.structs import struct
+from ..model.gears import with_prescribed_motors
+from ..model.known_motion import State
+from ..model.model import Model
+from .posture import Mobility, check_path, mobility
+from .reach import check_reach
+from .redundancy import resolved
+from .start import undeformed_posture
+
+
+@struct
+class PathStart:
+    """A robot that follows its path, and its state at t = 0 with undeformed links."""
+
+    model: Model  # with rows for redundant freedoms, and with compliant gears where motors follow the path
+    state: State
+    mobility: Mobility  # with rigid gears
+    warnings: tuple[str, ...]
+
+
+def path_start(model: Model, end: float) -> PathStart:
+    """Return the start of the path that ends at `end` (s).
+
+    Raises `InputError` for a path that the undeformed robot cannot follow, `SolveError` where redundant freedoms cannot
+    be resolved.
+    """
+    rigid = resolved(model, end)
+    check_reach(rigid, end)
+    state = undeformed_posture(rigid)
+    warnings, free = tuple(check_path(rigid, state.q, end)), mobility(rigid, state.q)
+    geared = with_prescribed_motors(rigid)
+    return PathStart(geared, state if geared is rigid else undeformed_posture(geared), free, warnings)
