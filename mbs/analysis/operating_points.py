@@ -37,8 +37,9 @@ def run_static(context: Context, analysis: Analysis) -> Run:
     """
     began = time.perf_counter()
     model = with_prescribed_motors(resolved(context.model, analysis.last_time))
+    undeformed = undeformed_posture(model)
     statics = Statics(model)
-    q = statics.equilibrium(undeformed_posture(model).q)
+    q = statics.equilibrium(undeformed.q)
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
     return Run(
         analysis=analysis,

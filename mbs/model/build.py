@@ -28,7 +28,7 @@ from .body import Body
 from .masses import welded_payloads
 from .model import Model
 from .nodes import ConstraintRow, Section, coordinate_row
-from .tree import KinematicTree, cut_coordinates, cut_row, with_auxiliary_rotors
+from .tree import KinematicTree, cut_coordinates, cut_row, loop_rows, with_auxiliary_rotors
 
 
 def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
@@ -40,48 +40,18 @@ def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
     topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
     floating = PlanarJoint if scene.is_planar else FreeJoint
     tree = KinematicTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
-    _check_cut_joints(scene, tree)
     tree = with_coordinates_of_frames(tree) if scene.motors == "frame" else tree
     tree, rows = with_auxiliary_rotors(tree)
-    rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
+    rows = [*(row for joint in tree.loops for row in loop_rows(scene, tree, joint)), *rows]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
     return Model(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
 
 
-def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
-    """Raise `InputError` for a motor without a rotor, or a compliant gear, in the joint at which a loop is cut."""
-    for joint in tree.loops:
-        if key := joint.asks_for_coordinate:
-            raise InputError(
-                f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
-                " rotor_inertia nor a compliant gear, to be cut",
-                f"{quoted(key)} here and one of them in each of the others. Such loops are not available in 3D",
-            )
-
-
-def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
-    if joint.loop_equations is None:
-        raise InputError(
-            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes",
-            f"a {joint.type} joint: list it before the other joints of its loop",
-        )
-    first, second = joint.triads()
-    a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
-    unit = np.eye(3)
-    for equation in joint.loop_equations:
-        if equation.kind == "point":
-            yield from (ConstraintRow(joint.name, "point", a, b, e, e, is_trajectory=False) for e in unit)
-        else:
-            yield ConstraintRow(
-                joint.name, equation.kind, a, b, unit[equation.f], unit[equation.g], is_trajectory=False
-            )
-
-
 def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:
-    unit, ground = np.eye(3), tree.section(GROUND)
     if path.coordinate_of is not None:
         yield _coordinate_row(scene, tree, path, path.coordinate_of)
         return
+    unit, ground = np.eye(3), tree.section(GROUND)
     if path.angle is not None:
         section, triad = tree.section(path.angle), smallest_turn(np.array(path.turning_axis))
         target = path.components["value"]
@@ -152,8 +122,7 @@ def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
     changed.on_frames = frozenset(
         joint.name
         for joint in joints
-        if joint.type == "revolute"
-        and all(_turns_about_z(tree, tree.section(*side)) for side in zip(joint.between, joint.triads(), strict=True))
+        if joint.type == "revolute" and all(_turns_about_z(tree, side) for side in tree.sides(joint))
     )
     changed.nodes = tuple(
         replace(node, inner=node.inner._replace(still=True), outer=node.outer._replace(still=True))

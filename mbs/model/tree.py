@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array, Booleans
+from ...common.errors import InputError, quoted
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
@@ -102,6 +103,11 @@ class KinematicTree:
         body, _, point = side.partition(".")
         own = self.tools[side] @ triad if side in self.tools else triad
         return Section(self.index[body], point, own, np.zeros(3))
+
+    def sides(self, joint: JointRecord) -> tuple[Section, Section]:
+        """The sections that a joint is between, the first and the second."""
+        first, second = zip(joint.between, joint.triads(), strict=True)
+        return self.section(*first, joint.at), self.section(*second, joint.at)
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
         """Return the tree with a massless body, named by a label, on each one-coordinate joint with a rotor.
@@ -217,13 +223,35 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
     """Return the row of a coordinate of a cut joint, times `sign`: of the second side relative to the first."""
     along = joint.along[number]
-    sides = [tree.section(side, triad, joint.at) for side, triad in zip(joint.between, joint.triads(), strict=True)]
+    sides = tree.sides(joint)
     if joint.name in tree.on_frames:
-        sides = [section._replace(still=True) for section in sides]
+        sides = sides[0]._replace(still=True), sides[1]._replace(still=True)
     a, b = sides[::-1] if along.of_outer else sides
     f, g = np.eye(3)[[along.f, along.g]]
     sign = -1.0 if along.of_outer else 1.0  # of the first side on the second
     return ConstraintRow(joint.name, along.kind, a, b, f, g, is_trajectory=False, sign=sign)
+
+
+def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
+    """Yield the rows by which a joint closes a loop, which is cut there.
+
+    Raises `InputError` for a type that cannot, and for a motor without a rotor, or a compliant gear, in it.
+    """
+    if key := joint.asks_for_coordinate:
+        raise InputError(
+            f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
+            " rotor_inertia nor a compliant gear, to be cut",
+            f"{quoted(key)} here and one of them in each of the others. Such loops are not available in 3D",
+        )
+    if joint.loop_equations is None:
+        raise InputError(
+            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes",
+            f"a {joint.type} joint: list it before the other joints of its loop",
+        )
+    a, b = tree.sides(joint)
+    for equation in joint.loop_equations:
+        axes = ((e, e) for e in AXES) if equation.kind == "point" else [(AXES[equation.f], AXES[equation.g])]
+        yield from (ConstraintRow(joint.name, equation.kind, a, b, f, g, is_trajectory=False) for f, g in axes)
 
 
 class CutMotion(NamedTuple):

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices, as_floats
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...common.toml_files import toml_line
 from ..fields.field_types import split_point
+from ..model.constraints import MET
 from ..model.model import Model
 from ..model.nodes import Node
 from ..scene.mechanism import MechanismKeys
@@ -86,6 +87,40 @@ def _chain(model: Model, point: str) -> _Chain | None:
         if not node.inner.point:
             return None
         number, label = node.inner.body, node.inner.point
+
+
+def posture_from_elsewhere(model: Model, guess: Array) -> Array:
+    """Return a posture (n_q,) with undeformed links that meets all rows at t = 0, where `guess` (n_q,) leads to none.
+
+    Where a point follows a path and no joint has a guess, zero may be singular: the nearest to zero that works does.
+    Raises `InputError` else, with what may help.
+    """
+    check_reach(model, 0.0)
+    works, scene = working_start(model, guess), model.scene
+    follows = any(path.point is not None for path in scene.trajectory)  # a note then says from where
+    if works is not None and follows and not scene.initial.named("joints"):
+        q = model.constraints.posture(works, 0.0)
+        if q is not None:
+            return q
+    owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), turned_guesses(scene)
+    advice += _turned_over(model, guess)
+    if works is not None:
+        advice.append(f"from [initial] {as_guess(turning_joints(model)[0], works)} it works")
+    raise InputError(
+        f"{scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets {owners} at"
+        " t = 0",
+        f"none by Newton's method ({'; '.join(advice) or 'out of reach, or on another branch?'})",
+    )
+
+
+def _turned_over(model: Model, guess: Array) -> Iterator[str]:
+    """What is turned by π in the posture next to the guess that would meet all rows but for that."""
+    times = np.zeros(1)
+    q = model.constraints.postures(guess[None], times)[0]
+    if np.abs(model.constraints.values(q, times)[0] / model.row_sizes).max() <= MET:
+        for owner, is_so in model.constraints.turned_over(q, times).items():
+            if is_so[0]:
+                yield f'next to it "{owner}" is turned over: axes that it aligns point against each other'
 
 
 def working_start(model: Model, guess: Array) -> Array | None:

@@ -52,14 +52,12 @@ def resolved(model: Model, end: float) -> Model:
     _check(model, criterion, free)
     times = as_floats(np.linspace(0.0, end, NODES)) if end > 0 else np.zeros(1)
     q = _least_motion(model, start.q, times)
-    redundant = free.freedom - free.followed
-    if not end > 0:
-        nodes = _most_observable(model, q, times, redundant)
-        return _with_prescribed_joints(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
-    if criterion == "least-torque":
+    if criterion == "least-torque" and end > 0:
         q = _least_torque(model, times, q)
-    nodes = _most_observable(model, q, times, redundant)
-    return _with_prescribed_joints(model, nodes, times, q)
+    nodes = _most_observable(model, q, times, free.freedom - free.followed)
+    if end > 0:
+        return _with_prescribed_joints(model, nodes, times, q)
+    return _with_prescribed_joints(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
 
 
 def resolving_joints(model: Model) -> list[str]:

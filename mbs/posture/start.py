@@ -10,12 +10,11 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
-from ..model.constraints import MET
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
 from ..scene.bodies import ROUND_OFF, tensor
 from .posture import mobility, paths_by_bending
-from .reach import as_guess, check_reach, turned_guesses, turning_joints, working_start
+from .reach import posture_from_elsewhere
 
 LEAST = 1e-13  # of inertia, relative
 SAME = 1e-8  # of the largest rate
@@ -25,8 +24,7 @@ AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than lin
 def undeformed_posture(model: Model) -> State:
     """The state with p = ṗ = 0 that meets all rows at t = 0, next to the guessed coordinates and rates.
 
-    Where a point follows a path and no joint has a guess, zero may be singular: then next to the nearest to zero that
-    works. Raises `InputError` where no posture near the guess does.
+    Raises `InputError` where none does: see `posture_from_elsewhere`.
     """
     tree = model.tree
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
@@ -35,28 +33,14 @@ def undeformed_posture(model: Model) -> State:
         guess = _with_gears_as_asked(model, State(guess, np.zeros(tree.n_v))).q
     q = model.constraints.posture(guess, 0.0, named | behind) if (named | behind).any() else None
     q = model.constraints.posture(guess, 0.0) if q is None else q
-    if q is None:
-        check_reach(model, 0.0)
-        works, scene = working_start(model, guess), model.scene
-        follows = any(path.point is not None for path in scene.trajectory)  # a note then says from where
-        if works is not None and follows and not scene.initial.named("joints"):
-            q = model.constraints.posture(works, 0.0)
-    if q is None:
-        owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), list(turned_guesses(model.scene))
-        advice += _turned_over(model, guess)
-        if works is not None:
-            advice.append(f"from [initial] {as_guess(turning_joints(model)[0], works)} it works")
-        raise InputError(
-            f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
-            f" {owners} at t = 0",
-            f"none by Newton's method ({'; '.join(advice) or 'out of reach, or on another branch?'})",
-        )
-    v, named = _guessed_rates(model), _named(model, "joint_rates") | behind
-    start = State(q, model.constraints.velocities(q, v))
+    q = posture_from_elsewhere(model, guess) if q is None else q
+    rates, named = _guessed_rates(model), _named(model, "joint_rates") | behind
+    asked = _with_gears_as_asked(model, State(q, rates)).v if behind.any() else rates
+    v = model.constraints.velocities(q, rates)
     if named.any():
-        v = _with_gears_as_asked(model, State(q, v)).v if behind.any() else v
-        kept = model.constraints.velocities(q, model.constraints.velocities(q, v, locked=named))
-        start = State(q, kept) if np.allclose(kept[named], v[named], atol=SAME * np.abs(v[named]).max()) else start
+        kept = model.constraints.velocities(q, model.constraints.velocities(q, asked, locked=named))
+        v = kept if np.allclose(kept[named], asked[named], atol=SAME * np.abs(asked[named]).max()) else v
+    start = State(q, v)
     return _twisted_gears(model, start, relaxed_gears(model, start))
 
 
@@ -114,16 +98,6 @@ def check_turning(model: Model) -> None:
             f"{model.scene.path}: expected bodies that all joints together turn with some inertia",
             f"none about an axis: {quoted(slim)} have a moment of inertia of 0 (rigid.inertia)",
         )
-
-
-def _turned_over(model: Model, guess: Array) -> Iterator[str]:
-    """What is turned by π in the posture next to the guess that would meet all rows but for that."""
-    times = np.zeros(1)
-    q = model.constraints.postures(guess[None], times)[0]
-    if np.abs(model.constraints.values(q, times)[0] / model.row_sizes).max() <= MET:
-        for owner, is_so in model.constraints.turned_over(q, times).items():
-            if is_so[0]:
-                yield f'next to it "{owner}" is turned over: axes that it aligns point against each other'
 
 
 def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
