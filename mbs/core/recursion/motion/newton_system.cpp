@@ -147,11 +147,16 @@ template <class Scalar>
 void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r, Eigen::Map<Vector<Scalar>> x) const {
   Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_);
   Vector<Scalar> y = product(G_, f);
-  if constexpr (std::is_same_v<Scalar, double>)
-    y += along_stiff<VectorXd>(x);
+  f.array() /= factors.S.array();
+  if constexpr (std::is_same_v<Scalar, double>) {
+    const VectorXd at_start = along_stiff<VectorXd>(x);
+    y += at_start;
+    f -= factors.S.cwiseProduct(at_start);
+  }
   y.array() *= factors.S.array();
   solve_symmetric(factors.symmetric, y);
-  f -= factors.S.cwiseProduct(y);
+  solve_symmetric(factors.symmetric, f);
+  f.array() *= factors.S.array();
   x(free_) += product(P_, f);
   for (std::size_t s = 0; s < stiff_.size() && stiff_[s] < x.size(); ++s)
     x[stiff_[s]] = y[s] / factors.S[s];

@@ -4,7 +4,8 @@
 //     N x + C_q^T nu = B^T r, C_q x = c:     x = P f + R c,     (1 + G E) B x = G r + B R c
 // P (n_v, stiff) are accelerations by unit forces along these coordinates while the constraint equations hold, R (n_v,
 // equations) those by which an equation alone accelerates. With y = S B x, S S = E, the matrix is symmetric: 1 + S G S.
-// x along stiff coordinates follows from y, along the others from P and R.
+// x along stiff coordinates follows from y, along the others from P and R. Of stiff coordinates f is next to nothing
+// beside r: f / S, too, is solved for with that matrix, (1 + S G S) f / S = r / S - S B R c, not left over from r.
 #pragma once
 
 #include "core/recursion/motion/scene.h"
