@@ -53,6 +53,19 @@ class CompliantGear(NamedTuple):
         way, rate = q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
         return way, rate
 
+    def round_off(self, q: Array) -> float:
+        """Round-off of the spring's torque, as that of angles makes it, by its largest one at q (T, n_q).
+
+        0 where there is no torque but round-off.
+        """
+        angle, twist = (
+            float(np.abs(of).max(initial=0.0))
+            for of in (q[:, self.motor.q], q[:, self.motor.q.start] - self.sign * q[:, self.joint.q.start])
+        )
+        noise = float(np.finfo(float).eps) * angle * max(self.spring.slopes)
+        largest = float(self.spring.moment(np.array(twist)))
+        return noise / largest if largest > 2.0 * noise else 0.0
+
 
 class KinematicTree:
     """Spanning forest of bodies on their joints; `loops`: the loop-closing joints, in the scene's order.

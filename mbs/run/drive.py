@@ -198,7 +198,8 @@ class _Integration:
             status, cause = "diverged", f"{posture}: {advice}"
         elif status not in ("completed", "interrupted"):
             cause = find_cause(self.system, self.analysis, self.integrator, run)
-        texts = [posture, beyond_round_off(self.analysis.tolerance, run)]
+        of_gears = max((gear.round_off(motion.q) for gear in motion.model.tree.gears), default=0.0)
+        texts = [posture, beyond_round_off(self.analysis.tolerance, run, of_gears)]
         texts += left_ranges(motion.model, run.ranges, motion.time, motion.q, motion.v)
         if (samples := self.continuation.samples) is not None and samples.every > 1:
             texts.append(f"peaks and means are of one in {samples.every} steps: memory holds no more; shorten the run")

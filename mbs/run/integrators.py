@@ -199,20 +199,24 @@ def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     )
 
 
-def beyond_round_off(tolerance: float, run: _core.TreeRun) -> str:
-    """A sentence where round-off of `run` needs a larger tolerance; else "".
+def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> str:
+    """A sentence where round-off of `run`, and of its gears, needs a larger tolerance; else "".
 
     It adds the errors that the core has found of its steps. Where equations hardly differ they determine forces less
     well: with r the least ratio of postures (`describe_posture`), to double precision over r².
     """
     of_posture = float(np.finfo(float).eps) / run.least_ratio**2 if run.least_ratio > 0.0 else 0.0
-    if not (round_off := max(run.rounding, of_posture)) > tolerance:
+    if not (round_off := max(run.rounding, of_posture, of_gears)) > tolerance:
         return ""
     digit = 10.0 ** np.floor(np.log10(round_off))
-    cause = "parts with next to no inertia" if of_posture < 0.01 * round_off else "nearly singular postures"
+    cause = "parts with next to no inertia amplify round-off of forces"
+    if of_gears >= 0.01 * round_off:
+        cause = "stiff gears amplify round-off of angles"
+    elif of_posture >= 0.01 * round_off:
+        cause = "nearly singular postures amplify round-off of forces"
     return (
-        f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as {cause} amplify"
-        f" round-off of forces; errors may reach {round_off:.1g} of the peaks, within tolerance ="
+        f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as {cause};"
+        f" errors may reach {round_off:.1g} of the peaks, within tolerance ="
         f" {np.ceil(round_off / digit) * digit:.1g}"
     )
 
