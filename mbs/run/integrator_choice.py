@@ -18,6 +18,7 @@ from ..model.system import MultibodySystem
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import ASKED_FOR, EXPLICIT, RULE, Choice, faster_of, without_choosing
 
+SMALL_TWIST = 1e-5  # rad
 TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few of its times long, are too many
 
 
@@ -48,7 +49,7 @@ def choose_integrator(
         return Choice("radau", "dry friction is a stiff damper to the light ends of links")
     if (rate := fastest_friction(system, start)[0]) * float(np.ptp(times)) > TOO_STIFF:
         return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
-    if not any(node.body.n_modes for node in model.tree.nodes):
+    if not model.tree.gears and not any(node.body.n_modes for node in model.tree.nodes):
         return Choice("dop853", "nothing vibrates")
     if is_sampled:
         return Choice("dop853", "every sample of the controller begins anew")
@@ -108,7 +109,8 @@ def _excitation(system: MultibodySystem, start: State, vibrations: Vibrations) -
 
     A mode at rest follows its load and the links' static deflection; the velocity v, the acceleration a or the jerk j
     about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does beside following statically
-    is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
+    is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on. Gears carry at least what the norm of errors takes for
+    small (core/recursion/motion/motion_norm.cpp).
     """
     model, omega, K = system.model, vibrations.frequency, vibrations.springs
     dt = (1e-3 if system.replay is None else 0.1) / float(omega.max())  # round-off of what is replayed is no jerk
@@ -119,7 +121,9 @@ def _excitation(system: MultibodySystem, start: State, vibrations: Vibrations) -
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     forces = K @ vibrations.shape * amplitude
     springs = [(node.p_v, node.body.stiffness * q[node.p_q]) for node in model.tree.nodes if node.body.n_modes]
-    springs += [(gear.joint.v, gear.spring.moment(gear.twist(q, v)[0])) for gear in model.tree.gears]
+    for gear in model.tree.gears:
+        least = SMALL_TWIST * max(gear.spring.slopes)
+        springs.append((gear.joint.v, np.append(gear.spring.moment(gear.twist(q, v)[0]), least)))
     of_each = np.array([np.linalg.norm(forces[columns], axis=0) for columns, _ in springs])
     carried = [of for _, of in springs]
     if system.replay is not None:  # which may carry what would bend links

@@ -213,6 +213,19 @@ def test_motors_behind_stepped_gears_carry_out_the_path(damping):
     assert error.max() < 1e-5  # m; 5e-3 with rigid moments
 
 
+@pytest.mark.parametrize(("stiffness", "error"), [(1e10, 1e-6), (1e13, 1e-3)])
+def test_gears_as_stiff_as_rigid_ones_transmit_their_torques_to_round_off_which_is_told(stiffness, error):
+    """Torques of the rigid gear: round-off of an angle of one radian is 2e-6 N·m, or 2e-3 N·m, of 5.3."""
+    path = {"name": "tip", "motor": "O", "value": nonic(0.0, 1.0)}
+    outcome = run(pendulum(trajectory=[path], stiffness=stiffness), pcid())
+    x = np.polynomial.Polynomial([0.0] * 5 + [126.0, -420.0, 540.0, -315.0, 70.0])
+    assert relative(outcome.tau[:, 0], (MOTOR + LINK) * x.deriv(2)(outcome.time)) < error
+    assert outcome.statistics.integrator.name == "radau"
+    assert outcome.statistics.steps < 200
+    told = "stiff gears amplify round-off of angles" in " ".join(outcome.statistics.warnings)
+    assert told == (error > 1e-6)
+
+
 def test_a_light_stiff_link_behind_a_driven_motor_takes_no_more_steps_than_without_the_gear():
     """Its root has next to no inertia under spring and damper, which implicit steps solve and explicit ones follow."""
     link = ritz_link("crank", "cantilever", length=0.12, mass=0.24, EI=1130.0, modes=4, damping_ratio=0.05)
