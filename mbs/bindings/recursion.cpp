@@ -71,7 +71,7 @@ Derivatives derivatives_at(Model<Space> &model, const Scene &scene, double t, co
   const std::vector<Jet> targets = targets_at(scene, t);
   for (Index r = 0; r < target.size(); ++r)
     target[r] = targets[r].acceleration;
-  Derivatives found = derivatives_under(model.mechanism, scene, t, state, force, target, model.w);
+  Derivatives found = derivatives_under(model.mechanism, scene, t, state, force, target, model.w, true);
   for (const JointForce &joint : scene.joint_forces)
     found.a_v.col(joint.v) -= joint.friction.slope(v[joint.v]) * found.a_f.col(joint.v);
   return found;

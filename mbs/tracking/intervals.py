@@ -10,7 +10,6 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ..inversion.stable_inversion import PROBES, cut, halved
 from .problem import NO_SHARE, track
-from .steps import TOLERANCE
 from .transition import Tracked, Transition
 
 GRADING = 2.5  # of breaks to both ends: tanh
@@ -48,9 +47,9 @@ def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callabl
         unmet, excess = _left_over(asked, tracked, tolerance)
         finer = cut(breaks, excess)
         is_fine = not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on()
-        if not tracked.converged or (is_fine and within == TOLERANCE):
+        if not tracked.converged or (is_fine and within == tolerance):
             return replace(tracked, unmet=unmet)
-        breaks, within = (breaks, TOLERANCE) if is_fine else (finer, within)
+        breaks, within = (breaks, tolerance) if is_fine else (finer, within)
 
 
 def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[float, Array]:

@@ -67,7 +67,7 @@ def track(
         K = near.curve(flat, 2).reshape(K.shape)
     steps = Steps(asked, breaks, tau_qs, size)
     steps.tolerance = within if calm is None else max(within, WHILE_SETTLING)
-    steps.gap = GAP if calm is None and within == TOLERANCE else ROUGH_GAP
+    steps.gap = GAP if calm is None else ROUGH_GAP
     e = np.zeros((N + 1, 3 * asked.errors))
     if near is not None and near.error is not None:
         e = np.hstack([near.error(breaks, order) for order in (2, 0, 1)])

@@ -57,7 +57,8 @@ template <class Values> void take(const Values &x, Index first, Index count, Mat
 
 template <class Space>
 Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
-                        const double *v, const Forces<double> &forces, const AtSections &at, const double *target) {
+                        const double *v, const Forces<double> &forces, const AtSections &at, const double *target,
+                        bool by_forces) {
   const ConfigurationSpace space(m.n_v, m.rotations);
   const Index n = m.n_v, rows = m.constraints.size();
   const std::size_t n_v = n, n_rows = m.constraints.size();
@@ -77,8 +78,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
     add_along_cuts(placed, at.joints, along.data(), acting_wrench.data());
     accelerations(placed, acting_wrench.data(), held.data(), a.data());
   };
-  Derivatives found{MatrixXd(n, n),    MatrixXd(n, n),    MatrixXd(n, n),   MatrixXd(rows, n),
-                    MatrixXd(rows, n), MatrixXd(rows, n), MatrixXd(rows, n)};
+  const MatrixXd square(n, n), of_rows(rows, n);
+  Derivatives found{square, square, square, of_rows, of_rows, of_rows, of_rows};
   for (Index first = 0; first < n; first += directions) {
     const Index count = std::min(directions, n - first);
     Duals q1 = q0, v1 = v0, force1 = force0;
@@ -88,7 +89,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
     }
     answer(q1, v0, force0), take(a, first, count, found.a_q), take(w.lambda, first, count, found.lambda_q);
     answer(q0, v1, force0), take(a, first, count, found.a_v), take(w.lambda, first, count, found.lambda_v);
-    answer(q0, v0, force1), take(a, first, count, found.a_f);
+    if (by_forces)
+      answer(q0, v0, force1), take(a, first, count, found.a_f);
     measure(m, q1.data(), v0.data(), w, value.data(), rate.data());
     take(value, first, count, found.value_q), take(rate, first, count, found.rate_q);
   }
@@ -96,8 +98,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
 }
 
 template Derivatives derivatives(const Mechanism<Planar> &, const Workspace<Planar, double> &, const double *,
-                                 const double *, const Forces<double> &, const AtSections &, const double *);
+                                 const double *, const Forces<double> &, const AtSections &, const double *, bool);
 template Derivatives derivatives(const Mechanism<Spatial> &, const Workspace<Spatial, double> &, const double *,
-                                 const double *, const Forces<double> &, const AtSections &, const double *);
+                                 const double *, const Forces<double> &, const AtSections &, const double *, bool);
 
 } // namespace ffrobot::recursion

@@ -28,9 +28,10 @@ struct AtSections {
 };
 
 // At q, v under `forces`, those `at` sections and second derivatives `target` (constraints) of the constraints that
-// `kept` keeps; markers of the ground stand and turn as there.
+// `kept` keeps; markers of the ground stand and turn as there. By forces only if asked for.
 template <class Space>
 Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
-                        const double *v, const Forces<double> &forces, const AtSections &at, const double *target);
+                        const double *v, const Forces<double> &forces, const AtSections &at, const double *target,
+                        bool by_forces);
 
 } // namespace ffrobot::recursion

@@ -54,20 +54,19 @@ FFROBOT_NOINLINE void evaluate(const Mechanism<Space> &m, const T *q, const T *v
 }
 
 // `call` with the number of columns as a constant
-template <class Space, class T, class F> FFROBOT_INLINE void with_columns(int columns, const F &call) {
-  if constexpr (std::is_same_v<T, double>)
-    switch (columns) {
-    case 1:
-      return call(std::integral_constant<int, 1>());
-    case 3:
-      if constexpr (Space::linear == 2)
-        return call(std::integral_constant<int, 3>());
-      break;
-    case 4:
-      return call(std::integral_constant<int, 4>());
-    case 7:
-      return call(std::integral_constant<int, 7>());
-    }
+template <class Space, class F> FFROBOT_INLINE void with_columns(int columns, const F &call) {
+  switch (columns) {
+  case 1:
+    return call(std::integral_constant<int, 1>());
+  case 3:
+    if constexpr (Space::linear == 2)
+      return call(std::integral_constant<int, 3>());
+    break;
+  case 4:
+    return call(std::integral_constant<int, 4>());
+  case 7:
+    return call(std::integral_constant<int, 7>());
+  }
   return call(std::integral_constant<int, most_columns>());
 }
 
@@ -76,7 +75,7 @@ FFROBOT_INLINE void evaluate(const Mechanism<Space> &m, const T *q, const T *v, 
                              const T *target, Workspace<Space, T> &w, T *a) {
   if (!w.blocks.empty())
     return evaluate_in_blocks(m, q, v, forces, is_placed, target, w, a);
-  with_columns<Space, T>(w.columns, [&](auto W) { evaluate<Space, T, W>(m, q, v, forces, is_placed, target, w, a); });
+  with_columns<Space>(w.columns, [&](auto W) { evaluate<Space, T, W>(m, q, v, forces, is_placed, target, w, a); });
 }
 
 template <class Space, class T>
@@ -101,7 +100,7 @@ template <class Space, class T> void put_active(const T *of_all, Workspace<Space
 template <class Space, class T> void respond(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w, T *dq) {
   if (!w.blocks.empty())
     return accelerate_in_blocks<true>(m, q, w, dq);
-  with_columns<Space, T>(w.columns, [&](auto W) {
+  with_columns<Space>(w.columns, [&](auto W) {
     const auto y = Pack<T, W>::read(w.y.data());
     if constexpr (W == most_columns)
       acceleration_pass_of_block<true>(m, q, y, w, dq);
@@ -178,10 +177,8 @@ Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Work
 template <class Space, class T>
 Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size()), frames(m.nodes.size()) {
   const int needed = static_cast<int>(m.constraints.size()) + 1;
-  columns = most_columns;
-  if constexpr (std::is_same_v<T, double>)
-    columns = *std::find_if(std::begin(column_counts<Space>), std::end(column_counts<Space>) - 1,
-                            [&](int c) { return c >= needed; });
+  columns = *std::find_if(std::begin(column_counts<Space>), std::end(column_counts<Space>) - 1,
+                          [&](int c) { return c >= needed; });
   const std::size_t stride = stride_of(columns);
   std::size_t widest = 8, softs = 0;
   for (const Node<Space> &node : m.nodes) {

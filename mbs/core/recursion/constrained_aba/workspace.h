@@ -11,7 +11,7 @@ namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
 // compiled (of a point in the plane, with a driven joint, and in space); where there are fewer constraint equations the
-// rest is zero. Of other scalars than doubles the largest alone. More equations go in blocks (blocks.h).
+// rest is zero. More equations go in blocks (blocks.h).
 template <class Space> constexpr int column_counts[] = {1, Space::linear + 1, 4, 7, 16};
 constexpr int most_columns = 16;
 constexpr int block_constraints = most_columns - 1;
@@ -75,7 +75,7 @@ template <class Space, class T> struct Workspace {
   static constexpr int d = Space::dim;
   explicit Workspace(const Mechanism<Space> &m);
 
-  int columns; // one of column_counts; most_columns of other scalars than doubles
+  int columns; // one of column_counts
   std::vector<typename Space::template State<T>> bodies;
   std::vector<Hinge<Space, T>> hinges;
   Aligned<PortWork<Space, T>> ports;

@@ -15,7 +15,8 @@ using Eigen::VectorXd;
 
 template <class Space>
 Derivatives derivatives_under(const Mechanism<Space> &m, const Scene &scene, double t, const VectorXd &state,
-                              const VectorXd &forces, const VectorXd &target, const Workspace<Space, double> &w) {
+                              const VectorXd &forces, const VectorXd &target, const Workspace<Space, double> &w,
+                              bool by_forces) {
   VectorXd wrench = VectorXd::Zero(Space::dim * m.wrenches.size());
   VectorXd along_cuts = VectorXd::Zero(scene.cut_joints.size());
   for (const PointLoad &load : scene.point_loads)
@@ -24,7 +25,7 @@ Derivatives derivatives_under(const Mechanism<Space> &m, const Scene &scene, dou
     along_cuts[load.joint] += load.share * load.magnitude(t).value;
   return derivatives(m, w, state.data(), state.data() + m.n_q, Forces<double>{forces.data(), wrench.data()},
                      {scene.cut_joints, along_cuts.data(), scene.point_forces, t, NaturalSizes<Space>(m).length()},
-                     target.data());
+                     target.data(), by_forces);
 }
 
 template <class Space> MatrixXd mass_matrix(const double *q, NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
@@ -146,7 +147,7 @@ MatrixXd stiffness_at_rest(const Mechanism<Space> &m, const Scene &scene, double
 
 #define FFROBOT_INSTANTIATE(Space)                                                                                     \
   template Derivatives derivatives_under(const Mechanism<Space> &, const Scene &, double, const VectorXd &,            \
-                                         const VectorXd &, const VectorXd &, const Workspace<Space, double> &);        \
+                                         const VectorXd &, const VectorXd &, const Workspace<Space, double> &, bool);  \
   template MatrixXd mass_matrix(const double *, NewtonEuler<Space> &, Workspace<Space, double> &);                     \
   template ForcesAtRest forces_at_rest(const Mechanism<Space> &, const Scene &, double, const VectorXd &,              \
                                        Workspace<Space, double> &);                                                    \

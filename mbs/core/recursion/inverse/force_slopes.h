@@ -13,7 +13,7 @@ namespace ffrobot::recursion {
 template <class Space>
 Derivatives derivatives_under(const Mechanism<Space> &m, const Scene &scene, double t, const Eigen::VectorXd &state,
                               const Eigen::VectorXd &forces, const Eigen::VectorXd &target,
-                              const Workspace<Space, double> &w);
+                              const Workspace<Space, double> &w, bool by_forces = false);
 
 // M (n_v, n_v) at the state q of a prepare(); multipliers and loads are nothing to it.
 template <class Space>
