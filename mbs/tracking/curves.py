@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import product
 from math import factorial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from ...common.arrays import Array, Indices
 from ...common.libraries import scipy
 from ...common.structs import struct
 from ..inversion.collocation import GAUSS
-
-if TYPE_CHECKING:
-    pass
 
 
 @struct

@@ -3,9 +3,9 @@
     min  Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k        z_k = (x_k, the first r of x_{k+1}),  k = 0 … N−1
     with F_k x_k + G_k x_{k+1} = c_k,   R_0 x_0 = e_0,   R_N x_N = e_N,   C_k z_k ≤ d_k
 
-Predictor and corrector are Mehrotra's (Nocedal and Wright, *Numerical Optimization*, ch. 16.6). Newton's equations in
-the order (R_0, x_0, λ_0, x_1, λ_1 …) are banded, and factorized with pivoting: growing and decaying solutions side by
-side need it.
+Predictor and corrector are Mehrotra's (Nocedal and Wright, *Numerical Optimization*, ch. 16.6), with further
+correctors for longer steps (Gondzio, Comput. Optim. Appl. 6, 1996). Newton's equations in the order (R_0, x_0, λ_0,
+x_1, λ_1 …) are banded, and factorized with pivoting: growing and decaying solutions side by side need it.
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
 GAP = 1e-9  # of the objective: closer, weights of dependent limits spoil the factors
 STATIONARY = 1e-8  # of the Lagrangian's gradient, relative to its terms
 EXACT = 1e-12  # of what Newton's equations contain: that may be left
-HALFWAY = 1e-3  # of the objective: the gap where a similar program begins
+HALFWAY = 1e-5  # of the objective: the gap where a similar program begins
 BACK = 0.995  # of the way to the nearest bound
+CORRECTORS, LONGER = 2, 0.3  # at most, and by how much each is to lengthen the step
+SPREAD = 10.0  # of slack × z about their target, which no corrector changes
 
 
 @struct
@@ -109,9 +111,9 @@ class _Band:
 
     def factorize(self, W: Array) -> bool:
         """Factors of [H + CᵀWC, Aᵀ; A, 0] in the place of those before; False where it is singular."""
-        self.factors[...] = self.ab
-        self._add_costs(self.factors, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
         b = self.layout.band
+        self.factors[b:] = self.ab[b:]  # but for the room
+        self._add_costs(self.factors, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
         self.factors, self.pivots, info = scipy.linalg.lapack.dgbtrf(self.factors, b, b, overwrite_ab=True)
         return bool(info == 0)
 
@@ -209,8 +211,17 @@ class _CentralPath:
         after = float(((slack + ways[0] * d_slack) * (z + ways[1] * dz)).sum()) / self.count
         target = self.gap * (after / self.gap) ** 3 if self.gap else 0.0
         target = max(target, 0.5 * self.relative_gap * self.size() / self.count)  # less spoils the factors' weights
-        dx, d_slack, dz = self._toward(slack * z + d_slack * dz - target)
-        step = min(1.0, BACK * min(_way(slack, d_slack), _way(z, dz)))
+        products, step = slack * z + d_slack * dz - target, -1.0
+        for _ in range(1 + CORRECTORS):
+            toward = self._toward(products)
+            way = min(1.0, BACK * min(_way(slack, toward[1]), _way(z, toward[2])))
+            if way <= step:
+                break
+            step, (dx, d_slack, dz) = way, toward
+            longer = min(1.0, step + LONGER)
+            reached = (slack + longer * d_slack) * (z + longer * dz)
+            most = SPREAD * target
+            products += np.minimum(reached - reached.clip(target / SPREAD, most), most)
         self.unknown, self.slack, self.z = self.unknown + step * dx, slack + step * d_slack, z + step * dz
         self._look()
         return True

@@ -26,7 +26,6 @@ import numpy as np
 from ...common.arrays import Array
 from ..inversion.collocation import GAUSS
 from ..inversion.zero_dynamics import shape_along
-from .interior_point import GAP
 from .steps import TOLERANCE, Iterate, Steps
 from .transition import Tracked, Transition
 
@@ -67,7 +66,6 @@ def track(
         K = near.curve(flat, 2).reshape(K.shape)
     steps = Steps(asked, breaks, tau_qs, size)
     steps.tolerance = within if calm is None else max(within, WHILE_SETTLING)
-    steps.gap = GAP if calm is None else ROUGH_GAP
     e = np.zeros((N + 1, 3 * asked.errors))
     if near is not None and near.error is not None:
         e = np.hstack([near.error(breaks, order) for order in (2, 0, 1)])
@@ -78,7 +76,7 @@ def track(
     if calm is not None:
         middle = 0.5 * (breaks[1:] + breaks[:-1])
         away = asked.rate * np.minimum(middle - breaks[0], breaks[-1] - middle)
-        steps.unique, steps.of_voltages = calm, np.minimum(1.0, calm * np.exp(away)) / calm
+        steps.gap, steps.unique, steps.of_voltages = ROUGH_GAP, calm, np.minimum(1.0, calm * np.exp(away)) / calm
         return _newton(steps, start, FEWEST_ITERATIONS).tracked(steps)
     last = _newton(steps, start, FEWEST_ITERATIONS if steps.has_share else MOST_ITERATIONS)
     if steps.has_share and not last.converged:

@@ -205,18 +205,13 @@ class Steps:
 
     def _torques(self, tau: Array, slopes: list[Array], moved: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
         """τ (N, s, motors) at stages once K has `moved`, and its derivatives (N, s, motors, width + m) by z."""
-        starts, K_z = by_z
-        h = self.h[:, None, None, None]
-        once, twice = (np.einsum("ij,Nj...->Ni...", a, K_z) for a in (GAUSS.stage_once, GAUSS.stage_twice))
-        p_z = starts[0] + GAUSS.c[:, None, None] * h * starts[1] + h**2 * twice
-        v_z = starts[1] + h * once
-        h = h[..., 0]
-        once, twice = (np.einsum("ij,Nj...->Ni...", a, moved) for a in (GAUSS.stage_once, GAUSS.stage_twice))
-        found = np.zeros((*tau.shape, len(self.unit_z)))
-        for by, of_z, of_moved in zip(slopes[::-1], (p_z, v_z, K_z), (h**2 * twice, h * once, moved), strict=True):
-            found = found + by @ of_z
-            tau = tau + np.einsum("Nstn,Nsn->Nst", by, of_moved)
-        return tau, found
+        h, with_moved = self.h[:, None, None, None], np.concatenate([by_z[1], moved[..., None]], axis=3)
+        p_0, v_0 = np.pad(by_z[0], ((0, 0), (0, 0), (0, 1)))
+        once, twice = (np.einsum("ij,Nj...->Ni...", a, with_moved) for a in (GAUSS.stage_once, GAUSS.stage_twice))
+        p_z = p_0 + GAUSS.c[:, None, None] * h * v_0 + h**2 * twice
+        by_K, by_v, by_p = slopes
+        found = by_p @ p_z + by_v @ (v_0 + h * once) + by_K @ with_moved
+        return tau + found[..., -1], found[..., :-1]
 
     def _charges(self, v: Array, K: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
         """Φ_Vᵀ ṗ (N, 5, m), A, by Bernstein's coefficients, which bound it between breaks, and its derivatives by z."""
