@@ -322,8 +322,8 @@ def _followed(
     """Where the tip went against where it should be; `quiet` as there."""
     assert isinstance(run.analysis, ClosedLoop)
     model = run.model
-    columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
-    rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
+    signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
+    rates = signs * run.v[:, model.motor_columns]
     error = _position(model, run.q, tip) - place_at(run.time)
     completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
     motion = run.time, error, place_at, rates, held(run.time)

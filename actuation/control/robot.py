@@ -48,7 +48,7 @@ class RigidArm:
     """
 
     def __init__(self, model: Model, q: Array) -> None:
-        freedom, count = rigid_freedom(model), sum(len(columns) for columns in model.motors.values())
+        freedom, count = rigid_freedom(model), len(model.motor_columns)
         if count != freedom:
             raise InputError(
                 f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them)",

@@ -146,8 +146,7 @@ class _Runs:
         rigid = np.diag(np.linalg.inv(arm.terms(angles, np.zeros_like(angles))[0]))
         mobility = model.by_motor(rigid)
         geared, start = self._geared(model)
-        columns = np.concatenate([*geared.motors.values()]).astype(int)
-        giving = np.diag(np.linalg.inv(mass_matrices(geared, start.q[None])[0]))[columns]
+        giving = np.diag(np.linalg.inv(mass_matrices(geared, start.q[None])[0]))[geared.motor_columns]
         squares = [float(node.body.stiffness.min()) for node in model.tree.nodes if node.body.n_modes]
         squares += [min(gear.spring.slopes) * mobility[gear.joint.joint.name].max() for gear in geared.tree.gears]
         slow_enough = SAMPLED * float((rigid / giving).min())

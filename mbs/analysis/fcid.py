@@ -92,7 +92,7 @@ class Fcid(TimedAnalysis):
             return _core.SpatialPrescribedMotion(driven_mechanism(model), q)
 
         began = time.perf_counter()
-        has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
+        has_motors = len(model.motor_columns) == freedom
         motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
 
         def at(times: Array) -> Run:

@@ -225,7 +225,7 @@ def _check_motors(model: Model, analysis: Forward, q: Array) -> None:
         raise InputError(
             f'{key}: expected joints with motors for "{analysis.apply}"', "none: name them with motor = true"
         )
-    count, freedom = sum(map(len, model.motors.values())), mobility(model, q).freedom
+    count, freedom = len(model.motor_columns), mobility(model, q).freedom
     if model.scene.is_planar and count != freedom:
         raise InputError(
             f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}"',

@@ -179,8 +179,10 @@ def make_servo(
     held = replace(model, rows=rows)
     start = undeformed_posture(held).q
     freedom = mobility(held, start).freedom
-    motors = sum(len(columns) for columns in model.motors.values())
-    for count, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
+    for count, what in (
+        (len(model.motor_columns), "motors"),
+        (np.count_nonzero(~model.loop_rows), "trajectory components"),
+    ):
         if count != freedom:
             raise InputError(
                 f'{where}: expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom'

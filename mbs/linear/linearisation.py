@@ -245,7 +245,7 @@ def _coordinates(model: Model) -> tuple[list[str], Array]:
 def _independent(model: Model, q: Array) -> Indices:
     """Where s is in v: motors first, then other joints, then modes."""
     modes = np.flatnonzero(~model.tree.joint_columns)
-    motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
+    motors = model.motor_columns
     others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
     (left,) = model.constraints.natural_gradients(q[None], np.zeros(1), model.natural_sizes)
     size, free = np.abs(left).max(initial=0.0), []

@@ -115,8 +115,7 @@ class PoseEvaluator:
 
     def _equilibrium(self, q: Array) -> tuple[LinearMechanism, Array]:
         """The linear equations in the equilibrium near q (n_q,) with motors locked, and its coordinates."""
-        rest, motors = np.zeros(self.model.tree.n_v), [*self.model.motors.values(), np.zeros(0, dtype=np.intp)]
-        bent = self._statics.equilibrium(q, np.concatenate(motors))
+        rest, bent = np.zeros(self.model.tree.n_v), self._statics.equilibrium(q, self.model.motor_columns)
         mechanism = self._linear.at(0.0, bent, rest, rest)
         K = free_coordinates(mechanism, COMPLIANT if self.model.tree.gears else LOCKED).K
         values = np.linalg.eigvalsh(K)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans
+from ...common.arrays import Array, Booleans, Indices
 from ...common.structs import struct
 from ..scene.mechanism import MechanismScene
 from .constraints import Constraints
@@ -49,6 +49,11 @@ class Model:
     def motors(self) -> dict[str, Array]:
         """Indices in v of motor coordinates by joint, in the scene's order."""
         return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
+
+    @property
+    def motor_columns(self) -> Indices:
+        """Indices in v of all motor coordinates."""
+        return np.array([column for columns in self.motors.values() for column in columns], dtype=np.intp)
 
     def by_motor(self, values: Array) -> dict[str, Array]:
         """Return columns of `values` (…, motors and any others) by joint with motors."""

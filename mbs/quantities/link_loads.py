@@ -101,8 +101,7 @@ def _of_mass(run: Run, payload: Payload) -> Array:
 def _with_motors(run: Run) -> MotionForces:
     """Where motors carry the motion, without forces on its paths: these stay where the motors do not fit."""
     model = run.model
-    loops, motors = int(model.loop_rows.sum()), sum(len(columns) for columns in model.motors.values())
-    if not run.is_prescribed or loops + motors != int(model.tree.joint_columns.sum()):
+    if not run.is_prescribed or model.loop_rows.sum() + len(model.motor_columns) != int(model.tree.joint_columns.sum()):
         return acting_forces(behind_gears(run))
     total = required_forces(model, run, run.time)
     multipliers = np.zeros_like(run.multipliers)

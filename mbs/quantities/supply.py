@@ -18,7 +18,6 @@ from ..model.motors import MotorForces
 from ..posture.posture import mobility
 from ..run.gears import Supplied, supplied_through_gears, with_motors
 from ..run.record import GearMotion, Run
-from ..run.replay import supplied_in
 from ..scene.trajectories import Trajectory
 from .motion import system_of
 
@@ -61,14 +60,13 @@ def motor_moments(run: Run) -> Mapping[str, Array]:
 def _supplied(run: Run) -> Supplied | None:
     if not run.is_prescribed or (run.space.is_plane and not motors_fit(run)):
         return None
-    return supplied_through_gears(run.model, run, run.time, supplied_in(run), run.twists or None)
+    return supplied_through_gears(run)
 
 
 @kept
 def motors_fit(run: Run) -> bool:
     """Whether there are as many as the mechanism has degrees of freedom with rigid links."""
-    count = sum(map(len, run.model.motors.values()))
-    return len(run.time) > 0 and count == mobility(run.model, run.q[0]).freedom
+    return len(run.time) > 0 and len(run.model.motor_columns) == mobility(run.model, run.q[0]).freedom
 
 
 def gear_motions(run: Run) -> Mapping[str, GearMotion]:
