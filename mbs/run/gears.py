@@ -41,33 +41,31 @@ class Supplied(NamedTuple):
     gears: Mapping[str, GearMotion]  # by joint with such a gear
 
 
-def supplied_through_gears(
-    model: Model, state: States, time: Array, wanted: Array, twists: Mapping[str, GearCurve] | None = None
-) -> Supplied:
-    """Return motor and modal forces of the motion `state` at `time` (T,); rigid gears need `wanted` (T, n_v).
+def supplied_through_gears(run: Run) -> Supplied:
+    """Return motor and modal forces of a run.
 
     Compliant gears let their rotors turn by N δ more. Then the rotor needs J N² δ̈ of its motor, and
     the body that carries it, which turns with Ω_a, the moment J N (δ̈ z + δ̇ Ω_a × z): the rate of J N δ̇ z. That is
     shared among motors and modes as all else. Moments in front of one gear contain what others add: all follow again,
-    gear by gear inwards, and until they repeat. `twists`: δ(t) by joint where they are known; with
-    torques, nothing else counts.
+    gear by gear inwards, and until they repeat. Where the run knows twists and torques, nothing else counts.
 
     Raises `InputError` for such a joint without a motor, or with a load.
     """
+    model, time, wanted, twists = run.model, run.time, supplied_in(run), run.twists
     felt = np.zeros_like(wanted)
     elastic = [] if model.tree.gears else elastic_joints(model)
     if not elastic:
-        return Supplied(motor_forces(model, state.q, wanted), {})
+        return Supplied(motor_forces(model, run.q, wanted), {})
     _refuse_loads(model, elastic)
-    compliant, torques = with_compliance(model), rotor_torques(model, state, time)
-    rigid = required_forces(compliant, _in_motor_coordinates(compliant, state, None), time)
-    is_found, change = twists is not None and all(of.torque is not None for of in twists.values()), np.inf
+    compliant, torques = with_compliance(model), rotor_torques(model, run, time)
+    rigid = required_forces(compliant, _in_motor_coordinates(compliant, run, None), time)
+    is_found, change = bool(twists) and all(of.torque is not None for of in twists.values()), np.inf
     for passes in count(1):
-        forces = motor_forces(model, state.q, wanted + felt)
+        forces = motor_forces(model, run.q, wanted + felt)
         gears = {
             node.joint.name: _gear(
                 model=model,
-                state=state,
+                state=run,
                 time=time,
                 node=node,
                 torque=torques[:, model.tree.index[node.body.name]],
@@ -78,7 +76,7 @@ def supplied_through_gears(
         }
         if is_found:
             break
-        needed = required_forces(compliant, _in_motor_coordinates(compliant, state, gears), time) - rigid
+        needed = required_forces(compliant, _in_motor_coordinates(compliant, run, gears), time) - rigid
         before, felt = felt, needed[:, : felt.shape[1]]
         for gear in compliant.tree.gears:  # but for what their springs do along their own joints
             of = gears[gear.joint.joint.name].twist
@@ -108,14 +106,14 @@ def _gear(
     node: Node,
     torque: Array,
     forces: MotorForces,
-    twists: Mapping[str, GearCurve] | None,
+    twists: Mapping[str, GearCurve],
 ) -> GearMotion:
     """Of the gear in the joint of `node`, whose rotor takes `torque` (T,), J u̇, where it is rigid."""
     joint, (inertia, N) = node.joint.name, rotor(node)
     where = f'{model.scene.path}: joint "{joint}"'
     spring = GearSpring(*(compliance(node) or (TwistSpring((np.inf,)), 0.0)), inertia * N**2, where)
-    curve = None if twists is None else twists[joint]
-    return gear_motion(spring, time, forces.moments[joint][:, 0], N * torque, _along(node, state), curve)
+    moment, along = forces.moments[joint][:, 0], _along(node, state)
+    return gear_motion(spring, time, moment, N * torque, along, twists.get(joint))
 
 
 def _along(node: Node, state: States) -> Array:
@@ -158,7 +156,7 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
             f" linearized and modes tilt the joint's axis ({quoted(sorted(turning))})",
             '"frame"',
         )
-    forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run), run.twists or None)
+    forces, gears = supplied_through_gears(run)
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
     return MotorCoordinates(q, v, a, gears, forces.moments)
 
