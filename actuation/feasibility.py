@@ -16,7 +16,7 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.motors import split_forces
-from ..mbs.quantities.motion import modal_coordinates, node_of, reported_points
+from ..mbs.quantities.motion import modal_coordinates, node_of, point_names
 from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis
@@ -421,7 +421,7 @@ def find_unsupplied(
     if not (motors_fit(run) and links.keys() <= run.model.tree.index.keys()):
         return about  # motors do not say where points are, or links are in pieces
     followed = [path.point for path in run.model.scene.trajectory if path.point is not None]
-    points = followed or [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
+    points = followed or point_names(run)
     return seen_at_points(about, run, find_unmet(links, patches, voltages, limited=True), points)
 
 

@@ -159,7 +159,7 @@ def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]
         begin = begin if entries else place
         entries += row
         if len(entries) > length:
-            raise InputError(f"{begin}: expected {length - 1} nodes of an element", len(entries) - 1)
+            break
         if len(entries) == length:
             yield entries, begin
             entries = []

@@ -211,9 +211,13 @@ def _check_inertia(body: ModalBody) -> None:
     relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
     matrices = {"second_moment, as inertia about the center of mass": about_center, "modal_mass, less S_bar": relative}
     for name, matrix in matrices.items():
-        lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
-        if lowest < -POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0):
-            _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+        _check_positive(body, name, matrix, POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0))
+
+
+def _check_positive(body: ModalBody, name: str, matrix: Array, round_off: float) -> None:
+    lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
+    if lowest < -round_off:
+        _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
 
 
 def _check_spin(body: ModalBody) -> None:
@@ -233,9 +237,7 @@ def _check_spin(body: ModalBody) -> None:
         "S_bar_kl[2, 2], less S_spin": body.S_bar_kl[2, 2] - S,
     }
     for name, matrix in matrices.items():
-        lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
-        if lowest < -IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0):
-            _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+        _check_positive(body, name, matrix, IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0))
 
 
 def _check_interfaces(body: ModalBody) -> None:

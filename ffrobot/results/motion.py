@@ -11,7 +11,7 @@ from ..common.arrays import Array, Indices
 from ..common.hdf5 import fields_in
 from ..common.meanings import write_record
 from ..mbs.model.truncation import modes_kept
-from ..mbs.quantities.motion import body_motion, joint_motion, plane_angle, point_motion, reported_points
+from ..mbs.quantities.motion import body_motion, joint_motion, plane_angle, point_motion, point_names, reported_points
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
 from ..mbs.scene.trajectories import Trajectory
@@ -58,7 +58,7 @@ def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) 
 def write_points(group: h5py.Group, result: AnalysisResult) -> None:
     """Write points/ of an analysis, except quantities with peaks."""
     run = result.run
-    for place in (f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels):
+    for place in point_names(run):
         if result.wants(f"points/{place}"):
             for key, values in point_motion(run, place).within(run.space).datasets.items():
                 if key != "deflection":  # which has peaks

@@ -25,7 +25,7 @@ from ..mbs.quantities.attachment_error import (
     start_jolt,
     start_of_motion,
 )
-from ..mbs.quantities.motion import reported_points
+from ..mbs.quantities.motion import point_names, reported_points
 from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
@@ -226,7 +226,7 @@ class AnalysisResult:
             return {}
         from ..actuation.feasibility import quasi_static_shift
 
-        points = [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
+        points = point_names(run)
         if (whole := make_whole_links(self.prepared)) is not None:
             try:
                 run = whole.as_links(run)

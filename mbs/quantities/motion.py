@@ -80,6 +80,11 @@ def reported_points(run: Run) -> dict[str, tuple[str, ...]]:
     return points
 
 
+def point_names(run: Run) -> list[str]:
+    """The reported sections, as "BODY.POINT"."""
+    return [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
+
+
 def node_of(run: Run, body: str) -> Node:
     """The node of a body."""
     return run.model.tree.nodes[run.model.tree.index[body]]

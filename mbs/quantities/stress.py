@@ -153,16 +153,18 @@ def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
         points[name] = PointStress(stress, von_mises(stress))
     surface = None
     if body.surface_stress is not None:
-        cases = _cases(body, recovery, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
-        surface = _surface(cases, body.mesh.points, recovery.cases)
+        surface = _surface(_surface_cases(body, recovery), body.mesh.points, recovery.cases)
     return BodyStress(points, surface, recovery)
 
 
 def surface_stress(body: ModalBody, recovery: Recovery) -> Array:
     """Return stresses (T, p, 6), Pa, body axes, on the surface of a body whose file has surface stresses."""
+    return np.asarray(np.einsum("pin,tn->tpi", _surface_cases(body, recovery), recovery.cases, optimize=True))
+
+
+def _surface_cases(body: ModalBody, recovery: Recovery) -> Array:
     assert body.surface_stress is not None
-    cases = _cases(body, recovery, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
-    return np.asarray(np.einsum("pin,tn->tpi", cases, recovery.cases, optimize=True))
+    return _cases(body, recovery, body.mesh.points[:, 0], body.surface_stress, body.surface_static)
 
 
 def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: Array | None) -> Array:
