@@ -1,8 +1,9 @@
-"""The version of the program, and of its code."""
+"""The version of the program, and hashes of its code and of what files contain."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 from functools import cache
 from pathlib import Path
 
@@ -17,3 +18,8 @@ def digest_of_code(folder: Path) -> str:
     for file in sorted(folder.rglob("*.py")):
         digest.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
     return digest.hexdigest()
+
+
+def digest_of_content(content: object) -> str:
+    """SHA-256 of nested tables and lists, independent of the order of keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()

@@ -11,8 +11,6 @@ Importing this loads no finite element library; they are loaded where a link mus
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -31,7 +29,7 @@ from ..common.interrupts import deferred_interrupts, ending_at_once
 from ..common.parallel import is_apart, on_first, processes, without_daemon
 from ..common.structs import struct
 from ..common.validation import plain
-from ..common.version import digest_of_code
+from ..common.version import digest_of_code, digest_of_content
 from ..mesh.kept_parts import digest_of_mesh_code, geometry_content, kept_path
 from .link_file import read_link
 from .link_records.families import FAMILIES
@@ -282,7 +280,7 @@ def _content(link: Link) -> dict[str, Any]:
 
 def _digest(record: Mapping[str, Any]) -> str:
     content = {"link": record, "fe_models": digest_of_code(Path(__file__).parent), "mesh": digest_of_mesh_code()}
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return digest_of_content(content)
 
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:

@@ -6,7 +6,6 @@ An entry is named by the content of the keys that define the mesh, the part's fi
 from __future__ import annotations
 
 import hashlib
-import json
 import zipfile
 from contextlib import suppress
 from dataclasses import asdict
@@ -19,7 +18,7 @@ import numpy as np
 from ..common.cache import cache_folder, is_own
 from ..common.errors import SolveError
 from ..common.files import write_atomically
-from ..common.version import digest_of_code
+from ..common.version import digest_of_code, digest_of_content
 from .cells import CELLS, CellName
 from .included import files_of
 from .records import PartTables, PlaceRecord, SolidGeometry
@@ -59,8 +58,7 @@ def kept_path(tables: PartTables) -> Path:
         "interfaces": [item.model_dump(mode="json", include=_OF_PLACES) for item in tables.places],
         "outlines": asdict(tables.outlines) if tables.outlines else None,
     }
-    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    return cache_folder("meshes") / f"{digest}.npz"
+    return cache_folder("meshes") / f"{digest_of_content(content)}.npz"
 
 
 def kept_part(path: Path) -> PartMesh | None:

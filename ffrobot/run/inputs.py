@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -13,7 +11,7 @@ from typing import Any
 from ..common.errors import InputError
 from ..common.python_files import sha256_of
 from ..common.toml_files import parse_toml, read_text
-from ..common.version import VERSION
+from ..common.version import VERSION, digest_of_content
 from ..mesh.included import files_of as files_with_included
 
 FILE_KEYS = {"link", "modal", "waypoints", "file", "python", "table", "repeat_steps"}
@@ -70,19 +68,14 @@ def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
     By the file's name, and `PROGRAM` for the version. TOML files count by their tables: comments change nothing.
     """
     files = dict.fromkeys(named_files(dict(scene), path.parent))
-    prints = {PROGRAM: VERSION, str(path): digest_of_tables(scene)}
+    prints = {PROGRAM: VERSION, str(path): digest_of_content(scene)}
     return prints | {os.path.normpath(file): digest_of_file(file) for file in files}
-
-
-def digest_of_tables(tables: Mapping[str, Any]) -> str:
-    """SHA-256 of the content of a TOML file, independent of the order of keys."""
-    return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def digest_of_file(path: Path) -> str:
     """SHA-256 of a file's content; "" where it cannot be read."""
     if path.suffix == ".toml" and (tables := read_tables(path)):
-        return digest_of_tables(tables)
+        return digest_of_content(tables)
     return sha256_of(path)
 
 

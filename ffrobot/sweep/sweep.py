@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import signal
@@ -21,6 +20,7 @@ from ..common.errors import InputError, StoppedError
 from ..common.files import check_folder, write_atomically
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import as_csv
+from ..common.version import digest_of_content
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, Value, Variation, grid, latin_hypercube, parse_variation, run_files
@@ -90,7 +90,7 @@ class Sweep:
         if not self.growing:
             return f"{number:04d}"
         changes = {".".join(key): value for key, value in self.changes(values).items()}
-        return hashlib.sha256(json.dumps(changes, sort_keys=True).encode()).hexdigest()[:16]
+        return digest_of_content(changes)[:16]
 
 
 def check_once(keys: Sequence[Key], option: str = "--vary") -> None:

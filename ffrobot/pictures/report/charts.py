@@ -36,12 +36,12 @@ class AnalysisRun(NamedTuple):
         return f"{self.source}: {self.analysis}" if self.source else self.analysis
 
 
-def sources(files: Sequence[Results]) -> list[str]:
-    """Return labels that distinguish the files: "" for one, names of their scenes, or the differing parts of paths."""
-    if len(files) == 1:
-        return [""]
-    names = [results.name for results in files]
-    return names if len(set(names)) == len(names) else distinct_parts([results.path for results in files])
+def labelled(files: Sequence[Results]) -> list[tuple[Results, str]]:
+    """Return the files with labels: "" for one, names of their scenes, or the differing parts of paths."""
+    names = [""] if len(files) == 1 else [results.name for results in files]
+    if len(set(names)) < len(names):
+        names = distinct_parts([results.path for results in files])
+    return list(zip(files, names, strict=True))
 
 
 def distinct_parts(paths: Sequence[Path]) -> list[str]:
@@ -62,9 +62,7 @@ def distinct_parts(paths: Sequence[Path]) -> list[str]:
 def runs(files: Sequence[Results]) -> list[AnalysisRun]:
     """Every analysis of every file, in order."""
     return [
-        AnalysisRun(results, analysis, source)
-        for results, source in zip(files, sources(files), strict=True)
-        for analysis in results.analyses
+        AnalysisRun(results, analysis, source) for results, source in labelled(files) for analysis in results.analyses
     ]
 
 
@@ -191,7 +189,7 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
     has_errors = bool(charts)
     looks = {(run.source, run.analysis): (k, _waiting(run)) for k, run in enumerate(runs(files))}
     together = len(looks) if len(files) > 1 else None
-    for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
+    for number, (results, source) in enumerate(labelled(files)):
         records = {record.name: record for record in standard_figures(results, together)}
         for record in records.values():
             if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories

@@ -24,7 +24,7 @@ from ...results.verdict import millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
 from ..studies.study import Study, read_study, study_files
-from .charts import AnalysisRun, Chart, folded, history_charts, path_error, runs, sources
+from .charts import AnalysisRun, Chart, folded, history_charts, labelled, path_error, runs
 from .mechanism import link_modes, mechanism, surface_modes
 
 
@@ -111,7 +111,7 @@ def _peaks(run: AnalysisRun) -> Iterator[tuple[str, str, float]]:
 def origins_table(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> Table:
     """Files, hashes and versions that the page rests on."""
     rows = []
-    for results, source in zip(files, sources(files), strict=True):
+    for results, source in labelled(files):
         rows.append((source or results.name, "results", str(results.path), _sha256(results.path.read_bytes())))
         rows.append(("", "written by", f"ffrobot {results.ffrobot_version}", ""))
         rows.append(("", "scene text", results.name, _sha256(results.scene_text.encode())))
@@ -240,7 +240,7 @@ def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) ->
         "studies": [_study_part(study) for _, study in studies],
         "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
         "origins": origins_table(files, studies),
-        "scenes": [(source or r.name, r.scene_text) for r, source in zip(files, sources(files), strict=True)],
+        "scenes": [(source or r.name, r.scene_text) for r, source in labelled(files)],
         **solved,
     }
 
@@ -282,7 +282,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "verdicts": [_verdict(run) for run in all_runs],
         **{name: table(all_runs) for name, table in TABLES.items()},
         "notes": notes,
-        "skipped": [(source, line) for r, source in zip(files, sources(files), strict=True) for line in r.skipped],
+        "skipped": [(source, line) for r, source in labelled(files) for line in r.skipped],
     }
     return content, [*histories, *(chart for link in modes for chart in link.charts)]
 
