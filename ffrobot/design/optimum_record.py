@@ -322,9 +322,9 @@ class Optimum(Finding):
         return f"{near} of {len(self.searches)} end at this value, within {AIM:g}; the worst at {worst:.6g}"
 
     def _standing(self) -> str:
-        if self.optimality is None:
-            return "the best of the designs that were tried"
         stands = self.optimality
+        if stands is None or not self.feasible:
+            return "the best of the designs that were tried"
         return (
             f"{'converged' if self.converged else 'not converged'}: the gradient of the Lagrangian is"
             f" {stands.residual:.1g} of the objective over the range of a parameter,"
