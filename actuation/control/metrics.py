@@ -239,18 +239,19 @@ def verdict_of(
 
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
     decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without
-    disturbance, or of the time in which nothing changes, or what is `asked` then, by samples (K,) in s and the largest
-    of their commands (K,), of the largest of all; "unstable (linear)"; "not settled": in that time the tip does not
-    come to rest, though sensors are exact; else "stable".
+    disturbance (of its path and of the rest after it), or of the time in which nothing changes, or what is `asked`
+    then, by samples (K,) in s and the largest of their commands (K,), of the largest of all; "unstable (linear)"; "not
+    settled": in that time the tip does not come to rest, though sensors are exact; else "stable".
     """
     if not run.completed:
         return "diverges"
     even = np.linspace(run.time[0], run.time[-1], len(run.time))
     error, whole = _interpolated(even, run.time, run.error) / run.length, float(np.ptp(even))
     window = min(max(WINDOW * whole / len(cut), PERIODS / lowest if lowest > 0.0 else 0.0), whole / 4)
-    shaking = np.linalg.norm(error - slow_part(even, error, window), axis=1)
-    off = np.linalg.norm(error - error[-1], axis=1)
     still = even >= run.quiet
+    parts = [part for part in (~still, still) if part.any()]  # the place of the tip may jump in between
+    shaking = np.concatenate([_shaking(even[part], error[part], window) for part in parts])
+    off = np.linalg.norm(error - error[-1], axis=1)
     is_quiet = even[-1] - run.quiet >= RESTING * whole
     third, fourth = (shaking[even >= even[-1] - part * whole].max(initial=0.0) for part in (1 / 4, 1 / 8))
     last = cut[3 * len(cut) // 4 :]
@@ -258,7 +259,8 @@ def verdict_of(
     alternates = all((half.min(axis=0) * half.max(axis=0) < 0.0).any() for half in np.array_split(last, 2) if len(half))
     if is_cut and (alternates or fourth > max(KEPT * third, NEGLIGIBLE * off.max(initial=0.0))):
         return "oscillates at its limits"
-    if (not run.is_disturbed and _grows(shaking)) or (
+    long = [part for part in parts if part.mean() >= RESTING]
+    if (not run.is_disturbed and all(_grows(shaking[part], GROWTH ** part.mean()) for part in long)) or (
         is_quiet and (_grows(shaking[still]) or _grows(asked[1][asked[0] >= run.quiet]))
     ):
         return "grows"
@@ -271,6 +273,11 @@ def verdict_of(
     return "stable" if is_settled or not is_quiet or not is_seen else "not settled"
 
 
-def _grows(shaking: Array) -> bool:
+def _shaking(t: Array, error: Array, window: float) -> Array:
+    """Size (T,) of the vibration in `error` (T, d)."""
+    return np.linalg.norm(error - slow_part(t, error, min(window, float(np.ptp(t)) / 4)), axis=1)
+
+
+def _grows(shaking: Array, growth: float = GROWTH) -> bool:
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]
-    return bool(quarters[1] < quarters[2] < quarters[3] and quarters[3] > max(GROWTH * quarters[1], ROUND_OFF))
+    return bool(quarters[1] < quarters[2] < quarters[3] and quarters[3] > max(growth * quarters[1], ROUND_OFF))

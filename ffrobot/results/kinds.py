@@ -76,7 +76,7 @@ def _first_gains(about: About, is_judged: bool) -> Iterator[str]:
 
 
 def _loop_verdict(about: About) -> str:
-    at_limits = f", {100 * about['saturated']:.2g} % of the samples saturated" if about["saturated"] else ""
+    at_limits = f", {100 * about['saturated']:.3g} % of the samples saturated" if about["saturated"] else ""
     most, rms = (millimeters(about[f"tip_error_{key}"]) for key in ("max", "rms"))
     is_settled = about["verdict"] == "stable" and np.isfinite(about["settling_time"])
     alone = "" if "spectral_radius" in about else ", by the run alone"

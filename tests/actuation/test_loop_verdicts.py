@@ -6,6 +6,7 @@ from rewritten_scenes import SYSTEMS, scaled
 from scipy.linalg import expm, solve_discrete_are
 
 import ffrobot
+from ffrobot.actuation.control.metrics import LoopMotion, verdict_of
 
 ARM, END, STANDARD = 0.3, 2.0, 10  # m from joint to tip; s; loops that are tried every time
 UNSTABLE = {"unstable (linear)", "grows", "oscillates at its limits", "diverges"}
@@ -245,3 +246,16 @@ def test_loops_that_grow_beyond_all_numbers_are_judged_without_a_word_of_numpy(r
     )  # fmt: skip
     assert not [str(one.message) for one in recwarn if issubclass(one.category, RuntimeWarning)]
     assert results.attributes("l/control")["verdict"] == verdict
+
+
+@pytest.mark.parametrize(("grows", "verdict"), [(False, "stable"), (True, "grows")])
+def test_tips_that_ring_from_the_end_of_their_path_on_are_no_loops_that_grow(grows, verdict):
+    """The final position is the place of a tip from then on, which rings in the inverse analysis as well."""
+    t = np.linspace(0.0, 2.0, 4001)
+    size = 1e-6 * np.exp(3.0 * t) if grows else np.where(t < 1.0, 1e-6, 1e-3 + 1e-4 * t)
+    run = LoopMotion(
+        time=t, error=(size * np.sin(60.0 * t))[:, None], place_at=lambda t: np.minimum(t, 1.0)[:, None],
+        rates=np.zeros((4001, 1)), held=np.zeros((4001, 1)), completed=True, is_disturbed=False, quiet=1.0, length=1.0,
+    )  # fmt: skip
+    samples = t[::2], np.zeros(2001)
+    assert verdict_of(run, np.zeros((2001, 1)), samples, 10.0, None, is_seen=False) == verdict
