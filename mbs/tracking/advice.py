@@ -245,16 +245,16 @@ def check_ends_for_gears(servo: Servo) -> float:
 def singular_times(servo: Servo, linear: Linearisation) -> Iterator[str]:
     """Yield where the modal inertia with free motors changes its sign, and the remedy.
 
-    That is a rotor without which its sign stays, or else less mass.
+    That is a rotor without which its sign stays, or else less mass; other modes may help.
     """
     for k in linear.singular_after[:1]:
         names = [node.joint.name for node in servo.model.tree.nodes if rotor(node)[0]]
         without = {name: replace(servo, model=without_rotor(servo.model, name)) for name in names}
         rotors = [name for name, other in without.items() if not linearise(other, servo.end).singular_after]
-        remedy = f"Reduce rotor_inertia of {' or '.join(rotors)}" if rotors else "Put less mass behind flexible links"
+        remedy = f"Reduce rotor_inertia of {' or '.join(rotors)}" if rotors else "Put less mass on links, say a third"
         yield (
             f"between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s a zero of the modes passes through"
-            f" infinity, where the search need not converge. {remedy}, or take another number of modes in link files"
+            f" infinity, where the search need not converge. {remedy}, or try another number of modes in link files"
         )
 
 
