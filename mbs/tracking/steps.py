@@ -21,13 +21,14 @@ POWERS = np.arange(2, len(GAUSS.c))
 CURVATURE = (GAUSS.c[:, None] ** (POWERS - 2) * POWERS * (POWERS - 1)) @ GAUSS.to_powers[2:]
 # of a polynomial's integral by its values at the Gauss points, five coefficients by four
 BERNSTEIN = bernstein_integral(GAUSS)
-FIFTHS = np.linspace(0.0, 1.0, len(BERNSTEIN))
-# Bernstein's coefficients of a polynomial by its values at `FIFTHS`
-OF_FIFTHS = np.linalg.inv(np.array([[comb(4, k) * x**k * (1 - x) ** (4 - k) for k in range(5)] for x in FIFTHS]))
-# likewise of a cubic on both halves of an interval, without the last one, which is the first of the next half
-THIRDS = np.linspace(0.0, 1.0, 4)
-OF_THIRDS = np.linalg.inv(np.array([[comb(3, k) * x**k * (1 - x) ** (3 - k) for k in range(4)] for x in THIRDS]))[:3]
-HALVES, OF_HALVES = np.concatenate([THIRDS, 1.0 + THIRDS]) / 2, np.kron(np.eye(2), OF_THIRDS)
+FIFTHS, THIRDS = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4)
+# Bernstein's coefficients of polynomials by their values there
+OF_FIFTHS, OF_THIRDS = (
+    np.linalg.inv(np.array([[comb(m, k) * x**k * (1 - x) ** (m - k) for k in range(m + 1)] for x in at]))
+    for m, at in ((4, FIFTHS), (3, THIRDS))
+)
+# of a cubic on both halves of an interval, without the last one, which is the first of the next half
+HALVES, OF_HALVES = np.concatenate([THIRDS, 1.0 + THIRDS]) / 2, np.kron(np.eye(2), OF_THIRDS[:3])
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
 BEND = 1e-5  # of the square of ë, relative to its limit, in the objective: it makes e unique, and smooth
 
