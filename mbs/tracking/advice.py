@@ -24,6 +24,7 @@ from .transition import Tracked, Transition
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6
+ROUGHLY = 0.1  # change of the least share by finer intervals, which only lower it: what is advised does
 NEAR_END = 1e-3  # of the path's time, of its start and of its end, for derivatives there
 FAR = 0.1  # of the time constant of the slowest zero: t_ℓ of patches whose voltages need not converge with modes
 INVERTED = 1e-6  # tolerance of stable inversion
@@ -178,7 +179,7 @@ def slowest(zeros: ComplexArray) -> float:
 
 
 def _share(servo: Servo, asked: Transition, breaks: Array) -> float:
-    least = settled(asked, breaks, servo.goes_on)
+    least = settled(asked, breaks, servo.goes_on, ROUGHLY)
     return least.share if least.converged and servo.goes_on() else np.nan
 
 

@@ -64,29 +64,31 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
     return float(unmet.max()), np.maximum(unmet, beyond).reshape(len(breaks) - 1, -1).max(axis=1) / tolerance
 
 
-def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tracked:
-    """The least voltage, on intervals that are halved where V or ë turns until that changes it by at most `SETTLED`.
+def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool], to: float = SETTLED) -> Tracked:
+    """The least voltage, on intervals that are halved where V or ë turns until that changes it by at most `to`.
 
     Both are linear on each interval: finer ones allow more of them, so that the least share falls. Where steps wander,
     more of the effort joins it, on intervals that are all halved. All that converge count, and the least one is taken;
     where much is `LOST` between Gauss points it is no motion and did not converge. Surely far beyond the limits it is
     not refined.
     """
-    best, is_settled = _descend(asked, breaks, CALM[0], goes_on)
+    best, is_settled = _descend(asked, breaks, CALM[0], goes_on, to)
     for calm in CALM[1:]:
         if is_settled or (best.converged and asked.is_limited and best.surely > OUT_OF_REACH):
             break
-        calmer, is_settled = _descend(asked, halved(breaks), calm, goes_on)
+        calmer, is_settled = _descend(asked, halved(breaks), calm, goes_on, to)
         best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
     best = best if best.converged else track(asked, breaks)
     unmet = _left_over(asked, best, 1.0)[0] if best.converged else np.inf
     return replace(best, unmet=unmet, converged=unmet <= LOST)
 
 
-def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool]) -> tuple[Tracked, bool]:
+def _descend(
+    asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool], to: float
+) -> tuple[Tracked, bool]:
     """The least voltage with a share `calm` of the effort on finer and finer intervals, and whether it settled."""
     tracked, change = track(asked, breaks, None, calm), np.inf
-    while tracked.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
+    while tracked.converged and change > to and len(breaks) <= MOST_INTERVALS and goes_on():
         if asked.is_limited and tracked.surely > OUT_OF_REACH:
             break
         breaks = halved(breaks, _changes(asked, tracked) > TURNING * tracked.share)
@@ -98,9 +100,9 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
         least = max(finer.share, NO_SHARE)
         change = abs(finer.share - tracked.share) / least
         tracked = replace(finer, doubt=2 * change + finer.added / least)
-    if change <= SETTLED:
+    if change <= to:
         tracked = replace(track(asked, breaks, tracked, calm), doubt=tracked.doubt)
-    return tracked, tracked.converged and change <= SETTLED
+    return tracked, tracked.converged and change <= to
 
 
 def _changes(asked: Transition, tracked: Tracked) -> Array:
