@@ -216,8 +216,8 @@ def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> s
         cause = "nearly singular postures amplify round-off of forces"
     return (
         f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as {cause};"
-        f" errors may reach {round_off:.1g} of the peaks, within tolerance ="
-        f" {np.ceil(round_off / digit) * digit:.1g}"
+        f" errors may reach {round_off:.1g} of the peaks, which tolerance ="
+        f" {np.ceil(round_off / digit) * digit:.1g} allows"
     )
 
 
