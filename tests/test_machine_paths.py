@@ -1,7 +1,6 @@
 """Paths as machines run them, solved: time scaling, shapers for the robot's frequencies, what is left of vibrations."""
 
 import pytest
-from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -9,15 +8,6 @@ from ffrobot.run.fastest import least_stretch
 
 INERTIA, TURN = 0.3, 1.2
 RIGID = {"rigid": {"mass": 2.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}}
-BEAM = {
-    "link": beam_link(
-        0.8,
-        rectangle(4e-3, 0.03),
-        12,
-        modes={"count": 3, "family": "in-plane-bending", "attachment_modes": False},
-        damping={"ratio": 0.005},
-    )
-}
 
 
 def arm(body, path, joint=None, end=2.0):

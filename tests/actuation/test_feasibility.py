@@ -8,7 +8,7 @@ from patches_on_links import CERAMIC
 import ffrobot
 from ffrobot.actuation.motors import path_jump
 from ffrobot.actuation.patches.link_patches import link_patches, with_count
-from ffrobot.mbs.quantities.motion import plane_angle, point_motion
+from ffrobot.mbs.quantities.motion import point_motion
 from ffrobot.mbs.quantities.supply import actuator_forces
 from ffrobot.run.solve import solve_scene
 
@@ -152,17 +152,6 @@ def test_predicted_shift_of_the_tip_is_what_happens():
     np.testing.assert_allclose(
         straight.analyses["motion"].predicted_shift["link.tip"][0], [0.0, tips[1], 0.0], rtol=1e-9, atol=1e-15
     )
-
-
-def test_predicted_shift_of_an_inclined_tip():
-    """The shift across the link is the deflection that unmet modal forces leave."""
-    solution = arm(trajectory={"point": "link.tip", "y": "0.1*sin(2*t)"})
-    result, body = solution.analyses["motion"], solution.bodies["link"].carrying
-    unmet = result.actuation.unmet["link"]
-    deflection = -(unmet @ body.modal_transform / body.stiffness) @ body.points["tip"].translation[1]
-    theta = plane_angle(result.run, "link")
-    expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta), 0 * theta])
-    np.testing.assert_allclose(result.predicted_shift["link.tip"], expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_rms_and_shares_of_time_by_hand():

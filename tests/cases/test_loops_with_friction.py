@@ -12,7 +12,6 @@ from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
 
 ROUGH = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.05}
-LOADS = [{"joint": "C", "moment": "0.7*sin(5*t)"}, {"joint": "B", "moment": "0.4 + t"}]
 TIMES = {"end": 0.5, "output_step": 0.01, "tolerance": 1e-10}
 INVERSE = {"name": "inverse", "kind": "pcid"} | TIMES
 

@@ -9,7 +9,7 @@ import ffrobot
 from ffrobot.common.errors import InputError
 
 ISOTROPIC = "youngs_modulus = 206842700000.0\npoissons_ratio = 0.3\n"
-E, RHO, LENGTH = 2.0e11, 8000.0, 1.0
+E, RHO = 2.0e11, 8000.0
 
 
 def halves(folder, E_outer=4 * E, rho_outer=4 * RHO, group="outer"):

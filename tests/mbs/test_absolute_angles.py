@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.rotations import smallest_turn
@@ -11,7 +10,6 @@ HAND = {"mass": 1.3, "center": [0.2, 0.03, -0.02], "inertia": [0.012, 0.03, 0.04
         "points": {"root": [0.0, 0.0, 0.0], "tip": [0.4, 0.0, 0.0]}}  # fmt: skip
 WRIST = {"mass": 0.4, "center": [0.01, 0.0, 0.05], "inertia": [2e-3, 2e-3, 1e-3],
          "points": {"root": [0.0, 0.0, 0.0], "top": [0.0, 0.0, 0.1]}}  # fmt: skip
-LINK = beam_link(0.4, rectangle(0.01, 0.02), 8, nu=0.3, modes={"count": 4, "family": "all"})  # fmt: skip
 TURN, TILT = "0.4 + 2*sin(3*t)", "0.6*cos(2*t) - 0.2"
 
 

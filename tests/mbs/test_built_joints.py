@@ -11,7 +11,6 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.operating_points import Static
 
-G = 9.81
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
 FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.5, "friction_speed": 0.05}
 

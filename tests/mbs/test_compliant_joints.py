@@ -17,7 +17,7 @@ from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.quantities.supply import gear_moment, gear_motions, motor_motion
 from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
 
-L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
+L, M, J, N, K = 0.7, 2.0, 3e-3, 9.0, 500.0
 MOTOR, LINK = J * N**2, M * L**2 / 3
 GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}

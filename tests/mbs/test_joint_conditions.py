@@ -13,7 +13,7 @@ from ffrobot.mbs.linear.poses import PoseEvaluator
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
-E, NU, RHO, HEIGHT, WIDTH = 70e9, 0.3, 2700.0, 0.02, 0.03
+E, NU, HEIGHT, WIDTH = 70e9, 0.3, 0.02, 0.03
 G = E / (2 * (1 + NU))
 GEAR = 3000.0  # N·m/rad
 
