@@ -91,7 +91,15 @@ class Constraints(Kinematics):
         scales = self._joint_sizes if locked is None else np.where(locked, 0.0, self._joint_sizes)
         # Coordinates by themselves have no branches
         farthest = np.inf if all(row.kind == "coordinate" for row in self._rows) else LARGEST_TURN
-        return self.core.postures(self.scene, as_list(times), q, more, scales, self._row_sizes, farthest)
+        return self.core.postures(
+            self.scene,
+            as_list(times),
+            q,
+            beside=more,
+            scales=scales,
+            sizes=self._row_sizes,
+            largest_step=farthest,
+        )
 
     def velocities(self, q: Array, v: Array, t: float = 0.0, locked: Booleans | None = None) -> Array:
         """V (n_v,) moved onto Ċ = 0 at q (n_q,) and t (s) by the least change of joints not `locked` (n_v,)."""
