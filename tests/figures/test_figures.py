@@ -10,7 +10,7 @@ import pytest
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.joint import MotorLimits
 from ffrobot.pictures.figures.plot import draw_time_history, plot_results
-from ffrobot.pictures.figures.shared import Curve, FigureRecord, curve_points, limit_curves
+from ffrobot.pictures.figures.shared import Curve, FigureRecord, curve_points, limit_curves, read_points
 from ffrobot.pictures.figures.style import new_axes
 from ffrobot.pictures.motion import visible_exaggeration
 from ffrobot.results.file import Results
@@ -154,3 +154,11 @@ def test_times_at_a_limit_are_shaded():
     (shade,) = axes.collections
     (span,) = shade.get_paths()
     assert [span.vertices[:, 0].min(), span.vertices[:, 0].max()] == pytest.approx([0.5, 1.0])
+
+
+def test_cells_of_points_that_are_no_numbers_are_named_by_their_line(tmp_path):
+    (tmp_path / "points.csv").write_text("t,a,b\n0,1,2\n# rest\n1,3\n")
+    time, values = read_points(tmp_path / "points.csv", "a")
+    assert (time.tolist(), values.tolist()) == ([0.0, 1.0], [1.0, 3.0])
+    with pytest.raises(InputError, match=r"line 4: expected 2 numbers .*, found '1'"):
+        read_points(tmp_path / "points.csv", "b")

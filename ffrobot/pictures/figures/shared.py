@@ -16,6 +16,7 @@ from ...common.keys import Positive
 from ...common.tables import shown
 from ...common.toml_files import load_toml, read_csv
 from ...common.validation import InputFile, Record, validate
+from ...mbs.fields.waypoints import numbers_of
 from ...mbs.joints.joint import MotorLimits
 from ...results.file import Results
 from ...results.joints import joint_coordinates
@@ -190,10 +191,9 @@ def read_points(path: Path, column: str) -> tuple[Array, Array]:
     if column not in header:
         raise InputError(f'{path}: expected the column "{column}"', quoted(map(shown, header)))
     k = header.index(column)
-    try:
-        return np.array([float(row[0]) for _, row in rows]), np.array([float(row[k]) for _, row in rows])
-    except (ValueError, IndexError) as error:
-        raise InputError(f'{path}: expected numbers in the column "{column}": {error}') from None
+    table = [numbers_of(path, line, [*row[:1], *row[k : k + 1]], 2) for line, row in rows]
+    time, values = np.reshape(table, (-1, 2)).T
+    return time, values
 
 
 MARGIN = 1.15  # of the largest moment or speed, where no limit ends a curve
