@@ -20,7 +20,10 @@ void make_controls(IntegrationControls *c, double tolerance, unsigned long max_s
                    const std::vector<std::tuple<MethodKind, double, double>> &methods, double spectral_radius) {
   if (methods.empty() || methods.size() > 2)
     throw std::invalid_argument("methods: expected one or two, found " + std::to_string(methods.size()));
-  new (c) IntegrationControls{.tolerance = tolerance, .max_steps = max_steps, .methods = {}};
+  new (c) IntegrationControls;
+  c->tolerance = tolerance;
+  c->max_steps = max_steps;
+  c->methods.clear();
   for (const auto &[kind, cost, pace] : methods)
     c->methods.push_back({{kind, spectral_radius}, cost, pace});
 }
