@@ -145,21 +145,16 @@ void NewtonSystem<Space>::factorise(Scalar damping_factor, Scalar stiffness_fact
 template <class Space>
 template <class Scalar>
 void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r, Eigen::Map<Vector<Scalar>> x) const {
-  Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_);
-  Vector<Scalar> y = product(G_, f);
+  Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_),
+                 stiff = along_stiff<Vector<Scalar>>(x);
   f.array() /= factors.S.array();
-  if constexpr (std::is_same_v<Scalar, double>) {
-    const VectorXd at_start = along_stiff<VectorXd>(x);
-    y += at_start;
-    f -= factors.S.cwiseProduct(at_start);
-  }
-  y.array() *= factors.S.array();
-  solve_symmetric(factors.symmetric, y);
+  f -= factors.S.cwiseProduct(stiff);
   solve_symmetric(factors.symmetric, f);
   f.array() *= factors.S.array();
   x(free_) += product(P_, f);
+  stiff += product(G_, f);
   for (std::size_t s = 0; s < stiff_.size() && stiff_[s] < x.size(); ++s)
-    x[stiff_[s]] = y[s] / factors.S[s];
+    x[stiff_[s]] = stiff[s];
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const double *r, const double *c, double *x) {

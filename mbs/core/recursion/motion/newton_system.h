@@ -1,11 +1,11 @@
 // The matrix of Newton's method in implicit integrators, N = M + B^T E B under C_q: E is a diagonal, zero but at a few
 // stiff coordinates B x: modes, joints with springs or friction, joints at which loops are cut, and twists of gears. N
 // is never made; what evaluations at rest say suffices, with G = B P and forces f = r - E B x:
-//     N x + C_q^T nu = B^T r, C_q x = c:     x = P f + R c,     (1 + G E) B x = G r + B R c
+//     N x + C_q^T nu = B^T r, C_q x = c:     x = P f + R c,     B x = G f + B R c
 // P (n_v, stiff) are accelerations by unit forces along these coordinates while the constraint equations hold, R (n_v,
-// equations) those by which an equation alone accelerates. With y = S B x, S S = E, the matrix is symmetric: 1 + S G S.
-// x along stiff coordinates follows from y, along the others from P and R. Of stiff coordinates f is next to nothing
-// beside r: f / S, too, is solved for with that matrix, (1 + S G S) f / S = r / S - S B R c, not left over from r.
+// equations) those by which an equation alone accelerates. With S S = E, the matrix for f / S is symmetric:
+//     (1 + S G S) f / S = r / S - S B R c
+// Where E is large f is next to nothing beside r: r - E B x would be round-off of r.
 #pragma once
 
 #include "core/recursion/motion/scene.h"
