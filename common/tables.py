@@ -42,6 +42,10 @@ def parse_csv(text: str) -> CsvTable:
     if separator != ",":
         rows = [(k, [" ".join(map(_with_point, cell.split(" "))) for cell in row]) for k, row in rows]
     header, *below = [(k, row) for k, row in rows if any(row)] or [(0, [])]
+    for k, row in below if "_" in text else ():
+        for cell in row:
+            if "_" in cell and _is_number(cell):  # to Python
+                raise csv.Error(f"line {k}: expected a number without underscores, found {cell}")
     is_table = len(header[1]) > 1 and all(map(NAME.fullmatch, header[1]))
     if header[1] and not (is_table or any(_is_number(cell) for _, row in below for cell in row)):
         raise csv.Error("expected names of columns and numbers below, found other text")  # which is not for messages

@@ -241,6 +241,8 @@ def test_stairs_of_many_holds(tmp_path):
         ("t,x\n0,0\n1,one\n", "line 3: expected 2 numbers"),
         ("t,x\n0,0\n1,nan\n", "line 3"),
         ("t,x\n0,0\n1,1,1\n", "line 3"),
+        ("t,x\n0,0\n0,5,1,2\n", "line 3: expected 2 numbers .*decimal commas need semicolons"),
+        ("t,x\n0,0\n1,1_0\n", "line 3: expected a number without underscores, found 1_0"),
         ("t,x\n0,0\n\n1,1\n1,2\n", "line 5: expected times that increase, found t = 1 after 1"),
     ],
 )
