@@ -26,16 +26,12 @@ def wanted(link):
     return np.random.default_rng(3).standard_normal((20, 5)) / np.arange(1, 6)
 
 
-LEFT = {1e-3: 1e-11, 1e-6: 1e-8, 1e-9: 1e-6}  # the condition number times rounding
-
-
-@pytest.mark.parametrize("apart", LEFT)
+@pytest.mark.parametrize("apart", [1e-3, 1e-6, 1e-9])
 def test_nearly_the_same_place(link, apart):
     """Patches much shorter than the modes, side by side: their columns of Φ_V are all but parallel."""
     length = 0.5 * apart
     array = patches(link, centers=(0.33, 0.33 + apart, 0.5, 0.7, 0.9), length=length)
     voltages = solve_voltages(array, wanted(link))
     left = np.abs(voltages.unmet).max() / np.abs(wanted(link)).max()
-    assert left < LEFT[apart]
-    assert left < np.finfo(float).eps * array.condition_number + 1e-13
+    assert left < np.finfo(float).eps * array.condition_number
     assert array.condition_number > min(10 / apart, 1e8)
