@@ -109,7 +109,7 @@ def test_unreadable_toml(tmp_path):
     with pytest.raises(InputError, match="cannot read the drawing"):
         load_toml(tmp_path, "drawing")
     (tmp_path / FILE).write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match="cannot read the drawing"):
+    with pytest.raises(InputError, match="line 1: expected a drawing in UTF-8, found the byte 0xff"):
         load_toml(tmp_path / FILE, "drawing")
     (tmp_path / FILE).write_text("a = \n")
     with pytest.raises(InputError, match=r"not a valid TOML drawing.*line 1"):
