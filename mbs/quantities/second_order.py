@@ -192,12 +192,10 @@ def missing_to_second_order(
 
 def largest_rotations(link: ModalBody, p: Array) -> Rotations:
     """Return the largest rotations of sections, rad, over p (T, n) of the file."""
-    if not len(p):
-        return Rotations(0.0, 0.0, 0.0)
     stations, x = link.stations, link.stations.position[:, 0]
     chord = (stations.translation[-1] - stations.translation[0]) / (x[-1] - x[0])
     shapes = stations.rotation - np.stack([stations.rotation[0, 0], -chord[2], chord[1]])  # (k, 3, n)
-    return Rotations(*(float(np.abs(p @ about.T).max()) if about.any() else 0.0 for about in shapes.swapaxes(0, 1)))
+    return Rotations(*(_largest(p, shapes[:, [k]]) for k in range(3)))
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
@@ -214,6 +212,16 @@ def _worst_outputs(loads: ModalLoads, p: Array) -> Indices:
 
 
 def _largest(p: Array, shapes: Array) -> float:
-    """Largest displacement (m) of stations of `shapes` (k, 3, n)."""
-    squares = sum((p @ along.T) ** 2 for along in shapes.swapaxes(0, 1) if along.any())
-    return float(np.sqrt(np.max(squares, initial=0.0)))
+    """Largest length over p (T, n) of what moves by `shapes` (k, axes, n)."""
+    return float(largest_lengths(p, shapes).max(initial=0.0))
+
+
+def largest_lengths(p: Array, shapes: Array) -> Array:
+    """Return the largest length (T,) at p (T, n) of what moves by `shapes` (k, axes, n), such as stations of a link.
+
+    One k after the other: all of them at once do not fit into memory in long runs.
+    """
+    squares = np.zeros(len(p))
+    for shape in shapes:
+        np.maximum(squares, ((shape @ p.T) ** 2).sum(axis=0), out=squares)
+    return np.sqrt(squares)

@@ -31,6 +31,7 @@ from .second_order import (
     Rotations,
     StiffnessChange,
     largest_displacement,
+    largest_lengths,
     largest_rotations,
     lasting,
     missing_to_first_order,
@@ -230,16 +231,11 @@ def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
     """
     stations, x = link.stations, link.stations.position[:, 0]
     shares = 0.5 * (np.append(np.diff(x), 0.0) + np.append(0.0, np.diff(x)))  # of the length, by the trapezoidal rule
-    off, turned = np.zeros((2, len(p), len(x)))
-    G = np.zeros((p.shape[1], p.shape[1]))
-    for axis in (1, 2):
-        across, slopes = stations.translation[:, axis], (-1) ** (axis + 1) * stations.rotation[:, 3 - axis]
-        if across.any() or slopes.any():
-            chord = (across[-1] - across[0]) / (x[-1] - x[0])
-            off += (p @ (across - across[0] - np.outer(x - x[0], chord)).T) ** 2
-            turned += (p @ (slopes - chord).T) ** 2
-            G += slopes.T @ (shares[:, None] * slopes)
-    return np.sqrt(off.max(axis=1)), np.sqrt(turned.max(axis=1)), 0.5 * ((p @ G) * p).sum(axis=1)
+    across, slopes = stations.translation[:, 1:], stations.rotation[:, [2, 1]] * [[1.0], [-1.0]]  # (stations, 2, n)
+    chord = (across[-1] - across[0]) / (x[-1] - x[0])
+    off = across - across[0] - (x - x[0])[:, None, None] * chord
+    G = np.einsum("k,kan,kam->nm", shares, slopes, slopes)
+    return largest_lengths(p, off), largest_lengths(p, slopes - chord), 0.5 * ((p @ G) * p).sum(axis=1)
 
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
