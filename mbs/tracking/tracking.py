@@ -208,7 +208,18 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
     rate, weights = slowest(linear.zeros[[0, -1]]), _weights(servo, analysis, limits)
     allowed = _tolerance(servo, analysis)
-    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage", is_free, rate, gears, allowed)
+    asked = Transition(
+        servo,
+        Phi_V,
+        limits,
+        weights,
+        rest,
+        objective="least-voltage",
+        is_free=is_free,
+        rate=rate,
+        gears=gears,
+        tolerance=allowed,
+    )
     meshes = (
         with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
         for k in (1, 2)
