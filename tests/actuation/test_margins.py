@@ -160,7 +160,7 @@ def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
         "controller": [{"kind": "joint-pid"} | gains],
         "disturbance": [{"point": "a0.tip", "y": f"where(t <= 0.01, {kick}, 0)"}],
     }  # fmt: skip
-    rest = {"name": "rest", "kind": "pcid", "end": 3.0, "output_step": 0.01}
+    rest = {"name": "rest", "kind": "pcid", "end": 2.0, "output_step": 0.01}
     arm = links(
         np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop],
         trajectory=[{"name": "still", "joint": "J0", "value": "0.3"}],
