@@ -71,7 +71,7 @@ def error(row, kind):
 def test_record_says_on_what_and_against_what(done):
     record = json.loads((done / "work_precision.json").read_text(encoding="utf-8"))
     assert record["machine"]["cores"] >= 1
-    assert "-O2" in record["machine"]["compiler"]
+    assert "-O3" in record["machine"]["compiler"]
     assert record["reference"]["integrator"] != record["reference"]["other"]
     assert max(record["reference"]["error"].values()) < 1e-6
     assert len(record["inputs"]["bodies"]["arm"]) == 64
