@@ -29,7 +29,7 @@ readonly DEBIAN_PACKAGES=(
 # What only tests need, in which pages are opened; test.sh asks for it.
 TEST_PACKAGES=()
 [[ -z ${WITH_TEST_PACKAGES:-} ]] || TEST_PACKAGES=(chromium chromium-driver)
-readonly SETUP_LOG=.venv/setup.log
+SETUP_LOG=.venv/setup.log
 
 # die MESSAGE: what is wrong and what to do about it.
 die() {
@@ -74,8 +74,8 @@ installed_packages() {
 
 missing_packages() {
   local installed package
-  installed=" $(installed_packages "${DEBIAN_PACKAGES[@]}" "${TEST_PACKAGES[@]}" | cut -d ' ' -f 1 | tr '\n' ' ')"
-  for package in "${DEBIAN_PACKAGES[@]}" "${TEST_PACKAGES[@]}"; do
+  installed=" $(installed_packages "$@" | cut -d ' ' -f 1 | tr '\n' ' ')"
+  for package in "$@"; do
     [[ $installed == *" $package "* ]] || printf '%s\n' "$package"
   done
 }
@@ -91,7 +91,7 @@ install_packages() {
 way() {
   if [[ ${FFROBOT_SETUP:-} ]]; then
     printf '%s' "$FFROBOT_SETUP"
-  elif type -P dpkg-query apt-get >/dev/null && { [[ -z $(missing_packages) ]] || ((EUID == 0)) || sudo -v; } 2>/dev/null; then
+  elif type -P dpkg-query apt-get >/dev/null && { [[ -z $(missing_packages "${DEBIAN_PACKAGES[@]}" "${TEST_PACKAGES[@]}") ]] || ((EUID == 0)) || sudo -v; } 2>/dev/null; then
     printf debian
   else
     printf pip
@@ -110,10 +110,10 @@ python_of() {
 
 debian_step() {
   local missing
-  mapfile -t missing < <(missing_packages)
+  mapfile -t missing < <(missing_packages "$@")
   ((${#missing[@]})) || return 0
   step "installing ${#missing[@]} Debian packages" install_packages "${missing[@]}"
-  mapfile -t missing < <(missing_packages)
+  mapfile -t missing < <(missing_packages "$@")
   ((${#missing[@]} == 0)) || die "apt-get left these packages uninstalled: ${missing[*]}"
 }
 
@@ -155,6 +155,13 @@ PYTHON
 # Checkers, the documentation's tools and VTK, a large download: test.sh asks for them, demo.sh does not.
 install_test_packages() {
   .venv/bin/python -m pip install -r .venv/test_requirements.txt -c .venv/constraints.txt
+}
+
+# test_packages_step KEY: all that only tests need.
+test_packages_step() {
+  SETUP_LOG=.venv/test_packages.log
+  [[ $WAY != debian ]] || debian_step "${TEST_PACKAGES[@]}"
+  once tests "$1" "installing what the tests need" install_test_packages
 }
 
 # Python files are seen as they are edited; C++ sources and new files are taken in here.
@@ -208,7 +215,7 @@ setup() {
   WAY=$(way)
   PYTHON=$(python_of "$WAY")
   if [[ $WAY == debian ]]; then
-    debian_step
+    debian_step "${DEBIAN_PACKAGES[@]}"
   fi
 
   local venv_key dependencies_key
@@ -223,10 +230,17 @@ setup() {
 
   dependencies_key=$({ installed_packages "${DEBIAN_PACKAGES[@]}" && cat pyproject.toml; } | digest)
   once dependencies "$dependencies_key" "installing Python packages" install_dependencies
-  [[ -z ${WITH_TEST_PACKAGES:-} ]] || once tests "$dependencies_key" "installing what the tests need" install_test_packages
+  if [[ ${WITH_TEST_PACKAGES:-} ]]; then # waits for the network: beside the build
+    test_packages_step "$dependencies_key" >.venv/test_packages.txt &
+    local test_packages=$!
+  fi
   once build "$(build_key) $dependencies_key" "building ffrobot" build_package
   once check "$(<.venv/build.stamp)" "checking the environment" check_environment
   once forms "$dependencies_key $(forms_key)" "compiling finite element forms" compile_forms
+  if [[ ${WITH_TEST_PACKAGES:-} ]]; then
+    wait "$test_packages"
+    cat .venv/test_packages.txt
+  fi
   exec 9<&-
 }
 
