@@ -71,9 +71,8 @@ class SolidStrip:
         x = V.tabulate_dof_coordinates()
         self.kept = np.flatnonzero(np.repeat(x[:, 0] > 1e-9, 3))
         self.tip = 3 * int(np.argmin(np.linalg.norm(x - [L, 0.0, 0.0], axis=1)))
-        self.solve = spla.splu(
-            self.K[self.kept][:, self.kept].tocsc(), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        ).solve
+        K = self.K[self.kept][:, self.kept].tocsc()
+        self.solve = spla.splu(K, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve
 
     def tip_per_volt(self):
         """(3,) m/V, of the middle of the tip; a positive voltage bends towards +y, as with opposite poles."""
