@@ -49,13 +49,13 @@ def pid(P=0.0, D=0.0, integral=0.0, joint="O", rate="measured"):
     return JointPid(kind="joint-pid", rate=rate, **gains)
 
 
-def links(rng, count, payload, rotors, analysis, **keys):
+def links(rng, count, payload, rotors, analysis, modes=3, **keys):
     """An arm of `count` tubes of random sizes and directions, geared motors with `rotors` (kg·m², at the joint)."""
     bodies, joints, before = [], [], "ground"
     for k in range(count):
         outer, length = rng.uniform(0.015, 0.04), rng.uniform(0.3, 0.8)
-        modes = {"count": 3, "family": "in-plane-bending"}
-        link = beam_link(length, tube(outer, 0.85 * outer), 10, nu=None, modes=modes, damping={"ratio": 0.01})
+        kept = {"count": modes, "family": "in-plane-bending"}
+        link = beam_link(length, tube(outer, 0.85 * outer), 10, nu=None, modes=kept, damping={"ratio": 0.01})
         bodies.append({"name": f"a{k}", "link": link})
         rotor = {"rotor_inertia": rotors[k]} if rotors[k] else {}
         joints.append({"name": f"J{k}", "type": "revolute", "between": [before, f"a{k}.root"]} | rotor)
@@ -162,7 +162,7 @@ def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
     }  # fmt: skip
     rest = {"name": "rest", "kind": "pcid", "end": 2.0, "output_step": 0.01}
     arm = links(
-        np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop],
+        np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop], modes=2,
         trajectory=[{"name": "still", "joint": "J0", "value": "0.3"}],
     )  # fmt: skip
     return solve_scene(arm).outcomes["loop"].details
