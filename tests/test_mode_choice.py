@@ -11,8 +11,7 @@ from ffrobot import make_scene
 from ffrobot.common import checksum
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
-from ffrobot.run.mode_choice import reported_modes
-from ffrobot.run.mode_search import ErrorEstimate
+from ffrobot.run.mode_search import ErrorEstimate, reported_modes
 from ffrobot.run.solve import solve_scene
 
 CASE = Path(__file__).parents[1] / "cases" / "two_link"

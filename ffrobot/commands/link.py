@@ -67,7 +67,7 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
     from ..exchange.part_draft import draft_link
     from ..mesh.inspection import inspect_part
     from ..present.console import summary_console
-    from ..present.part import LISTED, print_inspection
+    from ..present.info import LISTED, print_inspection
 
     protect([file])
     if output is not None:

@@ -12,7 +12,7 @@ from ..present.logs import VERBOSE, logging_options, python_option
 from .options import output_option, scene_argument
 
 if TYPE_CHECKING:
-    from ..run.solution import Solution
+    from ..run.result import Solution
 
 
 @click.command()
@@ -64,8 +64,9 @@ def solve(
         return
     _tell(solution, path, len(remarked))
     check_ended(solution, display, again, scene_file)
-    if strict:
-        _check_warnings(solution, scene_file)
+    for name, result in solution.analyses.items() if strict else ():
+        for text in result.warnings:
+            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
 def _tell(solution: Solution, path: Path, remarked: int) -> None:
@@ -92,9 +93,3 @@ def _tell(solution: Solution, path: Path, remarked: int) -> None:
         rows = [(name, cells) for name in results.analyses for cells in robustness_cells(results, name)]
         for table in named_tables("robustness of", rows):
             summary_console().print(table)
-
-
-def _check_warnings(solution: Solution, scene_file: Path) -> None:
-    for name, result in solution.analyses.items():
-        for text in result.warnings:
-            raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')

@@ -21,7 +21,7 @@ from ..map.pose_map import PoseMap
 from ..mbs.fields.field_types import NotNegative
 from ..mbs.linear.poses import PoseEvaluator
 from ..milling.process import stable_depths
-from ..run.solve import prepare_scene
+from ..run.prepare import prepare_scene
 from .fitting import RobotTarget, VariedKeys
 from .least_squares import Parameters
 

@@ -16,7 +16,7 @@ from ..common.toml_files import load_toml
 from ..common.validation import check_texts
 from ..mbs.scene.mechanism import Initial
 from ..present.lines import print_table
-from ..run.solve import prepare_scene
+from ..run.prepare import prepare_scene
 from .covariance import write_covariance
 from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
 from .frf_fit import PoseComparison, PoseModel, ResponseFit, fit_receptances

@@ -12,7 +12,7 @@ With Z = K + iωD − ω²M and rows J of the points' displacements, the recepta
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 import numpy as np
@@ -26,8 +26,8 @@ from ..mbs.linear.poses import PoseEvaluator
 from ..mbs.posture.start import undeformed_posture
 from ..mbs.scene.mechanism import Initial
 from ..mbs.scene.space import SPACES
-from ..run.prepare import with_scene
-from ..run.solution import Solution
+from ..run.prepare import unsolved
+from ..run.result import Solution
 from .frf_measured import MeasuredPose
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
 
@@ -77,7 +77,7 @@ class PoseModel:
         """The `stacked` equations about the equilibrium. Raises `InputError` for points, `SolveError` without one."""
         if self._initial is not None:
             change = {"initial": self._initial, "trajectory": ()}
-            robot = with_scene(robot, robot.scene.model_copy(update=change))
+            robot = unsolved(replace(robot, scene=robot.scene.model_copy(update=change)))
         q = undeformed_posture(robot.model).q
         first, *others = dict.fromkeys(row.point for row in self.pose.ends.directions)
         for point in (first, *others):

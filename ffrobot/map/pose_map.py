@@ -31,8 +31,8 @@ from ..mbs.posture.workspace import TURN, GridAxis, Postures, grid_postures
 from ..mbs.scene.space import SPACES
 from ..milling.process import Milling, stable_depths
 from ..run.inputs import changed, fingerprints, read_tables
-from ..run.solution import Solution
-from ..run.solve import prepare_scene
+from ..run.prepare import prepare_scene
+from ..run.result import Solution
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene

@@ -20,13 +20,12 @@ from ..mbs.inversion.zero_dynamics import is_unstable
 from ..mbs.linear.joint_conditions import translational_stiffness
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.validity import deflection_warning
 from ..mbs.run.record import Details, Run
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
-from ..run.mode_search import ModeChoice
-from ..run.result import AnalysisResult
-from ..run.solution import Solution
-from .lines import alike, error_budget, folded, integrated, named_tables, warning_lines
+from ..run.result import AnalysisResult, ModeChoice, Solution
+from .lines import alike, error_budget, folded, integrated, named_tables
 
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 
@@ -38,9 +37,7 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
     shown = ((name, {key: text for key, text in cells.items() if key not in OF_FILE}) for name, cells in rows)
     for table in named_tables("analysis", shown):
         console.print(table)
-    bending = {name: result.bending for name, result in solution.analyses.items()}
-    texts = {name: result.warnings for name, result in solution.analyses.items()}
-    for line in warning_lines(bending, texts):
+    for line in _warnings(solution.analyses):
         console.print(f"warning    {line}")
     for line in alike((name, text) for name, result in solution.analyses.items() for text in result.notes):
         console.print(f"note       {line}")
@@ -50,7 +47,7 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
     console.print()
     for line in verdict.lines():
         console.print(line)
-    for line in control_lines(_details(solution)):
+    for line in _control_lines(_details(solution)):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
     for title, text in _notes(solution):
@@ -58,6 +55,17 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
     console.print()
     console.print(notes)
     console.print(f"results    {results.path}", soft_wrap=True)
+
+
+def _warnings(analyses: Mapping[str, AnalysisResult]) -> Iterator[str]:
+    """Warnings of all analyses; deflection warnings in full for the worst analysis only."""
+    bent = {name: text for name, result in analyses.items() if (text := deflection_warning(result.bending))}
+    if bent:
+        worst = max(bent, key=lambda name: max(link.missing.of_length for link in analyses[name].bending.values()))
+        others = [name for name in bent if name != worst]
+        yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
+    texts = ((name, text) for name, result in analyses.items() for text in result.warnings)
+    yield from alike((name, text) for name, text in texts if text != bent.get(name))
 
 
 def _details(solution: Solution) -> dict[str, Details]:
@@ -69,9 +77,18 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
     yield from named_tables("voltages of", rows)
     rows = ((name, cells) for name in results.analyses for cells in settling_cells(results, name))
     yield from named_tables("residual vibration", rows)
-    analyses = solution.analyses.items()
+    analyses, details = solution.analyses.items(), _details(solution)
     yield from named_tables("stress in", (row for name, result in analyses for row in _stresses(name, result)))
-    yield from _control_tables(_details(solution))
+    loops = ((name, loop_cells(one.metrics)) for name, one in details.items() if isinstance(one, LoopRecord))
+    yield from named_tables("closed loop", loops)
+    kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {
+        "linear model": (LinearModels, _linear),
+        "joints": (LinearModels | RobotAtRest, _conditions),
+        "placement": (Placed, _placement),
+    }
+    for first, (kind, rows_of) in kinds.items():
+        mine = ((name, record) for name, record in details.items() if isinstance(record, kind))
+        yield from named_tables(first, (row for name, record in mine for row in rows_of(name, record)))
 
 
 def _notes(solution: Solution) -> Iterator[tuple[str, str]]:
@@ -148,19 +165,6 @@ TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with 
 UNDAMPED = 1e-9  # ratios below are round-off
 
 
-def _control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
-    loops = {name: record.metrics for name, record in details.items() if isinstance(record, LoopRecord)}
-    yield from named_tables("closed loop", ((name, loop_cells(metrics)) for name, metrics in loops.items()))
-    kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {
-        "linear model": (LinearModels, _linear),
-        "joints": (LinearModels | RobotAtRest, _conditions),
-        "placement": (Placed, _placement),
-    }
-    for first, (kind, rows_of) in kinds.items():
-        mine = ((name, record) for name, record in details.items() if isinstance(record, kind))
-        yield from named_tables(first, (row for name, record in mine for row in rows_of(name, record)))
-
-
 Rows = Iterator[tuple[str, Cells]]
 
 
@@ -225,7 +229,7 @@ def _placement(name: str, placed: Placed) -> Rows:
     yield name, cells
 
 
-def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
+def _control_lines(details: Mapping[str, Details]) -> Iterator[str]:
     """Explain closed loops, a line each: columns, damping ratios, zeros, unreached modes, places of patches."""
     loops = {name: record.metrics for name, record in details.items() if isinstance(record, LoopRecord)}
     if loops:

@@ -52,7 +52,9 @@ def _tables(results: Results, name: str) -> Iterator[Table | str]:
         yield missed.in_words
     for body, judged in group["feasibility"].get("pzt", {}).items():
         yield _patches(body, group[f"pzt/{body}"], judged)
-        yield _modes(body, judged)
+        modes = zip(*(judged[f"mode_{key}"][()] for key in ("required", "available", "factor")), strict=True)
+        rows = [(f"mode {k}", *map(_number, values)) for k, values in enumerate(modes, 1)]
+        yield plain_table((body, "needs (N/√kg)", "all patches have (N/√kg)", "factor"), rows, names=1)
         yield _remedy_line(judged)
         if "current" in judged:
             yield _amplifier_line(group[f"pzt/{body}"], judged)
@@ -121,12 +123,6 @@ def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
         rows.append((*cells, _number(field / 1e6), of_depoling, _number(1e6 * strain), ", ".join([can, *beyond])))
     headers = body, "at (m)", "needs (V)", "has (V)", "needs (N·m)", "has", "factor", "from (s)", "kV/mm", "depoling"
     return plain_table((*headers, "strain (µ)", "within?"), rows, names=1)
-
-
-def _modes(body: str, judged: h5py.Group) -> Table:
-    modes = zip(*(judged[f"mode_{key}"][()] for key in ("required", "available", "factor")), strict=True)
-    rows = [(f"mode {k}", *map(_number, values)) for k, values in enumerate(modes, 1)]
-    return plain_table((body, "needs (N/√kg)", "all patches have (N/√kg)", "factor"), rows, names=1)
 
 
 def _remedy_line(judged: h5py.Group) -> str:

@@ -1,4 +1,4 @@
-"""What a modal body file or a results file holds, as text."""
+"""What a modal body file, a results file or the file of a part has in it, as text."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -21,6 +22,11 @@ from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
+
+if TYPE_CHECKING:
+    from ..mesh.inspection import Inspection
+
+LISTED = 30  # faces of a part
 
 
 def describe(path: Path) -> str:
@@ -136,3 +142,33 @@ def _add_datasets(table: Table, group: h5py.Group, meanings: Mapping[str, Meanin
 def _rendered(table: Table) -> str:
     Console(file=(out := StringIO()), width=110).print(table)
     return out.getvalue()
+
+
+def print_inspection(file: Path, part: Inspection, density: float | None, console: Console) -> None:
+    """Unit, extent, volume, mass where the density (kg/m³) is known, and a table of the faces, largest first."""
+    from .lines import plain_table  # loads the core
+
+    said = "" if part.is_declared else ", a guess by its size: --unit sets it"
+    size = " × ".join(f"{1000 * value:.6g}" for value in part.high - part.low)
+    mass = "" if density is None else f"; mass {density * part.volume:.6g} kg with {density:g} kg/m³"
+    lines = [
+        f"{file}: drawn in {part.unit}{said}",
+        f"extent {size} mm, from {_point(part.low)} to {_point(part.high)} mm",
+        f"volume {1e6 * part.volume:.6g} cm³ of the mesh{mass}; center of volume {_point(part.center)} mm",
+    ]
+    if part.groups:
+        lines.append(f"groups {', '.join(part.groups)}")
+    for line in (*lines, *(f"remark     {remark}" for remark in part.remarks)):
+        console.print(line, soft_wrap=True)
+    rows = []
+    for k, face in enumerate(part.faces[:LISTED], start=1):
+        radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"
+        direction = f"({', '.join(f'{value + 0.0:.4g}' for value in face.direction.round(4))})"
+        rows.append((str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}"))
+    console.print(plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "area mm²"), rows))
+    if (more := len(part.faces) - LISTED) > 0:
+        console.print(f"and {more} smaller faces")
+
+
+def _point(place: Array) -> str:
+    return f"({', '.join(f'{value + 0.0:.5g}' for value in (1000 * place).round(6))})"

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..mbs.quantities.attachment_error import JOLT
-from ..mbs.quantities.validity import Bending, deflection_warning, largest
-from ..run.result import AnalysisResult
-from ..run.solution import Solution
+from ..mbs.quantities.validity import largest
+from ..run.result import AnalysisResult, Solution
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,26 +34,6 @@ def folded(lines: Iterable[str]) -> Iterator[str]:
         before, name, after = NAMED.fullmatch(line).groups()  # type: ignore[union-attr]
         names.setdefault((before, after), {})[name] = None
     yield from (f"{before}{', '.join(of)}{after}" for (before, after), of in names.items())
-
-
-def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Yield warnings of all analyses; deflection warnings in full for the worst analysis only."""
-    bent = {name: text for name, links in bending.items() if (text := deflection_warning(links))}
-    if bent:
-        worst = max(bent, key=lambda name: max(link.missing.of_length for link in bending[name].values()))
-        others = [name for name in bent if name != worst]
-        yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
-    texts = ((name, text) for name, of in warnings.items() for text in of)
-    yield from alike((name, text) for name, text in texts if text != bent.get(name))
-
-
-def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
-    """Describe the largest deflection of links and its effect on results, in the worst analysis."""
-    of_analyses = [worst for links in bending if (worst := largest(links)) is not None]
-    if not of_analyses:
-        return "links are rigid"
-    name, link = max(of_analyses, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
-    return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
 
 
 def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> Table:
@@ -90,14 +69,18 @@ RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolv
 
 
 def error_budget(solution: Solution) -> Iterator[str]:
-    """A line each: time integration, modes, deflection, patches."""
-    results = integrated(solution)
+    """A line each: time integration, modes, the largest deflection and its effect in the worst analysis, patches."""
+    results, analyses = integrated(solution), solution.analyses
     if aims := [result.analysis.tolerance for result in results]:
         asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
         yield f"time integration: {asked} of peaks, requested tolerance"
     yield f"modes: {_modes(solution, results)}"
-    yield f"deflection: {deflection_in_words(result.bending for result in solution.analyses.values())}"
-    for name, result in solution.analyses.items():
+    text, worst = "links are rigid", [most for one in analyses.values() if (most := largest(one.bending)) is not None]
+    if worst:
+        name, link = max(worst, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
+        text = "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
+    yield f"deflection: {text}"
+    for name, result in analyses.items():
         if result.check is not None:
             yield f"{name}, {result.check.in_words}"
     layouts = (array for of_link in solution.patches.values() for array in of_link.arrays.values())

@@ -15,7 +15,7 @@ from ..mbs.posture.branches import branch_names, in_words, start_postures
 from ..mbs.posture.start import undeformed_posture
 from ..mbs.scene.space import SPACES
 from ..results.file import Results
-from ..run.solve import prepare_scene
+from ..run.prepare import prepare_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_robot
 from .lines import print_table

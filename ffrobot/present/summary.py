@@ -41,7 +41,11 @@ def summary_lines(
         of_analyses = [(*row[:-1], "") for row in of_analyses]
     texts = [*_texts(verdict, remarks), *_labelled("note", folded(notes))]
     wanted = min(sum(len(_wrapped(text, width)) for text in texts), MOST_TEXTS)
-    motors, worst = list(_motors(verdict.analyses)), list(_worst_motors(verdict.analyses))
+    completed = [one for one in verdict.analyses if one.status == "completed"]
+    judged = [one for one in completed if one.feasible is not None or one.kind == "closed-loop"]  # others replay
+    judged = judged or list(verdict.analyses)
+    motors = [_motor(name, motor, one) for one in judged for name, motor in one.motors.items()]
+    worst = list(_worst_motors(judged))
     room = LINES - printed - 3 - bool(motors)  # without both headers, accuracy, results
     for_motors = min(len(worst), MOTORS, (room + 1) // 2)
     analyses = _at_most(of_analyses, room - for_motors - min(len(texts), TEXTS))
@@ -80,20 +84,8 @@ def _remark(one: AnalysisVerdict) -> str:
     return "; ".join(filter(None, texts))
 
 
-def _judged(analyses: Sequence[AnalysisVerdict]) -> list[AnalysisVerdict]:
-    """Those that say what motors have to do, rather than replay it; all where there are none of them."""
-    completed = [one for one in analyses if one.status == "completed"]
-    return [one for one in completed if one.feasible is not None or one.kind == "closed-loop"] or list(analyses)
-
-
-def _motors(analyses: Sequence[AnalysisVerdict]) -> Iterator[Row]:
-    for one in _judged(analyses):
-        yield from (_motor(name, motor, one) for name, motor in one.motors.items())
-
-
-def _worst_motors(analyses: Sequence[AnalysisVerdict]) -> Iterator[Row]:
+def _worst_motors(judged: Sequence[AnalysisVerdict]) -> Iterator[Row]:
     """Every motor in the analysis that asks most of it, the motors in the order of the scene."""
-    judged = _judged(analyses)
     for name in dict.fromkeys(name for one in judged for name in one.motors):
         having = [one for one in judged if name in one.motors]
         most = max(having, key=lambda one: (one.motors[name].factor, one.motors[name].moment))
@@ -148,7 +140,9 @@ def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
         left = len(texts) - len(shown)
         blocks = [_wrapped(texts[k] if k < shown[-1] else _counted(texts[k], left), width) for k in shown]
         if ends_early:
-            blocks[0] = _shortened(texts[0], free, width)
+            *whole, last = _wrapped(texts[0], width)[:free]
+            ending = f" (in full: {REST})"
+            blocks[0] = [*whole, wrap(last, width - len(ending))[0] + ending]
         return [line for block in blocks for line in block]
 
     shown = [0]
@@ -160,12 +154,6 @@ def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
 
 def _counted(text: str, left: int) -> str:
     return f"{text} (+{left} more: {REST})" if left else text
-
-
-def _shortened(text: str, room: int, width: int) -> list[str]:
-    *whole, last = _wrapped(text, width)[:room]
-    ending = f" (in full: {REST})"
-    return [*whole, wrap(last, width - len(ending))[0] + ending]
 
 
 def _wrapped(text: str, width: int) -> list[str]:

@@ -17,7 +17,6 @@ from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_mass, read_modal_body
 from .analyses import AnalysisAccess
-from .datasets import Datasets
 
 if TYPE_CHECKING:
     from ..mbs.quantities.stress import Recovery
@@ -33,53 +32,6 @@ class ModalFile:
     input_hash: str
 
 
-class LinkAccess(Datasets):
-    """Access to a results file by link: modal bodies, modal coordinates, stresses."""
-
-    @property
-    def modal_files(self) -> dict[str, ModalFile]:
-        """The file behind each flexible body of the scene."""
-        entries = json.loads(self.attributes("/")["modal_bodies"]).items()
-        return {name: ModalFile(Path(e["path"]), e["sha256"], e["input_hash"]) for name, e in entries}
-
-    def modal_body(self, name: str) -> ModalBody:
-        """The modal body that body `name` was solved with.
-
-        Sought at its path, then in the folder of the results; its hash has to be the same.
-        Raises `InputError` where `name` is no flexible body, or its file cannot be found.
-        """
-        return read_modal_body(self._modal_path(name))
-
-    def modal_mass(self, name: str) -> float:
-        """Mass of a modal body, kg; reads no other data."""
-        return read_mass(self._modal_path(name))
-
-    def _modal_path(self, name: str) -> Path:
-        files = self.modal_files
-        check_known(name, files, f"{self.path}: expected a flexible body")
-        file = files[name]
-        for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
-            if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
-                return path
-        now = "another" if file.path.is_file() else "none"
-        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with', now)
-
-    def modal(self, analysis: str, body: str) -> Array:
-        """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
-        # Here, as below: what writes a group loads the core, which reading can do without.
-        from .motion import read_modal
-
-        self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
-        return read_modal(self._file[analysis], body)
-
-    def stress_recovery(self, analysis: str, body: str) -> Recovery:
-        """Data for the stresses of a flexible body, for `mbs.quantities.stress`."""
-        from .motion import read_recovery
-
-        self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
-        return read_recovery(self._file[analysis], body)
-
-
 FORMAT = "ffrobot-results"
 
 
@@ -89,7 +41,7 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
     return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
 
 
-class Results(LinkAccess, AnalysisAccess):
+class Results(AnalysisAccess):
     """Open results file; datasets have the names of the file, such as `inverse/points/link2.tip/position`.
 
     Raises `InputError` where `path` is no results file.
@@ -145,3 +97,46 @@ class Results(LinkAccess, AnalysisAccess):
     def skipped(self) -> list[str]:
         """Parts of the scene that the model omits, one line each."""
         return [str(line) for line in self.attributes("/")["skipped"]]
+
+    @property
+    def modal_files(self) -> dict[str, ModalFile]:
+        """The file behind each flexible body of the scene."""
+        entries = json.loads(self.attributes("/")["modal_bodies"]).items()
+        return {name: ModalFile(Path(e["path"]), e["sha256"], e["input_hash"]) for name, e in entries}
+
+    def modal_body(self, name: str) -> ModalBody:
+        """The modal body that body `name` was solved with.
+
+        Sought at its path, then in the folder of the results; its hash has to be the same.
+        Raises `InputError` where `name` is no flexible body, or its file cannot be found.
+        """
+        return read_modal_body(self._modal_path(name))
+
+    def modal_mass(self, name: str) -> float:
+        """Mass of a modal body, kg; reads no other data."""
+        return read_mass(self._modal_path(name))
+
+    def _modal_path(self, name: str) -> Path:
+        files = self.modal_files
+        check_known(name, files, f"{self.path}: expected a flexible body")
+        file = files[name]
+        for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
+            if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
+                return path
+        now = "another" if file.path.is_file() else "none"
+        raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with', now)
+
+    def modal(self, analysis: str, body: str) -> Array:
+        """Modal coordinates (T, n), √kg·m, of a flexible body in all modes of its modal body file, kept or not."""
+        # Here, as below: what writes a group loads the core, which reading can do without.
+        from .motion import read_modal
+
+        self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
+        return read_modal(self._file[analysis], body)
+
+    def stress_recovery(self, analysis: str, body: str) -> Recovery:
+        """Data for the stresses of a flexible body, for `mbs.quantities.stress`."""
+        from .motion import read_recovery
+
+        self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
+        return read_recovery(self._file[analysis], body)

@@ -12,8 +12,7 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.peaks import largest, root_mean_square
 from ..mbs.quantities.motion import point_motion
-from ..run.result import AnalysisResult
-from ..run.solution import Solution
+from ..run.result import AnalysisResult, Solution
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .kinds import own_results
@@ -24,7 +23,6 @@ from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, ToolError, Verd
 if TYPE_CHECKING:
     from ..actuation.motors import MotorFeasibility
 
-AXES = "xyz"
 SAME = 1e-9  # of a time: what differs by less is round-off
 SAME_TIME = 9  # digits of output times (s) that count
 
@@ -87,7 +85,7 @@ def _apart(group: h5py.Group, source: h5py.Group, scene: Scene) -> Iterator[tupl
         point, path = f"points/{record.get('point')}/position", f"trajectories/{record['name']}"
         if not len(shared) or point not in group or f"{path}/target" not in source:
             continue
-        places = [(k, AXES.index(axis)) for k, axis in enumerate(source[path].attrs["components"]) if axis in AXES]
+        places = [(k, "xyz".index(axis)) for k, axis in enumerate(source[path].attrs["components"]) if axis in "xyz"]
         target, position = source[f"{path}/target"][()][then], group[point][()][now]
         off = np.sqrt(sum((position[:, axis] - target[:, k]) ** 2 for k, axis in places))
         if places:
@@ -187,12 +185,14 @@ def _answer(
         return answer, None
     if "feasibility" not in group or _ended_early(group):
         return "", None
-    short = dict(_short(motors, patches))
-    if short:
-        lacking = [
-            f"{name} (required/available = {factor:.3g}, first at t = {since:g} s)"
-            for name, (factor, since) in short.items()
-        ]
+    needs = [(f"motor {name}", motor.factor, motor.saturation_time) for name, motor in motors.items()]
+    needs += [(f"patches of {body}", need.factor, need.since) for body, need in patches.items()]
+    lacking = [
+        f"{name} (required/available = {factor:.3g}, first at t = {since:g} s)"
+        for name, factor, since in needs
+        if factor > 1.0
+    ]
+    if lacking:
         return f"limits exceeded: {', '.join(lacking)}; details: ffrobot feasibility", False
     has_limits = any(motor.has_limits for motor in motors.values()) or any(
         np.isfinite(e["available_moment"]).any() for e in group.get("feasibility/pzt", {}).values()
@@ -207,18 +207,6 @@ def _answer(
 
 def _ended_early(group: h5py.Group) -> bool:
     return bool(group.attrs["status"] != "completed")
-
-
-def _short(
-    motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
-) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
-    for name, motor in motors.items():
-        if motor.factor > 1.0:
-            yield f"motor {name}", (motor.factor, motor.saturation_time)
-    for body, need in patches.items():
-        if need.factor > 1.0:
-            yield f"patches of {body}", (need.factor, need.since)
 
 
 def _deflection(group: h5py.Group) -> Place | None:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace
     from ..actuation.control.loop import LoopRecord
     from ..actuation.control.metrics import Metrics
-    from ..actuation.control.observer import Estimates
-    from ..actuation.control.zeros import Zeros
     from ..mbs.analysis.operating_points import RobotAtRest
     from ..mbs.inversion.motors_only import AroundPath
     from ..mbs.run.record import Run
@@ -31,22 +29,38 @@ NAMES = ("state_names", "input_names", "output_names")
 LISTED = 3  # natural frequencies
 
 
-Shapes = Mapping[str, Mapping[str, Array]]
-"""By body, what the robot's modes (T, f) do to it: displacement, turn, modal coordinates."""
-
-
 def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
-    """Write linear/ of an analysis, and its joint conditions."""
-    n_v, space = run.model.tree.n_v, run.space
-    shapes = _shapes(run, np.array([modes.motion.real for modes in linear.modes]))
+    """Write linear/ of an analysis, and its joint conditions.
+
+    Models (T, …), poles, frequencies, shapes of all bodies, reach; zeros (T, most, 2) are nan where there are fewer.
+    """
+    n_v, models = run.model.tree.n_v, linear.models
     write_joint_conditions(group, run, linear)
-    if space.is_plane:
-        models = (
+    if run.space.is_plane:
+        models = tuple(
             replace(model, transformation=_of_frames(run, k) @ model.transformation[:n_v])
-            for k, model in enumerate(linear.models)
+            for k, model in enumerate(models)
         )
-        linear = replace(linear, models=tuple(models))
-    _write_models(group, linear, shapes)
+    group = group.create_group("linear")
+    for key in MATRICES:
+        group[key] = np.array([getattr(model, key) for model in models])
+    for key in NAMES:
+        group.attrs[key] = list(getattr(models[0], key))
+    group["frequency"] = np.array([modes.frequency for modes in linear.modes])
+    group["damping_ratio"] = np.array([modes.damping_ratio for modes in linear.modes])
+    _write_poles(group, np.array([modes.poles.ravel() for modes in linear.modes]))
+    for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
+        group[kind] = np.array([reach.measure for reach in reaches])
+        group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
+    _write_shapes(group, run, np.array([modes.motion.real for modes in linear.modes]))
+    group.attrs["advice"] = linear.advice
+    for k, (pair, every) in enumerate(linear.zeros.items(), 1):
+        values = np.full((len(every), max(len(zeros.values) for zeros in every), 2), np.nan)
+        for row, zeros in zip(values, every, strict=True):
+            row[: len(zeros.values)] = np.column_stack([zeros.values.real, zeros.values.imag])
+        dataset, half = group.create_dataset(f"zeros/{k}", data=values), len(pair) // 2
+        dataset.attrs.update(columns=["real", "imaginary"], inputs=list(pair[:half]), outputs=list(pair[half:]))
+        dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in every]
 
 
 def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | RobotAtRest) -> None:
@@ -55,7 +69,7 @@ def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | 
         states, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
         own["frequency"] = np.array([one.modes.frequency for one in states])
         own["damping_ratio"] = np.array([one.modes.damping_ratio for one in states])
-        _write_shapes(own, _shapes(run, np.array([one.modes.motion.real for one in states])))
+        _write_shapes(own, run, np.array([one.modes.motion.real for one in states]))
         for point in states[0].compliance:
             own[f"compliance/{point}"] = np.array([one.compliance[point] for one in states])
 
@@ -82,9 +96,9 @@ def at_rest_in_words(group: h5py.Group) -> str:
     return "; ".join(texts)
 
 
-def _shapes(run: Run, along_v: Array) -> Shapes:
-    """What modes with rates `along_v` (T, f, coordinates) do to bodies about the states of `motion`."""
-    along_v, shapes = along_v[:, :, : run.model.tree.n_v], {}  # motors behind gears come last
+def _write_shapes(group: h5py.Group, run: Run, along_v: Array) -> None:
+    """modes/: displacement, turn and modal coordinates of bodies by modes with rates `along_v` (T, f, coordinates)."""
+    along_v = along_v[:, :, : run.model.tree.n_v]  # motors behind gears come last
     T, f, n_v = along_v.shape
     moving = replace(run, time=np.repeat(run.time, f), q=np.repeat(run.q, f, 0), v=along_v.reshape(T * f, n_v))
     space, turning = run.space, "angle" if run.space.is_plane else "rotation"
@@ -92,14 +106,8 @@ def _shapes(run: Run, along_v: Array) -> Shapes:
         body = body_motion(moving, name)
         rates = {"position": space.along(body.velocity), turning: space.about(body.angular_velocity)}
         rates["modal"] = body.modal_velocity
-        shapes[name] = {key: values.reshape(T, f, *values.shape[1:]) for key, values in rates.items()}
-    return shapes
-
-
-def _write_shapes(group: h5py.Group, shapes: Shapes) -> None:
-    for body, parts in shapes.items():
-        for key, values in parts.items():
-            group[f"modes/{body}/{key}"] = values
+        for key, values in rates.items():
+            group[f"modes/{name}/{key}"] = values.reshape(T, f, *values.shape[1:])
 
 
 def _of_frames(run: Run, row: int) -> Array:
@@ -114,36 +122,6 @@ def _of_frames(run: Run, row: int) -> Array:
     return np.concatenate(rates)
 
 
-def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> None:
-    """linear/, with models (T, …), poles, frequencies, shapes of all bodies, reach and zeros."""
-    group = group.create_group("linear")
-    for key in MATRICES:
-        group[key] = np.array([getattr(model, key) for model in linear.models])
-    for key in NAMES:
-        group.attrs[key] = list(getattr(linear.models[0], key))
-    group["frequency"] = np.array([modes.frequency for modes in linear.modes])
-    group["damping_ratio"] = np.array([modes.damping_ratio for modes in linear.modes])
-    _write_poles(group, np.array([modes.poles.ravel() for modes in linear.modes]))
-    for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
-        group[kind] = np.array([reach.measure for reach in reaches])
-        group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
-    _write_shapes(group, shapes)
-    group.attrs["advice"] = linear.advice
-    for k, (pair, zeros) in enumerate(linear.zeros.items(), 1):
-        _write_zeros(group, f"zeros/{k}", pair, zeros)
-
-
-def _write_zeros(group: h5py.Group, name: str, pair: tuple[str, ...], every: tuple[Zeros, ...]) -> None:
-    """(T, most, 2), nan where there are fewer."""
-    values = np.full((len(every), max(len(zeros.values) for zeros in every), 2), np.nan)
-    for row, zeros in zip(values, every, strict=True):
-        row[: len(zeros.values)] = np.column_stack([zeros.values.real, zeros.values.imag])
-    dataset, half = group.create_dataset(name, data=values), len(pair) // 2
-    dataset.attrs["columns"] = ["real", "imaginary"]
-    dataset.attrs["inputs"], dataset.attrs["outputs"] = list(pair[:half]), list(pair[half:])
-    dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in every]
-
-
 def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
     """Write zero_dynamics/ of an analysis with motors only."""
     from ..mbs.inversion.motors_only import is_minimum_phase
@@ -153,11 +131,9 @@ def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
     linear = inversion.linearisation
     entry["time"] = linear.times
     entry["zeros"] = np.stack([linear.zeros.real, linear.zeros.imag], axis=2)
-    entry.attrs["columns"] = ["real", "imaginary"]
-    entry.attrs["factor"] = inversion.servo.factor
+    entry.attrs.update(columns=["real", "imaginary"], factor=inversion.servo.factor)
+    entry.attrs.update(unmet_force=inversion.unmet, off_rest=inversion.off_rest)
     entry.attrs["minimum_phase"] = is_minimum_phase(linear)
-    entry.attrs["unmet_force"] = inversion.unmet
-    entry.attrs["off_rest"] = inversion.off_rest
 
 
 def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController, ...]:
@@ -206,11 +182,9 @@ def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
     error.attrs.update(peak=metrics.tip_error_max, peak_time=record.tip_error_peak_time, rms=metrics.tip_error_rms)
     group = group.create_group("control")
     write_record(group, record)
-    group.attrs["inputs"] = list(record.inputs)
-    group.attrs["outputs"] = list(record.outputs)
-    group.attrs["warnings"] = list(record.warnings)
     write_record(group, metrics)
-    group.attrs["advice"] = list(record.advice)
+    for key in ("inputs", "outputs", "warnings", "advice"):
+        group.attrs[key] = list(getattr(record, key))
     if record.feedback:
         laws = list(record.feedback.values())
         for key in "ABCD":
@@ -221,10 +195,19 @@ def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
         group["controller"].attrs.update(inputs=list(laws[0].outputs), outputs=list(laws[0].inputs))
     if record.poles is not None:
         _write_poles(group, _by_size(record.poles))
-    if record.estimate is not None:
-        _write_estimates(group.create_group("estimate"), record.estimate)
     if (margins := record.margins) is not None:
         group.attrs.update(spectral_radius=margins.radius, gain_margin=margins.gain, delay_margin=margins.delay)
+    if (estimate := record.estimate) is not None:
+        group = group.create_group("estimate")
+        for name, values in zip(estimate.names, estimate.values.T, strict=True):
+            of, _, ending = name.rpartition("/")
+            if not name.startswith("point/"):
+                group[f"rate/{of}" if ending == "rate" else name] = values
+        if estimate.position.size:  # of the tip also its standard deviation and its distance from the truth
+            for key in ("position", "error", "sigma"):
+                group[f"points/{estimate.tip}/{key}"] = getattr(estimate, key)
+        group.attrs.update(nees=estimate.nees, inside=estimate.inside)
+        _write_poles(group, _by_size(estimate.poles))
 
 
 def _by_size(poles: ComplexArray) -> ComplexArray:
@@ -237,19 +220,6 @@ def _by_size(poles: ComplexArray) -> ComplexArray:
 def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
     group["pole"] = np.stack([poles.real, poles.imag], axis=-1)
     group["pole"].attrs["columns"] = ["real", "imaginary"]
-
-
-def _write_estimates(group: h5py.Group, estimates: Estimates) -> None:
-    """By name; of the tip also its standard deviation and its distance from the truth."""
-    for name, values in zip(estimates.names, estimates.values.T, strict=True):
-        of, _, ending = name.rpartition("/")
-        if not name.startswith("point/"):
-            group[f"rate/{of}" if ending == "rate" else name] = values
-    if estimates.position.size:
-        for key in ("position", "error", "sigma"):
-            group[f"points/{estimates.tip}/{key}"] = getattr(estimates, key)
-    group.attrs.update(nees=estimates.nees, inside=estimates.inside)
-    _write_poles(group, _by_size(estimates.poles))
 
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:

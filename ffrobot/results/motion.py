@@ -14,9 +14,7 @@ from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.motion import body_motion, joint_motion, plane_angle, point_motion, point_names, reported_points
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
-from ..mbs.scene.trajectories import Trajectory
-from ..run.result import AnalysisResult
-from ..run.solution import Solution
+from ..run.result import AnalysisResult, Solution
 
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
@@ -68,7 +66,7 @@ def write_points(group: h5py.Group, result: AnalysisResult) -> None:
 
 
 def read_modal(group: h5py.Group, body: str) -> Array:
-    """P (T, n) of a flexible body of an analysis, in the modes of its modal body file."""
+    """Modal coordinates (T, n), √kg·m, of a flexible body of an analysis, in the modes of its modal body file."""
     entry = group[f"bodies/{body}"]
     p: Array = entry["modal"][()]
     return p @ entry["modal_transform"][()].T if "modal_transform" in entry else p
@@ -104,7 +102,10 @@ def write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> Non
 
 
 def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
-    """Write trajectories/ of an analysis: prescribed or followed paths, constant before and after their duration."""
+    """Write trajectories/ of an analysis: prescribed or followed paths, constant before and after their duration.
+
+    Of paths made of legs also when they begin and are over, and what was found for them.
+    """
     run, details = result.run, result.run.details
     inside = np.clip(run.time, 0.0, run.analysis.last_time)
     errors = {} if details.held is None else details.held.path_errors(run.time, run.q)
@@ -116,17 +117,10 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
         if functions := list(trajectory.components.values()):
             target = [function.sample(inside)[0] for function in functions]
             entry["target"] = target[0] if trajectory.coordinate_of else np.stack(target, axis=1)
-        _write_path(entry, trajectory)
-
-
-def _write_path(entry: h5py.Group, trajectory: Trajectory) -> None:
-    """When a path made of legs begins and is over, and what was found for it."""
-    if trajectory.path is None:
-        return
-    entry.attrs["begin"], entry.attrs["end"] = trajectory.path.begin, trajectory.path.end
-    entry.attrs["stretch"] = trajectory.stretch
-    if trajectory.shaper is not None and trajectory.shaper.frequency is not None:
-        entry.attrs["shaper_frequency"] = np.atleast_1d(trajectory.shaper.frequency)
+        if (path := trajectory.path) is not None:
+            entry.attrs.update(begin=path.begin, end=path.end, stretch=trajectory.stretch)
+            if trajectory.shaper is not None and trajectory.shaper.frequency is not None:
+                entry.attrs["shaper_frequency"] = np.atleast_1d(trajectory.shaper.frequency)
 
 
 def write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:

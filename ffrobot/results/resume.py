@@ -30,9 +30,9 @@ from ..mbs.run.record import Continuation, Run, Statistics
 from ..mbs.scene.analysis import Analysis
 from ..run.bodies import LoadedBody
 from ..run.inputs import digest_of_file, named_files, python_files
-from ..run.prepare import with_stiffening
-from ..run.solution import Solution
-from ..run.solve import Keep, prepare_scene, run_analyses
+from ..run.prepare import prepare_scene, unsolved
+from ..run.result import Solution
+from ..run.solve import Keep, run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .file import Results
@@ -119,16 +119,6 @@ def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()
     return next((place for place in places if place is not None), loc)
 
 
-def write_input_files(file: h5py.File, scene: Scene) -> None:
-    """Attributes `input_files`, and `imported_files` where the scene runs Python files: names from its folder on."""
-    file.attrs["input_files"] = json.dumps(input_files(scene))
-    folder = scene.path.parent
-    if python := python_files(tomllib.loads(scene.text), folder):
-        imported = imported_files(folder, *(file.parent for file in python), *allowed_python())
-        names = {os.path.relpath(file, folder.resolve()): digest for file, digest in imported.items()}
-        file.attrs["imported_files"] = json.dumps(names)
-
-
 def input_files(scene: Scene) -> dict[str, str]:
     """SHA-256 of a scene's input files other than links and modal bodies, by their name in messages."""
     tables, folder = tomllib.loads(scene.text), scene.path.parent
@@ -146,16 +136,6 @@ KEPT: dict[str, type[_core.TreeCheckpoint | _core.Recording | _core.Samples]] = 
 }
 """What a `Continuation` may have, as bytes of the core."""
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
-
-
-def write_earlier_run(group: h5py.Group, outcome: Run) -> None:
-    """Write the state that the next step of a run depends on, and its counts."""
-    assert outcome.continuation is not None
-    for name in ROWS:
-        group[name] = getattr(outcome, name)
-    for name in KEPT:
-        if (kept := getattr(outcome.continuation, name)) is not None:
-            group[name] = np.frombuffer(kept.to_bytes(), dtype=np.uint8)
 
 
 def earlier_runs(file: Results, solution: Solution) -> dict[str, Run]:
@@ -177,6 +157,11 @@ def _earlier_run(file: Results, analysis: Analysis, model: Model) -> Run:
     counts = {count: about[count].item() for count in COUNTS}
     ends = file[f"{name}/step_ends"] if file.has(f"{name}/step_ends") else np.zeros(0)
     choice = Choice(about["integrator"], about["integrator_reason"])
+    kept: dict[str, Any] = {
+        key: kind.of_bytes(file[f"{group}/{key}"].astype(np.uint8).tobytes())
+        for key, kind in KEPT.items()
+        if file.has(f"{group}/{key}")
+    }
     return Run(
         analysis=analysis,
         model=model,
@@ -186,17 +171,8 @@ def _earlier_run(file: Results, analysis: Analysis, model: Model) -> Run:
         a=a,
         multipliers=multipliers,
         statistics=Statistics(about["status"], choice, **counts, step_ends=ends),
-        continuation=_continuation(file, group),
+        continuation=Continuation(**kept),
     )
-
-
-def _continuation(file: Results, group: str) -> Continuation:
-    kept: dict[str, Any] = {
-        name: kind.of_bytes(file[f"{group}/{name}"].astype(np.uint8).tobytes())
-        for name, kind in KEPT.items()
-        if file.has(f"{group}/{name}")
-    }
-    return Continuation(**kept)
 
 
 def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Keep | None = None) -> Solution | None:
@@ -214,15 +190,28 @@ def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Kee
         if all(file.has(name) and file.attributes(name)["status"] == "completed" for name in names):
             return None
         if solution.scene.geometric_stiffening == "auto" and file.attributes("/")["geometric_stiffening"]:
-            solution = with_stiffening(solution)
+            solution = unsolved(replace(solution, stiffened=True))
         solution = replace(solution, earlier=earlier_runs(file, solution))
     return run_analyses(solution, watcher, keep)
 
 
 def write_state(file: h5py.File, solution: Solution) -> None:
-    """Add the state of an interrupted run to its results file, for `resume_scene`."""
-    write_input_files(file, solution.scene)
+    """Add the state of an interrupted run to its results file, for `resume_scene`, and fingerprints of its input.
+
+    Where the scene runs Python files, those that they import have names from its folder on.
+    """
+    scene, folder = solution.scene, solution.scene.path.parent
+    file.attrs["input_files"] = json.dumps(input_files(scene))
+    if python := python_files(tomllib.loads(scene.text), folder):
+        imported = imported_files(folder, *(one.parent for one in python), *allowed_python())
+        names = {os.path.relpath(one, folder.resolve()): digest for one, digest in imported.items()}
+        file.attrs["imported_files"] = json.dumps(names)
     is_kept = stopped(solution) is not None or left_out(solution)
     for name, run in solution.outcomes.items() if is_kept else ():
         if solution.goes_on(run) and run.continuation is not None:
-            write_earlier_run(file[name].create_group(GROUP), run)
+            group = file[name].create_group(GROUP)
+            for row in ROWS:
+                group[row] = getattr(run, row)
+            for key in KEPT:
+                if (kept := getattr(run.continuation, key)) is not None:
+                    group[key] = np.frombuffer(kept.to_bytes(), dtype=np.uint8)

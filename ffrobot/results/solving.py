@@ -11,7 +11,7 @@ from ..common.errors import SolveError, StoppedError
 from ..common.files import check_output
 from ..common.outputs import protected
 from ..run.inputs import files_of_tables
-from ..run.solution import Solution
+from ..run.result import Solution
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.scene import Scene

@@ -18,8 +18,7 @@ from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.posture.redundancy import resolving_joints
 from ..mbs.quantities.motion import constraint_violation
 from ..mbs.run.record import Details, Run
-from ..run.result import AnalysisResult
-from ..run.solution import Solution
+from ..run.result import AnalysisResult, Solution
 from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
 from .judging import write_off_path
@@ -105,10 +104,10 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
 
 def _write_balances(group: h5py.Group, result: AnalysisResult) -> None:
     """Of an analysis: energy/, momentum/ and how well constraints are kept."""
-    run = result.run
-    write_record(group.create_group("energy"), result.energies)
-    group["momentum/linear"] = run.space.along(result.momentum.linear)
-    group["momentum/angular"] = run.space.about(result.momentum.angular)
+    run, (energies, momentum) = result.run, result.totals
+    write_record(group.create_group("energy"), energies)
+    group["momentum/linear"] = run.space.along(momentum.linear)
+    group["momentum/angular"] = run.space.about(momentum.angular)
     violation = group.create_dataset("constraint_violation", data=constraint_violation(run))
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
 

@@ -17,7 +17,6 @@ from ..mbs._core import TimeFunction
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model
-from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis
 from ..mbs.scene.space import SPACES
@@ -33,7 +32,6 @@ Bodies = Mapping[str, LoadedBody]
 LEAST_PARTS, MOST_PARTS = 20_000, 2_560_000  # of time, in which voltages of loads are straight behind hysteresis
 STRAIGHT = 2e-4  # of the largest voltage: what parts may miss
 JUMPS, BETWEEN = 100, 0.381966  # parts that may miss more; where in parts that is seen: at no simple fraction
-FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
 
 
 @struct
@@ -42,7 +40,7 @@ class Actuation:
 
     Attributes:
         voltages: by layout.
-        unmet: by body with patches, (T, n) modal forces that voltages within their limits leave, modes of its file.
+        unmet: by body with patches, (T, n) N/√kg on modes of its file, that voltages within their limits leave.
         feasibility: whether motors and patches can do it, within their limits.
     """
 
@@ -146,19 +144,10 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str,
         voltages |= of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
     unmet = find_unmet({name: links[name] for name in patches}, patches, voltages, limited=True)
     others = {of.body for of in scene.actuation_points}
-    if any(getattr(one, "apply", None) in FORCES_AT_POINTS for one in scene.analysis if one.source == analysis.name):
-        others |= links.keys()
-    if analysis.supplies_all:
+    applied = {getattr(one, "apply", None) for one in scene.analysis if one.source == analysis.name}
+    if analysis.supplies_all or applied & {"trajectory", "points"}:  # forces there need no modal forces
         others |= links.keys()
     judged = judge_actuators(
         path=scene.path, run=run, links=links, patches=patches, voltages=voltages, analysis=analysis, others=others
     )
     return Actuation(voltages, unmet, judged)
-
-
-def missing_forces(run: Run, actuation: Actuation) -> dict[str, Array]:
-    """Return modal forces (T, n), N/√kg, by body, modes of its file, that nothing supplies; empty if none."""
-    forces = actuator_forces(run)
-    if forces is None or not motors_fit(run) or not (actuation.unmet or actuation.feasibility.unsupplied):
-        return {}
-    return {**forces.modal, **actuation.unmet}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from ..actuation.patches.records import PztLayout, by_body
+from ..actuation.patches.records import by_body
 from ..common.errors import InputError, did_you_mean, of_file, quoted
 from ..common.structs import struct
 from ..fe_models.link_records.families import FAMILIES, Family
@@ -71,23 +71,10 @@ class LoadedBody:
         return tuple(one for one in self.motions if one in self.modal.family and one not in kept)
 
 
-IN_PLANE: tuple[Family, ...] = ("in-plane-bending",)
-"""Of planar scenes; stretch: see `omissions`."""
-
-
-def robot_damping_ratios(bodies: Mapping[str, LoadedBody]) -> dict[str, float]:
-    """Return ζ by body, for links whose damping ratio is that of the robot's vibrations."""
-    return {
-        name: float(modal.damping_ratio[0])
-        for name, body in bodies.items()
-        if (modal := body.modal) is not None and modal.damping_of == "robot"
-    }
-
-
 P = TypeVar("P", Payload, Tool)
 
 
-def records_on(
+def _records_on(
     kind: str, records: Iterable[P], body: str, points: Collection[str], scene: Path
 ) -> Iterator[tuple[str, P]]:
     """Payloads or tools (`kind`) of a body with their points. Raises `InputError` for a point that it does not have."""
@@ -103,8 +90,8 @@ def records_on(
         yield point, record
 
 
-def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
-    """Load bodies in the order of the scene, with payloads and patches; runs stage 1 for outdated links.
+def load_bodies(scene: Scene, stage: Callable[[str], None]) -> dict[str, LoadedBody]:
+    """Load bodies by name in the order of the scene, with payloads and patches; runs stage 1 for outdated links.
 
     They have geometric stiffening where the scene, or the key `pieces` of the body, may put it into the equations.
 
@@ -112,20 +99,32 @@ def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
     """
     patches = dict(by_body(scene.pzt))
     with of_file(scene.path):
-        wanted = bool(scene.geometric_stiffening)
-        loaded = [_loaded(scene, body, wanted or body.pieces is not None, stage) for body in scene.body]
-    bodies = [(body.spatial.name, _with_payloads(scene, body)) for body in loaded]
-    complete = [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
-    if not scene.is_planar:
-        return complete
-    return [replace(one, spatial=projected(one.spatial), carrying=projected(one.carrying)) for one in complete]
+        loaded = {body.name: _loaded(scene, body, stage) for body in scene.body}
+    for name, body in loaded.items():
+        spatial = carrying = body.spatial
+        for point, payload in _records_on("payload", scene.payload, name, spatial.points, scene.path):
+            F = spatial.points[point].triad
+            about = point, payload.mass, F @ np.array(payload.center), F @ tensor(payload.inertia) @ F.T
+            carrying = with_payload(carrying, *about)
+            if body.modal is None or not turns_as_a_body(scene, payload):
+                spatial = with_payload(spatial, *about)
+        body = replace(body, spatial=spatial, carrying=carrying)
+        if any(layout.adds_mass or layout.adds_stiffness for layout in patches.get(name, ())):
+            from ..actuation.patches.link_patches import link_patches, placed_patches
+
+            assert body.modal is not None
+            link_patches(scene.path, patches[name], body.modal, carrying)  # refuses patches that do not fit
+            body = with_structure(body, placed_patches(scene.path, patches[name], body.modal))
+        if scene.is_planar:
+            body = replace(body, spatial=projected(body.spatial), carrying=projected(body.carrying))
+        loaded[name] = body
+    return loaded
 
 
-def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str], None]) -> LoadedBody:
+def _loaded(scene: Scene, body: BodyKeys, stage: Callable[[str], None]) -> LoadedBody:
     """Without payloads and patches, which in a planar scene are on modes that move in the plane."""
     path, computed, reused, modal = None, False, "", None
-    if body.rigid is not None:
-        rigid = body.rigid
+    if (rigid := body.rigid) is not None:
         points = {name: np.array(position) for name, position in rigid.points.items()}
         made = rigid_body(body.name, rigid.mass, np.array(rigid.center), tensor(rigid.inertia), points)
     elif body.modal is not None:
@@ -137,9 +136,10 @@ def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str]
         outcome = cached_modal_body(body.link, stage)
         modal, path, computed, reused = outcome.body, outcome.path, outcome.computed, outcome.reused
     if modal is not None:
+        stiffened = bool(scene.geometric_stiffening) or body.pieces is not None
         made = from_modal_body(body.name, modal, stiffened, is_planar=scene.is_planar)
     made = projected(made) if scene.is_planar else made
-    for _, tool in records_on("tool", scene.tool, made.name, made.points, scene.path):
+    for _, tool in _records_on("tool", scene.tool, made.name, made.points, scene.path):
         if tool.name in made.points:
             raise InputError(f'tool: name: expected one that no point of "{made.name}" has', f'"{tool.name}"')
         made = with_tool(made, tool)
@@ -150,30 +150,8 @@ def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str]
         path=path,
         computed=computed,
         reused=reused,
-        motions=IN_PLANE if scene.is_planar else FAMILIES,
+        motions=("in-plane-bending",) if scene.is_planar else FAMILIES,  # stretch: see `omissions`
     )
-
-
-def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
-    spatial = carrying = body.spatial
-    for point, payload in records_on("payload", scene.payload, spatial.name, spatial.points, scene.path):
-        F = spatial.points[point].triad
-        about = point, payload.mass, F @ np.array(payload.center), F @ tensor(payload.inertia) @ F.T
-        carrying = with_payload(carrying, *about)
-        if body.modal is None or not turns_as_a_body(scene, payload):
-            spatial = with_payload(spatial, *about)
-    return replace(body, spatial=spatial, carrying=carrying)
-
-
-def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> LoadedBody:
-    """With the mass and stiffness of its patches, as far as the scene asks for it."""
-    if not any(layout.adds_mass or layout.adds_stiffness for layout in layouts):
-        return body
-    from ..actuation.patches.link_patches import link_patches, placed_patches
-
-    assert body.modal is not None
-    link_patches(scene.path, layouts, body.modal, body.carrying)  # refuses patches that do not fit
-    return with_structure(body, placed_patches(scene.path, layouts, body.modal))
 
 
 def with_structure(body: LoadedBody, placed: Sequence[PlacedLayout]) -> LoadedBody:

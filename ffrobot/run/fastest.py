@@ -7,7 +7,7 @@ duration excites more than another, and the motion that is found has been solved
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, sqrt
 from typing import TYPE_CHECKING
@@ -150,38 +150,29 @@ def _names(scene: Scene) -> str:
     return quoted(one.name for one in scene.trajectory if one.fastest)
 
 
-Notes = tuple[str, ...]
-
-
-def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, Notes]:
+def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with shapers for its frequencies and paths stretched to be `fastest`, and remarks.
 
     `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """
-    scene, notes = _shaped(scene, model)
+    tables = [(one, one.waypoints) for one in scene.trajectory if one.waypoints is not None]
+    notes = list(dict.fromkeys(remark for _, table in tables for remark in table.remarks))
+    splines = ((one.name, table.abrupt_hold) for one, table in tables if one.profile in (None, "spline"))
+    notes += [f'trajectory "{name}": {hold}' for name, hold in splines if hold]
+    asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
+    if asking:
+        paths = [path for one in scene.trajectory if (path := one.path) is not None]
+        begin, end = min(path.begin for path in paths), max(path.end for path in paths)
+        frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
+        notes += [f"{name}: {_in_words(shaper, frequencies)}" for name, shaper in asking.items()]
+        shapers = {name: _for_robot(shaper, frequencies) for name, shaper in asking.items()}
+        changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
+        scene = scene.model_copy(update={"trajectory": tuple(changed)})
     if any(trajectory.fastest for trajectory in scene.trajectory):
         stage("fastest motion")
         scene, note = fastest(scene, judge)
-        notes = (*notes, note)
-    return scene, notes
-
-
-def _shaped(scene: Scene, model: Model) -> tuple[Scene, Notes]:
-    """The scene with shapers for frequencies of the robot where they ask for these; notes on them and on tables."""
-    asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
-    tables = [(one, one.waypoints) for one in scene.trajectory if one.waypoints is not None]
-    of_tables: Notes = tuple(dict.fromkeys(remark for _, table in tables for remark in table.remarks))
-    splines = {one.name: table for one, table in tables if one.profile in (None, "spline")}
-    holds = ((name, table.abrupt_hold) for name, table in splines.items())
-    of_tables = (*of_tables, *(f'trajectory "{name}": {remark}' for name, remark in holds if remark))
-    if not asking:
-        return scene, of_tables
-    begin, end = _span(scene)
-    frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
-    shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, frequencies) for name, shaper in asking.items()}
-    changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
-    of_shapers: Notes = tuple(f"{name}: {_in_words(shaper, frequencies)}" for name, shaper in asking.items())
-    return scene.model_copy(update={"trajectory": tuple(changed)}), (*of_tables, *of_shapers)
+        notes.append(note)
+    return scene, tuple(notes)
 
 
 def _for_robot(shaper: Shaper, frequencies: PathFrequencies) -> Shaper:
@@ -195,11 +186,3 @@ def _for_robot(shaper: Shaper, frequencies: PathFrequencies) -> Shaper:
 def _in_words(shaper: Shaper, frequencies: PathFrequencies) -> str:
     ranges = (f"{f.mean():.4g} Hz ({f.min():.4g} to {f.max():.4g} along the path)" for f in frequencies.frequency.T)
     return f"{shaper.kind} shaper for {', '.join(list(ranges)[: shaper.modes])}"
-
-
-def _span(scene: Scene) -> tuple[float, float]:
-    """When the first path begins and the last one is over, s."""
-    paths = [one.path for one in scene.trajectory]
-    ends = [path.end for path in paths if path is not None]
-    begins = [path.begin for path in paths if path is not None]
-    return min(begins), max(ends)

@@ -1,4 +1,4 @@
-"""How many modes of the links a scene needs for its tolerance: more and more are tried.
+"""`modes = "auto"` of bodies: how many modes a scene needs for its tolerance, of which more and more are tried.
 
 The first solves are cheap: few modes leave out the high frequencies, which hold the steps down.
 """
@@ -6,49 +6,91 @@ The first solves are cheap: few modes leave out the high frequencies, which hold
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.arrays import Array
-from ..common.structs import struct
+from ..common.arrays import Array, as_floats
 from ..mbs.model.body import Body
-
-if TYPE_CHECKING:
-    from ..scene.scene import Scene
-
-Errors = Mapping[str, Mapping[str, float]]
-"""By analysis and kind of quantity, relative to peaks."""
-
-
-@struct
-class ModeChoice:
-    """Result of the search for the number of modes.
-
-    Attributes:
-        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
-            by analysis and kind; 0 where all modes of the files were needed.
-        before: likewise, how much the last solve differs from the one before it.
-        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
-        seconds: of the solves before the last.
-        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
-    """
-
-    errors: Errors
-    before: Errors
-    tried: tuple[int, ...]
-    seconds: float
-    highest: tuple[float, float]
-
+from ..mbs.model.truncation import loaded_points, with_fewer_modes
+from ..mbs.quantities.motion import point_motion
+from ..mbs.quantities.supply import followed_trajectories, motor_moments, path_force
+from ..scene.scene import Scene
+from .bodies import LoadedBody
+from .result import AnalysisResult, Errors, ModeChoice
 
 Reported = Mapping[str, Mapping[str, Array]]
 """Quantities of an analysis by kind and name, (T, …)."""
 
+GROWTH = 1.5  # of the number of modes from one solve to the next
+ALIKE = 1e-9  # of ω²: of a round link, both planes of bending
 LEAST_RATIO = 0.1  # of two differences one after the other: better ones are luck
 MARGIN = 0.5  # part of the tolerance that an estimate has to meet: it may be too small
 SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measured against that
+
+
+def reported_modes(result: AnalysisResult) -> Reported:
+    """Return what `modes = "auto"` compares, by kind; moments on joints and paths over the largest length of links."""
+    run = result.run
+    nodes = [node for node in run.model.tree.nodes if node.body.n_modes]
+    size = max((node.body.length or 0.0 for node in nodes), default=0.0) or 1.0
+    forces: dict[str, Array] = {}
+    for trajectory in followed_trajectories(run):
+        force, places = path_force(run, trajectory.name), len(trajectory.components)
+        forces[f"trajectory {trajectory.name}"] = force[:, :places]
+        forces[f"trajectory {trajectory.name}, moment"] = as_floats(force[:, places:] / size)
+    for joint, acting in result.reactions.items():
+        forces[f"joint {joint}"], forces[f"joint {joint}, moment"] = acting.force, as_floats(acting.moment / size)
+    points = [f"{node.body.name}.{label}" for node in nodes for label in node.body.points]
+    voltages = {} if result.actuation is None else result.actuation.voltages
+    found_by_kind = {
+        "deflections": {point: point_motion(run, point).deflection for point in points},
+        "forces": {name: values for name, values in forces.items() if values.size},
+        "motors": motor_moments(run),
+        "voltages": {name: of.required for name, of in voltages.items()},
+    }
+    return {kind: quantities for kind, quantities in found_by_kind.items() if quantities}
+
+
+def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str, Body]]:
+    """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
+
+    A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that count.
+    These are the family with most modes: with those of one plane alone, both planes of bending come at once. In a
+    planar scene all modes count. `bodies` may have fewer modes already.
+    """
+    wanted = {body.name: body.modes for body in scene.body if body.modes is not None}
+    whole = {name: bodies[name].spatial.whole for name in wanted}
+    loaded = {name: loaded_points(scene, name) for name in wanted}
+    fixed = {
+        name: with_fewer_modes(whole[name], modes, loaded[name])
+        for name, modes in wanted.items()
+        if isinstance(modes, int)
+    }
+    auto = {name: whole[name] for name, modes in wanted.items() if modes == "auto"}
+    if not auto:
+        return [fixed]
+    counted: dict[str, list[float]] = {}  # ω² by family
+    for name, body in auto.items():
+        modal = bodies[name].modal
+        assert modal is not None
+        families = [""] * body.n_eigenmodes if scene.is_planar else modal.family  # attachment modes come after them
+        for family, square in zip(families, body.stiffness[: body.n_eigenmodes], strict=False):
+            counted.setdefault(family, []).append(square)
+    squares, each = np.sort(max(counted.values(), key=len, default=[])), 1
+    levels: list[dict[str, Body]] = []
+    while each * len(auto) < len(squares):
+        cut = squares[each * len(auto) - 1] * (1 + ALIKE)
+        level = {
+            name: with_fewer_modes(body, int(np.count_nonzero(body.stiffness <= cut)), loaded[name])
+            for name, body in auto.items()
+        }
+        if all(body.reduction is None for body in level.values()):
+            break
+        levels.append(fixed | level)
+        each = int(np.ceil(GROWTH * each))
+    return [*levels, fixed | auto]
 
 
 @dataclass
@@ -70,12 +112,16 @@ class ErrorEstimate:
         if self.last:
             self.differences = {name: difference(of, self.last[name]) for name, of in reported.items()}
         self.last = reported
-        ratios = {name: _ratio(of, before[name]) for name, of in self.differences.items() if name in before}
-        self.ratio = max(ratios.values(), default=None)
-        self.errors = {
-            name: {kind: d * _remaining(ratios.get(name, 1.0)) for kind, d in of.items()}
-            for name, of in self.differences.items()
-        }
+        errors: dict[str, dict[str, float]] = {}
+        ratios: list[float] = []
+        for name, of in self.differences.items():
+            left = 1.0  # to come, of the last difference: a geometric series
+            if name in before:
+                ratios.append(_ratio(of, before[name]))
+                ratio = max(ratios[-1], LEAST_RATIO)
+                left = min(1.0, ratio / (1.0 - ratio)) if ratio < 1.0 else 1.0
+            errors[name] = {kind: d * left for kind, d in of.items()}
+        self.errors, self.ratio = errors, max(ratios, default=None)
 
     def meets(self, tolerances: Mapping[str, float]) -> bool:
         """Whether all errors, by analysis, are well within tolerance; needs at least two differences."""
@@ -94,12 +140,6 @@ def _ratio(now: Mapping[str, float], before: Mapping[str, float]) -> float:
     return max((now[kind] / max(before[kind], 1e-300) for kind in now if now[kind] > 0.0), default=LEAST_RATIO)
 
 
-def _remaining(ratio: float) -> float:
-    """What is left to come, as a part of the last difference: a geometric series."""
-    ratio = max(ratio, LEAST_RATIO)
-    return min(1.0, ratio / (1.0 - ratio)) if ratio < 1.0 else 1.0
-
-
 def difference(now: Reported, before: Reported) -> dict[str, float]:
     """Return, by kind, the largest difference of two solves relative to the peak of its quantity."""
     errors = {}
@@ -115,14 +155,20 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
 
 
 class ModeSearch:
-    """Search for a sufficient number of modes.
+    """Search for the number of modes that keeps the error tolerance of each analysis of a scene.
 
-    `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`mode_levels`).
+    That of algebraic ones is by default the tightest of the integrated ones. `bodies`: with all modes, or fewer.
     """
 
-    def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, Body]]) -> None:
-        self._tolerances = tolerances
-        self._levels: Sequence[Mapping[str, Body]] = levels
+    def __init__(self, scene: Scene, bodies: Mapping[str, LoadedBody]) -> None:
+        tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
+        self._tolerances = {
+            analysis.name: tightest
+            if tightest is not None and not analysis.is_resumable and "tolerance" not in analysis.model_fields_set
+            else analysis.tolerance
+            for analysis in scene.analysis
+        }
+        self._levels = mode_levels(scene, bodies)
         self._estimate, self._tried = ErrorEstimate(), list[int]()
         self.is_over = False  # whether the last solve is the one to keep
         self._level, self._completed = 0, False
@@ -164,14 +210,3 @@ class ModeSearch:
         )
         seconds = self._last - self._began
         return ModeChoice(errors, self._estimate.differences, tuple(self._tried), seconds, (kept, every))
-
-
-def error_tolerances(scene: Scene) -> dict[str, float]:
-    """Return the error tolerance of each analysis; default of algebraic ones: the tightest of the integrated ones."""
-    tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
-    return {
-        analysis.name: tightest
-        if tightest is not None and not analysis.is_resumable and "tolerance" not in analysis.model_fields_set
-        else analysis.tolerance
-        for analysis in scene.analysis
-    }

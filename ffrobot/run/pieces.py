@@ -1,21 +1,24 @@
-"""Links in pieces: what their pieces are, how far they bend, and how many are enough."""
+"""Links in pieces: what their pieces are, how far they bend, how many are enough, and the whole links' motion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..common.arrays import as_floats
 from ..common.errors import InputError
-from ..mbs.model.divided_link import LinkInPieces
+from ..mbs.model.divided_link import DividedLink, LinkInPieces, PieceOfLink, divided_link_of
+from ..mbs.model.model import Model
 from ..mbs.quantities.attachment_error import PieceInMotion, missed_by_pieces
 from ..mbs.quantities.motion import modal_coordinates, node_of, section_motion
 from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
+from ..mbs.run.context import WholeLinks
 from ..mbs.run.record import Run
-from ..scene.pieces import BodyInPieces, bodies_in_pieces
+from ..scene.pieces import bodies_in_pieces, places_on_pieces
 from ..scene.scene import Scene
 from .prepared import Prepared
 
@@ -51,24 +54,39 @@ def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
     for body in prepared.scene.body:
         if body.pieces == "auto":
             names = prepared.divided[body.name].names if body.name in prepared.divided else (body.name,)
-            worst = max((_shortening(prepared, runs, name) for name in names), default=0.0)
+            worst = 0.0  # shortening, of the length
+            for name in names:
+                modal = (prepared.parts or prepared.bodies)[name].modal
+                assert modal is not None
+                for run in runs:
+                    shortening = shape_from_chord(modal, modal_coordinates(run, name))[2].max(initial=0.0)
+                    worst = max(worst, float(shortening) / modal.length)
             count = enough_pieces(worst, len(names)) if worst > ENOUGH else 1
             wanted[body.name], now[body.name] = max(min(MOST, count), len(names)), len(names)
     return {} if wanted == now else wanted
 
 
 def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
-    """Return deflections of flexible bodies (of links in pieces, the worst piece) and whether they can be divided."""
-    bodies = prepared.parts or prepared.bodies
+    """Return deflections of flexible bodies (of links in pieces, the worst piece) and whether they can be divided.
+
+    In motion with the largest errors of any link for all: errors of one link move and load all others.
+    """
+    bodies, divided = prepared.parts or prepared.bodies, prepared.divided
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
-    worst = worst_of_pieces(link_bending(run, links), prepared.divided)
-    for name in prepared.divided:
-        if worst[name].is_stiffened:
-            worst[name] = replace(worst[name], missing=_missing(prepared, run, name))
-    if not run.is_at_rest:
-        worst = shared_in_motion(worst)
+    link_of = {piece: name for name, body in divided.items() for piece in body.names}
+    worst: dict[str, Bending] = {}
+    for piece, bent in link_bending(run, links).items():
+        name = link_of.get(piece, piece)
+        if name not in worst or bent.missing.of_length > worst[name].missing.of_length:
+            worst[name] = bent
+    for name, body in divided.items():
+        missing = _missing(prepared, run, name) if worst[name].is_stiffened else worst[name].missing
+        worst[name] = replace(worst[name], pieces=len(body.names), missing=missing)
+    if worst and not run.is_at_rest:
+        most = Missing(*map(max, zip(*(of.missing for of in worst.values()), strict=True)))
+        worst = {name: replace(of, missing=of.missing.grown_to(most)) for name, of in worst.items()}
     return {
-        name: replace(bent, is_divisible=is_divisible(prepared.scene, name)) if bent.is_beyond else bent
+        name: replace(bent, is_divisible=_is_divisible(prepared.scene, name)) if bent.is_beyond else bent
         for name, bent in worst.items()
     }
 
@@ -88,38 +106,53 @@ def _missing(prepared: Prepared, run: Run, name: str) -> Missing:
     return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
 
 
-def _shortening(prepared: Prepared, runs: Sequence[Run], name: str) -> float:
-    """The largest of a body of the equations over all analyses, of its length."""
-    modal = (prepared.parts or prepared.bodies)[name].modal
-    assert modal is not None
-    shortenings = [shape_from_chord(modal, modal_coordinates(run, name))[2].max(initial=0.0) for run in runs]
-    return float(max(shortenings, default=0.0)) / modal.length
-
-
-def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyInPieces]) -> dict[str, Bending]:
-    """Return deflections of links; for a divided link those of its worst piece."""
-    link_of = {piece: name for name, body in divided.items() for piece in body.names}
-    worst: dict[str, Bending] = {}
-    for piece, bent in bending.items():
-        name = link_of.get(piece, piece)
-        if name not in worst or bent.missing.of_length > worst[name].missing.of_length:
-            worst[name] = bent
-    return {
-        name: replace(bent, pieces=len(divided[name].names)) if name in divided else bent
-        for name, bent in worst.items()
-    }
-
-
-def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:
-    """Return deflections with the largest errors for all links: errors of one link move and load all others."""
-    missing = [of.missing for of in bending.values()] or [Missing(0.0, 0.0)]
-    worst = Missing(*(max(errors) for errors in zip(*missing, strict=True)))
-    return {name: replace(of, missing=of.missing.grown_to(worst)) for name, of in bending.items()}
-
-
-def is_divisible(scene: Scene, name: str) -> bool:
-    """Whether the scene lets a body be divided into pieces."""
+def _is_divisible(scene: Scene, name: str) -> bool:
     try:
         return bool(bodies_in_pieces(scene, {name: 2}))
     except InputError:
         return False
+
+
+def make_whole_links(prepared: Prepared) -> WholeLinks | None:
+    """What analyses have to know of whole links where the equations are those of pieces; None where none is divided."""
+    if prepared.whole is None:
+        return None
+    divided = {}
+    for name, link in links_in_pieces(prepared).items():
+        own = (prepared.parts[piece].spatial for piece in link.names)
+        pieces = [PieceOfLink(*of) for of in zip(link.starts, link.pieces, own, strict=True)]
+        divided[name] = divided_link_of(link.modal, prepared.bodies[name].spatial, pieces)
+    places = places_on_pieces(prepared.divided)
+    return WholeLinks(prepared.whole, divided, places, partial(_as_links, prepared.whole, divided))
+
+
+def _as_links(whole: Model, divided: Mapping[str, DividedLink], run: Run) -> Run:
+    """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
+
+    Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.
+    """
+    tree = run.model.tree
+    q = np.zeros((len(run.time), whole.tree.n_q))
+    v, a = np.zeros((2, len(run.time), whole.tree.n_v))
+    for node in whole.tree.nodes:
+        if node.joint.freedoms:
+            number = tree.carried.get(node.joint.name)
+            same = number is not None and tree.nodes[number].backwards == node.backwards
+            if number is None or not (same or len(node.joint.units) == 1):
+                raise InputError(
+                    f"{whole.scene.path}: {node.joint.label}: expected joints that have the same place in the tree with"
+                    " subdivided links as with whole ones if these are controlled",
+                    "another. List it before the others of its loop",
+                )
+            sign, other = 1.0 if same else -1.0, tree.nodes[number]
+            for to, values, slices in zip((q, v, a), (run.q, run.v, run.a), ("q", "v", "v"), strict=True):
+                to[:, getattr(node, slices)] = sign * values[:, getattr(other, slices)]
+        link = divided.get(node.body.name)
+        names = (node.body.name,) if link is None else link.bodies
+        bodies = [tree.nodes[tree.index[name]] for name in names]
+        T = np.eye(node.body.n_modes) if link is None else link.gathered
+        for to, values, place in zip((q, v, a), (run.q, run.v, run.a), ("p_q", "p_v", "p_v"), strict=True):
+            to[:, getattr(node, place)] = np.hstack([values[:, getattr(of, place)] for of in bodies]) @ T.T
+    multipliers = np.zeros((len(run.time), len(whole.rows)))
+    alone = replace(run, required=None, prescribed=None, twists={}, links={})
+    return replace(alone, model=whole, q=q, v=v, a=a, multipliers=multipliers)

@@ -1,4 +1,4 @@
-"""What is read off a run: evaluated where it is asked for, since studies ask for little of most runs."""
+"""What a solve computed: a scene and the results of its analyses, evaluated where studies ask for them."""
 
 from __future__ import annotations
 
@@ -30,16 +30,15 @@ from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
 from ..mbs.quantities.stress import BodyStress
-from ..mbs.quantities.supply import Energies, Momentum, actuator_forces, gear_motions, totals
+from ..mbs.quantities.supply import Energies, Momentum, actuator_forces, gear_motions, motors_fit, totals
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.run.gears import unresolved_gears
 from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis, TimedAnalysis
-from .actuation import Actuation, find_actuation, missing_forces
-from .pieces import bending_of_links, links_in_pieces
+from .actuation import Actuation, find_actuation
+from .pieces import bending_of_links, links_in_pieces, make_whole_links
 from .prepared import Prepared
 from .stresses import find_stresses
-from .whole_links import make_whole_links
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.points import PointForces
@@ -161,7 +160,7 @@ class AnalysisResult:
         result = cls(prepared, seen, Histories(prepared, closest, outputs), commanding, sharing)
         if prepared.wanted is None:  # now: an error is one of the outputs of this analysis
             of = result.histories
-            _ = of.reactions, of.actuation, of.stresses, of.point_forces, result._totals, result.bending
+            _ = of.reactions, of.actuation, of.stresses, of.point_forces, result.totals, result.bending
             _ = result.point_forces, result.settling, result.predicted_shift
         return result
 
@@ -176,18 +175,9 @@ class AnalysisResult:
         return made
 
     @cached_property
-    def _totals(self) -> tuple[Energies, Momentum]:
+    def totals(self) -> tuple[Energies, Momentum]:
+        """Of the robot."""
         return totals(self.run)
-
-    @property
-    def energies(self) -> Energies:
-        """Of the robot."""
-        return self._totals[0]
-
-    @property
-    def momentum(self) -> Momentum:
-        """Of the robot."""
-        return self._totals[1]
 
     @cached_property
     def point_forces(self) -> Mapping[str, PointForces]:
@@ -218,21 +208,23 @@ class AnalysisResult:
     def predicted_shift(self) -> Mapping[str, Array]:
         """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces that of the links.
 
-        None where the joints of whole links cannot say how the pieces move.
+        Empty without such forces, and where the joints of whole links cannot say how the pieces move.
         """
         run, of = self.run, self.histories
-        missing = {} if of.actuation is None else missing_forces(of.run, of.actuation)
-        if not missing:
+        asked, forces = of.actuation, actuator_forces(of.run)
+        if asked is None or forces is None or not motors_fit(of.run):
+            return {}
+        if not (asked.unmet or asked.feasibility.unsupplied):
             return {}
         from ..actuation.feasibility import quasi_static_shift
 
-        points = point_names(run)
+        points, missing = point_names(run), {**forces.modal, **asked.unmet}
         if (whole := make_whole_links(self.prepared)) is not None:
             try:
                 run = whole.as_links(run)
             except InputError:
                 return {}
-        return quasi_static_shift(run, {name: forces[of.outputs] for name, forces in missing.items()}, points)
+        return quasi_static_shift(run, {name: values[of.outputs] for name, values in missing.items()}, points)
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:
@@ -280,7 +272,8 @@ class AnalysisResult:
         """Reasons to doubt the results, one text each, most serious first."""
         bent, run = deflection_warning(self.bending), self.run
         texts = [bent] if bent else []
-        texts += [*self._doubts, *run.statistics.warnings, *unresolved_gears(gear_motions(run)), *run.details.warnings]
+        texts += [*doubts(run, run.analysis.tolerance), *run.statistics.warnings]
+        texts += [*unresolved_gears(gear_motions(run)), *run.details.warnings]
         if not isinstance(self.analysis, IntegratedAnalysis) and len(run.time):
             of = self.histories.run
             texts += left_ranges(of.model, None, of.time, of.q, of.v)
@@ -299,10 +292,6 @@ class AnalysisResult:
             return (*texts, "no motors, so no torques: joints of kinematic loops have motors with motor = true alone")
         return texts
 
-    @cached_property
-    def _doubts(self) -> tuple[str, ...]:
-        return tuple(doubts(self.run, self.run.analysis.tolerance))
-
     @property
     def stiffening_effect(self) -> float:
         """Largest relative change of a link's stiffness by the loads of the run."""
@@ -313,3 +302,61 @@ def _point_forces(prepared: Prepared, run: Run) -> dict[str, PointForces]:
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         return {name: solve_points(points, run) for name, points in prepared.points.items()}
     return {}
+
+
+Errors = Mapping[str, Mapping[str, float]]
+"""By analysis and kind of quantity, relative to peaks."""
+
+
+@struct
+class ModeChoice:
+    """Result of the search for the number of modes.
+
+    Attributes:
+        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
+            by analysis and kind; 0 where all modes of the files were needed.
+        before: likewise, how much the last solve differs from the one before it.
+        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
+        seconds: of the solves before the last.
+        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
+    """
+
+    errors: Errors
+    before: Errors
+    tried: tuple[int, ...]
+    seconds: float
+    highest: tuple[float, float]
+
+
+@struct
+class Solution(Prepared):
+    """Everything a solve of a scene in space computed.
+
+    Attributes:
+        analyses: by name, in the order of the scene.
+        seconds: wall time by stage.
+        failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
+        unread: the run of the analysis of which outputs failed; its integration is kept.
+        path_notes: what was found of paths before the analyses, one line each.
+        earlier: runs of analyses to go on with, from a results file: see `results.resume`.
+        mode_choice: where `modes = "auto"`.
+    """
+
+    analyses: Mapping[str, AnalysisResult] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    failure: Exception | None = None
+    unread: Run | None = None
+    path_notes: tuple[str, ...] = ()
+    earlier: Mapping[str, Run] = field(default_factory=dict)
+    mode_choice: ModeChoice | None = None
+
+    @property
+    def outcomes(self) -> dict[str, Run]:
+        """Runs by the name of their analysis."""
+        runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
+        return {run.analysis.name: run for run in runs}
+
+    def goes_on(self, outcome: Run) -> bool:
+        """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+        searched = any("auto" in (body.modes, body.pieces) for body in self.scene.body)
+        return not searched and outcome.analysis.is_resumable

@@ -19,7 +19,6 @@ from ..common.errors import SolveError
 from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.operating_points import locked_motors
-from ..mbs.joints.joints import AnyJoint
 from ..mbs.joints.moving_joint import GearedJoint
 from ..mbs.joints.twist_spring import stiffer
 from ..mbs.linear.statics import static_equilibrium
@@ -68,8 +67,11 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
     robots: dict[str, list[Model]] = {"as computed": [nominal], held: [nominal]}
     for cause, robot in varied_robots(nominal, asked):
         robots.setdefault(cause, []).append(robot)
-    forces = asked.force * np.eye(3)[: 2 if nominal.scene.is_planar else 3]
-    robots[f"{asked.force:g} N at the tip"] = [_with_force(nominal, runs.points[-1], force) for force in forces]
+    scene, tip = nominal.scene, runs.points[-1]
+    forces = [Load.model_validate({"point": tip, axis: f"{asked.force!r}"}) for axis in "xyz"[: 3 - scene.is_planar]]
+    robots[f"{asked.force:g} N at the tip"] = [
+        build_model(scene.model_copy(update={"load": (*scene.load, force)}), _bodies(nominal)) for force in forces
+    ]
 
     def lane(run: Callable[[Model], Run], *, is_sampled: bool) -> Array:
         """Return the largest error for each cause; NaN "as computed" for runs that are sampled in any case."""
@@ -93,14 +95,13 @@ def varied_robots(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]
             varied = [scaled(body, **{what: factor}) if body.n_modes else body for body in bodies]
             yield f"{what} ± {100 * share:g} %", build_model(scene, varied)
     for share, factor in _both_ways(asked.gears if elastic_joints(model) else ()):
-        joints = tuple(_with_gear(joint, factor) for joint in scene.joint)
+        joints = tuple(
+            joint.model_copy(update={"stiffness": stiffer(joint.stiffness, factor)})
+            if isinstance(joint, GearedJoint) and joint.stiffness is not None
+            else joint
+            for joint in scene.joint
+        )
         yield f"gear stiffness ± {100 * share:g} %", build_model(scene.model_copy(update={"joint": joints}), bodies)
-
-
-def _with_gear(joint: AnyJoint, factor: float) -> AnyJoint:
-    if not isinstance(joint, GearedJoint) or joint.stiffness is None:
-        return joint
-    return joint.model_copy(update={"stiffness": stiffer(joint.stiffness, factor)})
 
 
 def _both_ways(shares: Sequence[float]) -> Iterator[tuple[float, float]]:
@@ -110,12 +111,6 @@ def _both_ways(shares: Sequence[float]) -> Iterator[tuple[float, float]]:
 def _bodies(model: Model) -> list[Any]:
     names = {body.name for body in model.scene.body}
     return [node.body for node in model.tree.nodes if node.body.name in names]
-
-
-def _with_force(model: Model, point: str, force: Array) -> Model:
-    keys = {axis: f"{size!r}" for axis, size in zip("xyz", force.tolist(), strict=True) if size}
-    load = Load.model_validate({"point": point, **keys})
-    return build_model(model.scene.model_copy(update={"load": (*model.scene.load, load)}), _bodies(model))
 
 
 class _Runs:

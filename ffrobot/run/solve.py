@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,30 +14,25 @@ import numpy as np
 
 from ..actuation.context import ActuatedContext
 from ..actuation.points import forces_at_points
-from ..common.errors import FfrobotError, SolveError, of_file
+from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.posture.path_start import path_start
 from ..mbs.posture.reach import turned_guesses
 from ..mbs.posture.start import check_turning
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis
-from ..scene.load import load_scene
 from ..scene.scene import Scene
-from .bodies import load_bodies
 from .fastest import with_paths
-from .mode_choice import mode_levels, reported_modes
-from .pieces import wanted_pieces
-from .prepare import check_replays, made_solution, with_bodies, with_pieces, with_scene, with_stiffening
-from .result import AnalysisResult
-from .solution import Solution
+from .mode_search import ModeSearch, reported_modes
+from .pieces import make_whole_links, wanted_pieces
+from .prepare import prepare_scene, unsolved, with_bodies, with_pieces
+from .result import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
-from .whole_links import make_whole_links
 
 if TYPE_CHECKING:
     from ..actuation.feasibility import Feasibility
 
 logger = logging.getLogger(__name__)
-
 
 Keep = Callable[[Solution], None]
 
@@ -62,37 +57,29 @@ def solve_scene(
     return run_analyses(replace(prepare_scene(scene, watcher), wanted=wanted), watcher, keep)
 
 
-def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
-    """All that analyses start from, nothing solved yet. Raises `InputError` as `solve_scene`."""
-    watcher = watcher or Watcher()
-    if isinstance(scene, Path):
-        scene = load_scene(scene)
-    began = time.perf_counter()
-    loaded = load_bodies(scene, watcher.stage)
-    seconds = {"links and files": time.perf_counter() - began}
-    bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
-    counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
-    return with_pieces(made_solution(scene, bodies, seconds), counts, watcher)
-
-
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """Run the analyses of a prepared solution; they resume from `solution.earlier` if present."""
-    check_turning(solution.model)
-    check_replays(solution)
+    scene, model = solution.scene, solution.model
+    check_turning(model)
+    checked = [analysis.name for analysis in scene.analysis if analysis.is_checked]
+    is_compliant = any(getattr(joint, "stiffness", None) is not None for joint in scene.joint)
+    if checked and (is_compliant or not model.motors):  # robots that nothing simulates on finer links
+        wanted = 'expected motors, and joints without stiffness, for "finer"'
+        raise InputError(f'{scene.path}: analysis "{checked[0]}": check: {wanted}')
     with Interruption(watcher) as interruption:
         judge = partial(_judged, replace(solution, earlier={}), interruption)
-        scene, notes = with_paths(solution.scene, solution.model, judge, watcher.stage)
-        solution = replace(with_scene(solution, scene) if notes else solution, path_notes=notes)
+        scene, notes = with_paths(scene, model, judge, watcher.stage)
+        solution = replace(unsolved(replace(solution, scene=scene)) if notes else solution, path_notes=notes)
         if any(body.modes == "auto" for body in scene.body):
             solution = _with_enough_modes(solution, interruption)
-        elif any(body.pieces == "auto" for body in scene.body):
-            solution = _with_enough_pieces(solution, interruption)
         else:
             solution = _completed(solution, interruption)
-        if any(analysis.is_checked for analysis in scene.analysis):
+            if any(body.pieces == "auto" for body in scene.body):
+                solution = _with_enough_pieces(solution, interruption)
+        if checked:
             from .finer import with_finer_check
 
-            solution = with_finer_check(solution, prepare_scene, watcher)
+            solution = with_finer_check(solution, watcher)
         solution = _with_deviations(solution, interruption)
         if keep is not None and solution.outcomes:
             keep(solution)
@@ -121,9 +108,7 @@ def _with_deviations(solution: Solution, interruption: Interruption) -> Solution
 
 def _with_enough_modes(solution: Solution, interruption: Interruption) -> Solution:
     """The scene solved with as many modes as its tolerances need: see `mode_search`."""
-    from .mode_search import ModeSearch, error_tolerances
-
-    search = ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies))
+    search = ModeSearch(solution.scene, solution.bodies)
     while True:
         solution = _completed(with_bodies(solution, search.bodies), interruption)
         if solution.failure is not None:
@@ -139,21 +124,20 @@ def _with_enough_modes(solution: Solution, interruption: Interruption) -> Soluti
 
 
 def _with_enough_pieces(solution: Solution, interruption: Interruption) -> Solution:
-    """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
-    solution = _completed(solution, interruption)
+    """The scene solved again with links in as many pieces as they bend far, those of `pieces = "auto"`."""
     given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
     while solution.failure is None and not interruption.requested:
         more = wanted_pieces(solution, list(solution.outcomes.values()))
         if not more:
             break
-        solution = _completed(with_pieces(solution, {**given, **more}, interruption.watcher), interruption)
+        solution = _completed(with_pieces(solution, given | more, interruption.watcher), interruption)
     return solution
 
 
 def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        solved = _completed(with_scene(solution, trial), interruption)
+        solved = _completed(unsolved(replace(solution, scene=trial)), interruption)
         if solved.unread is not None:
             assert solved.failure is not None
             raise solved.failure
@@ -168,7 +152,8 @@ def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Fea
 
 def _completed(solution: Solution, interruption: Interruption) -> Solution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
-    completed = _run_all(solution, interruption) or _run_all(with_stiffening(solution), interruption)
+    completed = _run_all(solution, interruption)
+    completed = completed or _run_all(unsolved(replace(solution, stiffened=True)), interruption)
     assert completed is not None
     return completed
 
@@ -235,15 +220,15 @@ def _unread(solution: Solution, run: Run, error: Exception) -> Solution:
 
 
 def _context(
-    solution: Solution, analysis: Analysis, results: Mapping[str, AnalysisResult], interruption: Interruption
+    solution: Solution, analysis: Analysis, results: dict[str, AnalysisResult], interruption: Interruption
 ) -> ActuatedContext:
-    others = (other for other in solution.scene.analysis if other.takes_actuation)
+    sources = [other.source for other in solution.scene.analysis if other.takes_actuation]
     return ActuatedContext(
         model=solution.model,
         outcomes={name: result.run for name, result in results.items()},
         path=path_start(solution.model, analysis.last_time) if analysis.starts_on_path else None,
         progress=lambda t: interruption.advance(t, analysis.last_time),
-        is_replayed=analysis.is_checked or any(other.source == analysis.name for other in others),
+        is_replayed=analysis.is_checked or analysis.name in sources,
         earlier=solution.earlier.get(analysis.name),
         points=solution.points,
         at_points=partial(forces_at_points, solution.points),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -57,15 +57,11 @@ def find_stresses(
         stresses[name] = body_stress(link, recovery)
     for name, pieces in divided.items():
         if of_pieces := [stresses.pop(piece) for piece in pieces.names if piece in stresses]:
-            stresses[name] = _of_pieces(of_pieces, modal_coordinates(run, name))
+            points = {label: point for stress in of_pieces for label, point in stress.points.items()}
+            method = min((stress.recovery.method for stress in of_pieces), key=METHODS.index)
+            recovery = replace(mode_displacement(modal_coordinates(run, name)), method=method)
+            stresses[name] = BodyStress(points, None, recovery)
     return stresses
-
-
-def _of_pieces(stresses: Sequence[BodyStress], p: Array) -> BodyStress:
-    """Of a link, p (T, n) in the modes of its file, at points that its pieces have."""
-    points = {name: point for stress in stresses for name, point in stress.points.items()}
-    method = min((stress.recovery.method for stress in stresses), key=METHODS.index)
-    return BodyStress(points, None, replace(mode_displacement(p), method=method))
 
 
 def _in_plane(of_link: LinkPatches, spatial: Body) -> PatchArray | None:

@@ -21,7 +21,6 @@ from ..fe_models.link_source import LinkTable
 from ..mbs._core import TimeFunction
 from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_derivatives, check_domain
-from ..mbs.fields.orientations import OrientationLaw
 from ..mbs.fields.spelling import PLANAR, SPATIAL
 from ..mbs.joints.joint import JointRecord
 from ..mbs.scene.analysis import Analysis, Surroundings
@@ -192,18 +191,15 @@ def _check_trajectory(trajectory: Trajectory, times: Array, label: str) -> None:
     places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
     for component, function in trajectory.components.items():
         _check_path(function, times, f"{label}: {places or component}")
-    if (law := trajectory.orientation) is not None:
-        _check_orientation(law, times, f"{label}: {law.kind}")
-
-
-def _check_orientation(law: OrientationLaw, times: Array, label: str) -> None:
+    if (law := trajectory.orientation) is None:
+        return
     for function in law.functions:
-        _check_path(function, times, label)
+        _check_path(function, times, f"{label}: {law.kind}")
     if law.kind == "direction":
         sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
         if sizes.min() <= 1e-9 * sizes.max():
             at = times[sizes.argmin()]
-            raise InputError(f"{label}: expected a direction at all times", f"none at t = {at:.9g} s")
+            raise InputError(f"{label}: direction: expected a direction at all times", f"none at t = {at:.9g} s")
 
 
 def _check_path(function: TimeFunction, times: Array, label: str) -> None:

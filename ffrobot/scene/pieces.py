@@ -51,21 +51,16 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
         if body.link is not None and body.name in counts:
             names = tuple(f"{body.name}, piece {k}" for k in range(1, counts[body.name] + 1))
             whole = cut(body.link, counts[body.name], families)
-            divided[body.name] = BodyInPieces(replace(whole, places=_with_tools(scene, body.name, whole.places)), names)
+            places = dict(whole.places)
+            for tool in scene.tool:
+                name, point = split_point(tool.point)
+                if name == body.name and point in places:
+                    places[tool.name] = places[point][0], tool.name
+            divided[body.name] = BodyInPieces(replace(whole, places=places), names)
     problems = [f"{scene.path}: {problem}" for problem in _problems(scene, divided)]
     if problems:
         raise InputError("\n".join(problems))
     return {name: body for name, body in divided.items() if len(body.names) > 1}
-
-
-def _with_tools(scene: Scene, body: str, places: Mapping[str, tuple[int, str]]) -> dict[str, tuple[int, str]]:
-    """Where points of a body are, by piece and name, tools too."""
-    used = dict(places)
-    for tool in scene.tool:
-        name, point = split_point(tool.point)
-        if name == body and point in used:
-            used[tool.name] = used[point][0], tool.name
-    return used
 
 
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
@@ -75,27 +70,24 @@ def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
         name: _renamed(getattr(scene, name), places)
         for name in ("tool", "joint", "trajectory", "load", "payload", "analysis")
     }
-    bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
+    bodies: list[BodyKeys] = []
+    for body in scene.body:
+        if body.name in divided:
+            tables = zip(divided[body.name].names, divided[body.name].cut.tables, strict=True)
+            bodies += [body.model_copy(update={"name": name, "link": link, "pieces": None}) for name, link in tables]
+        else:
+            bodies.append(body)
     welds = (
         WeldJoint(name=f"{name}, cut {k}", type="weld", between=(f"{first}.tip", f"{second}.root"))
-        for name, body in divided.items()
-        for k, (first, second) in enumerate(pairwise(body.names), 1)
+        for name, pieces in divided.items()
+        for k, (first, second) in enumerate(pairwise(pieces.names), 1)
     )
-    return scene.model_copy(update=keys | {"body": bodies, "joint": (*keys["joint"], *welds)})
+    return scene.model_copy(update=keys | {"body": tuple(bodies), "joint": (*keys["joint"], *welds)})
 
 
 def places_on_pieces(divided: Mapping[str, BodyInPieces]) -> dict[str, str]:
     """Map each point "BODY.POINT" of divided bodies to PIECE.POINT."""
     return {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
-
-
-def _pieces(body: BodyKeys, divided: Mapping[str, BodyInPieces]) -> Iterator[BodyKeys]:
-    if body.name not in divided:
-        yield body
-        return
-    pieces = divided[body.name]
-    for name, link in zip(pieces.names, pieces.cut.tables, strict=True):
-        yield body.model_copy(update={"name": name, "link": link, "pieces": None})
 
 
 T = TypeVar("T")

@@ -16,7 +16,6 @@ from ..mbs.scene.bodies import ROUND_OFF, RigidBody, tensor
 
 if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links
     from ..actuation.patches.records import PztLayout
-    from ..common.arrays import Array
     from ..fe_models.link_records.link import BeamLink, Link
     from .scene import Scene
 
@@ -65,8 +64,12 @@ def remarks(scene: Scene) -> Iterator[str]:
     yield from _voltages(scene)
     yield from _angles(scene)
     yield from _times(scene)
-    yield from _tracked(scene)
     for analysis in scene.analysis:
+        if analysis.kind == "tracking":  # known before the search, which takes minutes
+            from ..mbs.tracking.advice import rough_ends
+
+            functions = [function for one in scene.trajectory for _, function in one.targets]
+            yield from (f'analysis "{analysis.name}": {text}' for text in rough_ends(functions, analysis.last_time))
         if step := getattr(analysis, "output_step", None):
             outputs = round(analysis.last_time / step) + 1
             yield from remarks_on_memory(outputs, len(scene.body), memory(), f'analysis "{analysis.name}"')
@@ -154,7 +157,11 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
         if first.body != second.body or first.normal != second.normal or not is_beam(link := links.get(first.body)):
             continue
         is_one_face = "both" in (first.face, second.face) or first.face == second.face
-        begin, end = _shared(*(patch_edges(one, link.geometry.length) for one in (first, second)))
+        edges, others = (patch_edges(one, link.geometry.length) for one in (first, second))
+        begins = np.maximum(edges[:, None, 0], others[None, :, 0])
+        ends = np.minimum(edges[:, None, 1], others[None, :, 1]) - ROUND_OFF
+        k = np.unravel_index(int(np.argmax(ends - begins)), ends.shape)  # the longest part that they share, if any
+        begin, end = begins[k], ends[k]
         if is_one_face and end > begin and first.width + second.width > _thickness_and_face(first, link)[1]:
             yield (
                 f'pzt "{first.label}", "{second.label}": patches on one place of "{first.body}", {begin:g} to'
@@ -167,14 +174,6 @@ def _thickness_and_face(layout: PztLayout, link: BeamLink) -> tuple[float, float
     extents = max(one.height for one in link.sections), max(one.width for one in link.sections)
     thick, wide = extents if layout.normal == "y" else extents[::-1]
     return thick, np.pi * wide if link.shapes[0].shape != "rectangle" else wide
-
-
-def _shared(first: Array, second: Array) -> tuple[float, float]:
-    """Begin and end, m, of the longest part that patches with these edges (k, 2) share; of none the end comes first."""
-    begins = np.maximum(first[:, None, 0], second[None, :, 0])
-    ends = np.minimum(first[:, None, 1], second[None, :, 1]) - ROUND_OFF
-    k = np.unravel_index(int(np.argmax(ends - begins)), ends.shape)
-    return float(begins[k]), float(ends[k])
 
 
 def _voltages(scene: Scene) -> Iterator[str]:
@@ -238,16 +237,6 @@ def _angles(scene: Scene) -> Iterator[str]:
                     f'trajectory "{one.name}" reaches {value.max():.4g} rad, {value.max() / (2 * np.pi):.3g} turns:'
                     " angles are in rad; is it in degrees (45*deg)?"
                 )
-
-
-def _tracked(scene: Scene) -> Iterator[str]:
-    """Paths of tracking with rough ends: known before the search, which takes minutes."""
-    for analysis in scene.analysis:
-        if analysis.kind == "tracking":
-            from ..mbs.tracking.advice import rough_ends
-
-            functions = [function for one in scene.trajectory for _, function in one.targets]
-            yield from (f'analysis "{analysis.name}": {text}' for text in rough_ends(functions, analysis.last_time))
 
 
 def _times(scene: Scene) -> Iterator[str]:

@@ -21,9 +21,9 @@ from ..mbs.quantities.supply import gear_motions, motor_moments
 from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
-from ..run.prepare import with_scene
+from ..run.prepare import prepare_scene, unsolved
 from ..run.result import AnalysisResult
-from ..run.solve import prepare_scene, run_analyses
+from ..run.solve import run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .servo import Servo
@@ -194,6 +194,6 @@ class Robot:
         end = np.ceil(end / output_step * (1 - ROUND_OFF)) * output_step
         analysis = Pcid(name=RUN, kind="pcid", end=end, output_step=output_step, tolerance=TOLERANCE)
         scene = self._following(path, subject).model_copy(update={"analysis": (analysis,)})
-        found = run_analyses(with_scene(self._prepared, scene), self._watcher).analyses[RUN]
+        found = run_analyses(unsolved(replace(self._prepared, scene=scene)), self._watcher).analyses[RUN]
         found.run.check_completed("")
         return found

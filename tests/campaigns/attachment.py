@@ -24,10 +24,9 @@ from record import options, record
 import ffrobot
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.truncation import loaded_points, with_fewer_modes
-from ffrobot.run.mode_choice import reported_modes
-from ffrobot.run.mode_search import Errors, difference
+from ffrobot.run.mode_search import Errors, difference, reported_modes
 from ffrobot.run.prepare import with_bodies
-from ffrobot.run.solution import Solution
+from ffrobot.run.result import Solution
 from ffrobot.run.solve import run_analyses, solve_scene
 from ffrobot.run.watcher import Watcher
 

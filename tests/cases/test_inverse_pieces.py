@@ -14,9 +14,9 @@ from tables_3d import joint, revolute, scene
 import ffrobot
 from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.fe_models.pieces import cut
+from ffrobot.run.pieces import make_whole_links
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
-from ffrobot.run.whole_links import make_whole_links
 
 S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"
 NAMES = "upper", "fore"

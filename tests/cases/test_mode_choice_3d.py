@@ -12,8 +12,7 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.truncation import with_fewer_modes
 from ffrobot.mbs.quantities.motion import deflection
 from ffrobot.run.bodies import load_bodies
-from ffrobot.run.mode_choice import reported_modes
-from ffrobot.run.mode_search import difference
+from ffrobot.run.mode_search import difference, reported_modes
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_scene

@@ -16,9 +16,8 @@ from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model
 from ...mbs.posture.start import undeformed_posture
-from ...run.mode_choice import mode_levels
-from ...run.prepare import with_bodies
-from ...run.solve import prepare_scene
+from ...run.mode_search import mode_levels
+from ...run.prepare import prepare_scene, with_bodies
 from ...run.watcher import Watcher
 from ...scene.load import load_scene
 from ...scene.scene import Scene

@@ -134,8 +134,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
             f'{path}: --format urdf: expected a scene with space = "spatial"',
             "a planar one, which has no moments of inertia about x and y",
         )
-    bodies = load_bodies(scene, lambda stage: logger.info("%s", stage))
-    loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
+    loaded = load_bodies(scene, lambda stage: logger.info("%s", stage))
     urdf = UrdfOfScene(scene, loaded)
     counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(urdf.tree.loops)} joints of {scene.name}"
     ElementTree.indent(urdf.root)
