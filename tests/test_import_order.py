@@ -157,6 +157,19 @@ def test_there_are_no_circles(found):
     assert circles(found) == []
 
 
+def test_includes_of_the_core_have_no_circles():
+    """Of its files, and of its folders."""
+    files = [*ROOT.glob("mbs/core/**/*.h"), *ROOT.glob("mbs/core/**/*.cpp")]
+    included = [
+        Import(path.relative_to(ROOT / "mbs"), line, Path(text.split('"')[1]))
+        for path in files
+        for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if text.startswith('#include "core/')
+    ]
+    assert len(included) > len(files)
+    assert circles(included) == []
+
+
 # In each way, in a file of its own.
 TURNED = {
     "errors": "from ..cli import main\n",

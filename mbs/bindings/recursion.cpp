@@ -1,7 +1,7 @@
 // The recursion in joint coordinates (docs/developer/kernel.md), for tests and for what is built upon it.
-#include "core/recursion/constrained_aba/independent_constraints.h"
 #include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/inverse/observe.h"
+#include "core/recursion/motion/independent_constraints.h"
 #include "core/recursion/motion/mobility.h"
 
 #include <nanobind/stl/array.h>
@@ -116,7 +116,7 @@ std::vector<Mobility> mobilities_of(Model<Space> &model, const Scene &scene, con
 
 template <class Space> void bind_body(nb::module_ &m, const char *name) {
   using Body = BodyModel<typename Space::Data>;
-  nb::class_<Body>(m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/mechanism/model.h.")
+  nb::class_<Body>(m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/model.h.")
       .def(nb::init<>())
       .def_rw("name", &Body::name)
       .def_rw("parent", &Body::parent)
@@ -251,7 +251,7 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
           },
           "scene"_a, "times"_a, "q"_a, "beside"_a, "scales"_a, "sizes"_a, "largest_step"_a,
           "q (T, n_q) moved onto the rows at times (T), and what is left (T) in natural sizes: see "
-          "mbs/core/recursion/inverse/postures.h.")
+          "mbs/core/recursion/motion/postures.h.")
       .def("mobilities", &mobilities_of<Space>, "scene"_a, "times"_a, "q"_a, "is_path"_a, "length"_a, "loop_rank"_a,
            "How joints can move with rigid links at times (T) and q (T, n_q); loop_rank -1: what loops have there.");
 }

@@ -1,4 +1,4 @@
-// What a mechanism in joint coordinates is made of: mbs/core/recursion/mechanism/model.h.
+// What a mechanism in joint coordinates is made of: mbs/core/recursion/model.h.
 #include "core/recursion/inverse/motion_forces.h"
 #include "core/recursion/inverse/observe.h"
 
@@ -87,7 +87,7 @@ void bind_constraints(nb::module_ &m) {
       .def_ro("marker", &MarkerAt::marker)
       .def_rw("only_forces", &MarkerAt::only_forces, "Of a wrench in the plane: its moment is zero at all times.");
   nb::class_<ConstraintModel>(m, "ConstraintModel",
-                              "A constraint row between markers a and b; see mbs/core/recursion/mechanism/model.h.")
+                              "A constraint row between markers a and b; see mbs/core/recursion/model.h.")
       .def(nb::init<>())
       .def_rw("name", &ConstraintModel::name)
       .def_rw("kind", &ConstraintModel::kind)

@@ -1,5 +1,5 @@
-// What motions that are known take: mbs/core/recursion/inverse/newton_euler.h, at many states of a mechanism and its
-// scene.
+// What motions that are known take: mbs/core/recursion/newton_euler/newton_euler.h, at many states of a mechanism and
+// its scene.
 #pragma once
 
 #include "core/recursion/inverse/motion_forces.h"

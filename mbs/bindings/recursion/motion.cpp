@@ -160,7 +160,7 @@ void bind_orientation_laws(nb::module_ &m) {
       .value("rotation_vector", OrientationKind::rotation_vector)
       .value("rpy", OrientationKind::rpy)
       .value("direction", OrientationKind::direction);
-  nb::class_<OrientationLaw>(m, "TurningLaw", "A triad A(t); see mbs/core/recursion/motion/orientation.h.")
+  nb::class_<OrientationLaw>(m, "TurningLaw", "A triad A(t); see mbs/core/recursion/mechanism/orientation.h.")
       .def(
           "__init__",
           [](OrientationLaw *law, OrientationKind kind, const std::vector<TimeFunction> &functions,

@@ -6,8 +6,8 @@
 #include "core/analysis/replay.h"
 #include "core/check_index.h"
 #include "core/integrate/integrate.h"
-#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/motion.h"
+#include "core/recursion/motion/postures.h"
 
 #include <algorithm>
 #include <functional>

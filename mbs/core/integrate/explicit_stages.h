@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/integrate/ode.h"
-#include "core/linear/four_doubles.h"
+#include "core/recursion/numbers/four_doubles.h"
 
 #include <cstddef>
 #include <utility>

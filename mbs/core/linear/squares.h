@@ -1,7 +1,7 @@
 // Sums of squares, four at once: the compiler does not reorder sums by itself.
 #pragma once
 
-#include "core/linear/four_doubles.h"
+#include "core/recursion/numbers/four_doubles.h"
 
 #include <cstddef>
 

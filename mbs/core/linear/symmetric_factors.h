@@ -1,5 +1,5 @@
 // L D L^T of a dense symmetric matrix without pivoting, real or complex: A = L D L^T, not L D L^H. For many unknowns;
-// constrained_aba/multipliers.h has the few multipliers of one evaluation, of any kind of numbers.
+// recursion/numbers/multipliers.h has the few multipliers of one evaluation, of any kind of numbers.
 #pragma once
 
 #include <Eigen/Core>

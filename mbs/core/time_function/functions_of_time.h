@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/linear/sines.h"
+#include "core/recursion/numbers/sines.h"
 #include "core/time_function/time_function.h"
 
 #include <array>

@@ -1,6 +1,6 @@
 // Steel links of 1 m that bend, for programs that count instructions: both ends supported, or clamped at the root.
 #pragma once
-#include "core/recursion/mechanism/model.h"
+#include "core/recursion/model.h"
 
 #include <cmath>
 

@@ -2,7 +2,7 @@
 // tip, or 6 rigid ones. `CHAIN ROWS REPETITIONS` prints the microseconds of the fastest of 20 rounds,
 // with `d` behind them those of an evaluation in duals, with derivatives in eight directions.
 #include "core/recursion/numbers/dual.h"
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 #include <Eigen/Geometry>
 

@@ -5,7 +5,7 @@
 //
 //   here       in the literature
 //   M, H       articulated inertia I^A and, by columns, [p^A | K^A]: bias force, forces of unit multipliers
-//   U, D       of a joint: I^A S and S^T I^A S; in planar/pin_joints.h U D^-1
+//   U, D       of a joint: I^A S and S^T I^A S; in pin_joints.h U D^-1
 //   S          Lambda^-1 = C M^-1 C^T, inverse inertia in constraint space, L^A (Delassus matrix, delassus.h)
 //   S[.][0]    what constraint equations measure by forces, l^A; gamma: by velocities and the ground's acceleration
 //

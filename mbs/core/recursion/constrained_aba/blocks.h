@@ -5,8 +5,8 @@
 // one column, the first.
 #pragma once
 
-#include "core/recursion/constrained_aba/multipliers.h"
 #include "core/recursion/constrained_aba/passes.h"
+#include "core/recursion/numbers/multipliers.h"
 
 namespace ffrobot::recursion {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/backward_pass.h"
-#include "core/recursion/constrained_aba/poses.h"
+#include "core/recursion/kinematics/poses.h"
 
 namespace ffrobot::recursion {
 

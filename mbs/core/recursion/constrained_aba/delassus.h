@@ -1,7 +1,7 @@
 // Columns side by side: what unit multipliers do beside what acts without constraints (column 0).
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

@@ -4,7 +4,7 @@
 
 #include "core/recursion/constrained_aba/blocks.h"
 #include "core/recursion/constrained_aba/loop_joint_forces.h"
-#include "core/recursion/constrained_aba/multipliers.h"
+#include "core/recursion/numbers/multipliers.h"
 
 #include <algorithm>
 #include <numeric>

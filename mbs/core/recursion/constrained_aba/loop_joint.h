@@ -2,8 +2,8 @@
 // as a moment or force on the second one and its opposite on the first.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
-#include "core/recursion/motion/friction.h"
+#include "core/recursion/joint/friction.h"
+#include "core/recursion/mechanism/workspace.h"
 
 #include <vector>
 

@@ -3,7 +3,7 @@
 
 #include "core/recursion/constrained_aba/acceleration_pass.h"
 #include "core/recursion/constrained_aba/constraints.h"
-#include "core/recursion/planar/pin_joints.h"
+#include "core/recursion/constrained_aba/pin_joints.h"
 
 namespace ffrobot::recursion {
 

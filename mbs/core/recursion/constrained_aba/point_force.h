@@ -1,7 +1,7 @@
 // Forces of the user's on sections, of how these move.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 #include <functional>
 

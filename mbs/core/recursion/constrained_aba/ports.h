@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/subtree_inertia.h"
-#include "core/recursion/planar/kinematics.h"
-#include "core/recursion/spatial/kinematics.h"
+#include "core/recursion/kinematics/planar.h"
+#include "core/recursion/kinematics/spatial.h"
 
 namespace ffrobot::recursion {
 

@@ -1,8 +1,8 @@
 #include "core/recursion/inverse/force_slopes.h"
 
 #include "core/linear/products.h"
-#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/natural_sizes.h"
+#include "core/recursion/motion/postures.h"
 #include "core/recursion/motion/scene_forces.h"
 
 #include <algorithm>

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/derivatives.h"
-#include "core/recursion/inverse/newton_euler.h"
 #include "core/recursion/motion/scene.h"
+#include "core/recursion/newton_euler/newton_euler.h"
 
 namespace ffrobot::recursion {
 

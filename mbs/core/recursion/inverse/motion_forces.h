@@ -1,7 +1,7 @@
 // What bodies and joints do to each other in a motion that is known: as outputs have it, state by state.
 #pragma once
 
-#include "core/recursion/inverse/newton_euler.h"
+#include "core/recursion/newton_euler/newton_euler.h"
 
 #include <Eigen/Core>
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/linear/least_norm.h"
-#include "core/recursion/inverse/newton_euler.h"
 #include "core/recursion/motion/motion.h"
+#include "core/recursion/newton_euler/newton_euler.h"
 
 namespace ffrobot::recursion {
 

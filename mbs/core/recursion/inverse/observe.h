@@ -1,8 +1,8 @@
 // What a mechanism does at a state, in global axes: for outputs and tests, not for steps.
 #pragma once
 
-#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/motion.h"
+#include "core/recursion/motion/postures.h"
 
 namespace ffrobot::recursion {
 

@@ -1,6 +1,6 @@
 #include "core/recursion/inverse/prescribed_motion.h"
 
-#include "core/recursion/inverse/postures.h"
+#include "core/recursion/motion/postures.h"
 
 #include <algorithm>
 #include <cmath>

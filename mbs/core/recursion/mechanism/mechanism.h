@@ -33,7 +33,7 @@ template <class Space> struct Node {
   int port_slots = 0;  // the first of its ports' among them
   int first_cross = 0; // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
   bool is_pin = false; // plane: a revolute joint, at most one port, which passes forces, and moments that are given
-                       // (planar/pin_joints.h)
+                       // (constrained_aba/pin_joints.h)
   // … of a pin: so is its parent, unless that is the ground; its port carries a child, and that is a pin; what
   // it hands to its port is added to what acts there
   bool parent_is_pin = false, is_loaded = false, carries_pin = false, adds_up = false;

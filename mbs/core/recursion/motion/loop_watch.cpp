@@ -1,6 +1,6 @@
 #include "core/recursion/motion/loop_watch.h"
 
-#include "core/recursion/inverse/postures.h"
+#include "core/recursion/motion/postures.h"
 
 #include <Eigen/LU>
 

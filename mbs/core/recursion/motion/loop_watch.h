@@ -5,7 +5,7 @@
 // than constraints are kept, and a step can change to another one, along which the sign stays: so none ends there.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

@@ -1,7 +1,7 @@
 #include "core/recursion/motion/mobility.h"
 
-#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/natural_sizes.h"
+#include "core/recursion/motion/postures.h"
 
 #include <Eigen/LU>
 

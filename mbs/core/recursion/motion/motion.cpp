@@ -1,6 +1,6 @@
 #include "core/recursion/motion/motion.h"
 
-#include "core/recursion/constrained_aba/independent_constraints.h"
+#include "core/recursion/motion/independent_constraints.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Lengths and a pace that belong to a mechanism: what its motion is compared with, in place of a meter and a second.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

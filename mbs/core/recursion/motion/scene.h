@@ -4,7 +4,7 @@
 #include "core/integrate/limit_watch.h"
 #include "core/recursion/constrained_aba/loop_joint.h"
 #include "core/recursion/constrained_aba/point_force.h"
-#include "core/recursion/motion/friction.h"
+#include "core/recursion/joint/friction.h"
 #include "core/recursion/motion/singular_posture.h"
 #include "core/time_function/time_function.h"
 

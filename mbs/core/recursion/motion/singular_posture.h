@@ -2,7 +2,7 @@
 // path in every direction.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

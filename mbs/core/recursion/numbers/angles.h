@@ -1,7 +1,7 @@
 // Sines and cosines of the angles of many joints.
 #pragma once
 
-#include "core/linear/sines.h"
+#include "core/recursion/numbers/sines.h"
 #include "core/recursion/numbers/small.h"
 
 #include <cstddef>

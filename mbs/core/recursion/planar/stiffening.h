@@ -13,7 +13,7 @@
 //     g(p) = g + F p - 1/2 p^T K p,     s = (g_0, g_1) sqrt(m),     m_ff = 1 - F^T F + F(p)^T F(p)
 #pragma once
 
-#include "core/recursion/mechanism/model.h"
+#include "core/recursion/model.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
 #include <Eigen/Core>

@@ -3,7 +3,7 @@
 // W(p).
 #pragma once
 
-#include "core/recursion/constrained_aba/multipliers.h"
+#include "core/recursion/numbers/multipliers.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
 namespace ffrobot::recursion {

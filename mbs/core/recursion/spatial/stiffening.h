@@ -14,7 +14,7 @@
 //     g(p) = g + F p - 1/2 p^T K p,     s = g_c0 sqrt(m),     J2(p) = g g^T + …,     m_ff = 1 - F^T F + F(p)^T F(p)
 #pragma once
 
-#include "core/recursion/mechanism/model.h"
+#include "core/recursion/model.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
 #include <Eigen/Core>

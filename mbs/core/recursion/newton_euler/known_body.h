@@ -2,8 +2,8 @@
 // algorithm (newton_euler.h).
 #pragma once
 
-#include "core/recursion/planar/known_motion.h"
-#include "core/recursion/spatial/known_motion.h"
+#include "core/recursion/newton_euler/planar_body.h"
+#include "core/recursion/newton_euler/spatial_body.h"
 
 #include <Eigen/Core>
 

@@ -1,7 +1,7 @@
 // Outward, in the plane: angles, angular velocities, what velocities do at joints.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 #include "core/recursion/numbers/angles.h"
 #include "core/recursion/planar/inertia.h"
 

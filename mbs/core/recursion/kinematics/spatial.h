@@ -1,7 +1,7 @@
 // Outward, in space: orientations, angular velocities, what velocities do at joints.
 #pragma once
 
-#include "core/recursion/planar/kinematics.h"
+#include "core/recursion/kinematics/planar.h"
 
 namespace ffrobot::recursion {
 

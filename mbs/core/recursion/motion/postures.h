@@ -1,8 +1,8 @@
 // Postures that keep to constraint equations: what these measure at many states, and Newton's method onto them.
 #pragma once
 
-#include "core/recursion/inverse/newton_euler.h"
 #include "core/recursion/motion/scene.h"
+#include "core/recursion/newton_euler/newton_euler.h"
 
 #include <cmath>
 #include <utility>

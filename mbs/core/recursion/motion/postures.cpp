@@ -1,4 +1,4 @@
-#include "core/recursion/inverse/postures.h"
+#include "core/recursion/motion/postures.h"
 
 #include "core/linear/least_norm.h"
 #include "core/space/configuration_space.h"

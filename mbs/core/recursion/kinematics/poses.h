@@ -1,9 +1,9 @@
 // Where frames and sections are and how they move, in global axes: the end of the first pass.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
-#include "core/recursion/planar/kinematics.h"
-#include "core/recursion/spatial/kinematics.h"
+#include "core/recursion/kinematics/planar.h"
+#include "core/recursion/kinematics/spatial.h"
+#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

@@ -1,7 +1,7 @@
-#include "core/recursion/constrained_aba/independent_constraints.h"
+#include "core/recursion/motion/independent_constraints.h"
 
-#include "core/recursion/inverse/postures.h"
 #include "core/recursion/motion/natural_sizes.h"
+#include "core/recursion/motion/postures.h"
 
 #include <algorithm>
 #include <numeric>

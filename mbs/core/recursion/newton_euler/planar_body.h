@@ -1,7 +1,7 @@
-// What a known motion takes of one body in the plane; of its modes: inverse/known_body.h.
+// What a known motion takes of one body in the plane; of its modes: known_body.h.
 #pragma once
 
-#include "core/recursion/planar/kinematics.h"
+#include "core/recursion/kinematics/planar.h"
 
 #include <Eigen/Core>
 

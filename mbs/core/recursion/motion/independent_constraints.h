@@ -1,7 +1,7 @@
 // Which constraint equations say something that the others do not.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

@@ -1,4 +1,4 @@
-#include "core/recursion/inverse/newton_euler.h"
+#include "core/recursion/newton_euler/newton_euler.h"
 
 #include "core/recursion/constrained_aba/joint_elimination.h"
 #include "core/recursion/constrained_aba/once.h"

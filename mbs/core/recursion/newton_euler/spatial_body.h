@@ -1,4 +1,4 @@
-// What a known motion takes of one body in space; of its modes: inverse/known_body.h. The elimination leaves of the
+// What a known motion takes of one body in space; of its modes: known_body.h. The elimination leaves of the
 // body's equations
 //
 //     M_rr A + m p_ddot - Q_r = M A + bias + m d,   d = p_ddot - m_ff^-1 (Q_f - m^T A)
@@ -6,7 +6,7 @@
 // with M = M_rr - m m_ff^-1 m^T and bias = -(Q_r - m m_ff^-1 Q_f).
 #pragma once
 
-#include "core/recursion/spatial/kinematics.h"
+#include "core/recursion/kinematics/spatial.h"
 
 #include <Eigen/Core>
 

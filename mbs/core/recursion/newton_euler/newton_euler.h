@@ -3,8 +3,8 @@
 // that finds accelerations but the kinematics of a state, in space the inertia of each body as well.
 #pragma once
 
-#include "core/recursion/constrained_aba/workspace.h"
-#include "core/recursion/inverse/known_body.h"
+#include "core/recursion/mechanism/workspace.h"
+#include "core/recursion/newton_euler/known_body.h"
 
 #include <Eigen/Core>
 

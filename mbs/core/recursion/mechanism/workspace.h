@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/recursion/mechanism/mechanism.h"
-#include "core/recursion/motion/orientation.h"
+#include "core/recursion/mechanism/orientation.h"
 
 #include <string>
 #include <type_traits>

@@ -1,4 +1,4 @@
-#include "core/recursion/motion/orientation.h"
+#include "core/recursion/mechanism/orientation.h"
 
 #include "core/recursion/spatial/section.h"
 

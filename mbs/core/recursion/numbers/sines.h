@@ -1,7 +1,7 @@
 // Sines and cosines of four numbers at once.
 #pragma once
 
-#include "core/linear/four_doubles.h"
+#include "core/recursion/numbers/four_doubles.h"
 
 #include <cmath>
 #include <cstdint>
