@@ -13,7 +13,7 @@ from copy import copy
 import click
 
 from .commands.bench import bench
-from .commands.design import optimise, sensitivity, uncertainty
+from .commands.design import optimise, sensitivity, sweep, uncertainty
 from .commands.exchange import export, import_
 from .commands.fit import fit
 from .commands.link import link
@@ -22,7 +22,6 @@ from .commands.pictures import plot, report, view
 from .commands.read import feasibility, info, linear, pose
 from .commands.smooth import smooth
 from .commands.solve import solve
-from .commands.sweep import sweep
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first

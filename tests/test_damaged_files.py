@@ -235,21 +235,24 @@ def test_records_that_lack_a_field(tmp_path, of):
     """Each that is read from results: a message with what is missing, and no program fault."""
     from ffrobot.common.hdf5 import blaming
     from ffrobot.results.actuators import read_motors, read_unsupplied
-    from ffrobot.results.linear import read_metrics
-    from ffrobot.results.motion import read_recovery
+    from ffrobot.results.file import Results
+    from ffrobot.results.kinds import read_metrics
 
     path, nothing = tmp_path / "r.h5", np.zeros((1, 1))
     with h5py.File(path, "w") as file:
         file.update({"joints/A": nothing, "unsupplied": nothing})
-        file.update({"stress/arm/modal": nothing, "stress/arm/loads": nothing})
-        file["stress/arm/loads"].attrs["columns"] = ["force/tip/x"]
-        file["stress/arm"].attrs["method"] = "static"
-        file.create_group("stress/arm/layers")
+        file.attrs["scene"] = ""
+        file.update({"a/bodies/arm/modal": nothing, "a/stress/arm/modal": nothing, "a/stress/arm/loads": nothing})
+        file["a/stress/arm/loads"].attrs["columns"] = ["force/tip/x"]
+        file["a/stress/arm"].attrs["method"] = "static"
+        file.create_group("a/stress/arm/layers")
+        file.flush()
+        results = Results.from_image(file.id.get_file_image(), path)
         read, lacking = {
             "motor": (lambda: read_motors(file, ["A"]), 'attribute "moment"'),
             "unsupplied": (lambda: read_unsupplied(file), 'attribute "bodies"'),
             "metrics": (lambda: read_metrics({}), '"verdict"'),
-            "layers": (lambda: read_recovery(file, "arm"), 'dataset or group "edges"'),
+            "layers": (lambda: results.stress_recovery("a", "arm"), 'dataset or group "edges"'),
         }[of]
         expected = rf"r\.h5: damaged file, .*: expected the {lacking}, found none"
         with pytest.raises(InputError, match=expected), blaming(path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -47,20 +48,7 @@ from .options import POSITIVE, output_option, protect, scene_argument
 @click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
 def smooth(
-    scene_file: Path,
-    motion: Path | None,
-    servo: tuple[str, ...],
-    damping_ratio: float,
-    point: str | None,
-    settled: float,
-    acceleration: float | None,
-    jerk: float | None,
-    rate: float,
-    kind: str,
-    output: Path | None,
-    *,
-    degrees: bool,
-    force: bool,
+    scene_file: Path, motion: Path | None, servo: tuple[str, ...], output: Path | None, *, force: bool, **how: Any
 ) -> None:
     """Find out why a robot vibrates on a recorded motion, and a motion on the same path that leaves less vibration.
 
@@ -75,17 +63,17 @@ def smooth(
     from ..smooth.printed import print_smooth, write_page
     from ..smooth.smoothing import check_target, smooth_motion
 
-    controllers = _servo(servo)
-    tables = map(Path, controllers.values() if isinstance(controllers, dict) else [controllers])
-    protect([*files_of(scene_file), *([motion] if motion else []), *tables])
+    pairs = [text.rpartition("=") for text in servo] or [("", "", "20")]
+    controllers = {joint: value for joint, _, value in pairs}
+    if len(controllers) < len(pairs) or ("" in controllers and len(controllers) > 1):
+        raise InputError("--servo: expected one for all joints, or JOINT=… for each", ", ".join(servo))
+    protect([*files_of(scene_file), *([motion] if motion else []), *map(Path, controllers.values())])
     target = output or scene_file.with_suffix(".smooth.json")
     check_target(target, force=force)
+    given = {key: value for key, value in how.items() if value is not None}
     with Display() as display:
-        found = smooth_motion(
-            scene_file, motion, servo=controllers, damping_ratio=damping_ratio, point=point,
-            settled=settled, acceleration=acceleration or float("inf"), jerk=jerk or float("inf"),
-            degrees=degrees, rate=rate, kind=kind, watcher=display,
-        )  # fmt: skip
+        of_all = controllers.get("", controllers)
+        found = smooth_motion(scene_file, motion, servo=of_all, watcher=display, **given)
     console = summary_console()
     print_smooth(found, console)
     if found.candidates:
@@ -98,12 +86,3 @@ def smooth(
     console.print(f"figure     {figure}", soft_wrap=True)
     write_page(found, motion, page)
     console.print(f"report     {page}", soft_wrap=True)
-
-
-def _servo(texts: tuple[str, ...]) -> str | dict[str, str]:
-    """Of all joints, or by joint."""
-    pairs = [text.rpartition("=") for text in texts] or [("", "", "20")]
-    values = {name: value for name, _, value in pairs}
-    if len(values) < len(pairs) or ("" in values and len(values) > 1):
-        raise InputError("--servo: expected one for all joints, or JOINT=… for each", ", ".join(texts))
-    return values.get("", values)

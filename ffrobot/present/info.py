@@ -120,7 +120,7 @@ def _results(file: h5py.File) -> str:
     tables = [analyses, datasets]
     closed = {name: group["control"].attrs for name, group in file.items() if "control/commands" in group}
     if closed:
-        from ..results.linear import read_metrics  # loads the core
+        from ..results.kinds import read_metrics  # loads the core
         from ..results.tables import loop_cells  # loads the records of scenes
 
         cells = {name: loop_cells(read_metrics(attributes)) for name, attributes in closed.items()}

@@ -24,7 +24,7 @@ class Coordinate(NamedTuple):
     limits: MotorLimits  # of its motor; infinite where the scene gives none
 
     def of(self, values: Array) -> Array:
-        """Return the column (T,) of this coordinate in `values` of a joint's dataset, (T,) or (T, coordinates)."""
+        """Column (T,) of this coordinate in a joint's dataset `values`, (T,) or (T, coordinates), of the same unit."""
         return values.reshape(len(values), -1)[:, int(self.column[1:-1] or 0)]
 
     @property

@@ -15,8 +15,7 @@ from ..mbs.quantities.motion import point_motion
 from ..run.result import AnalysisResult, Solution
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
-from .kinds import own_results
-from .linear import at_rest_in_words
+from .kinds import at_rest_in_words, own_results
 from .peaks import POWER, peak_of
 from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, ToolError, Verdict, millimeters, vibrates
 

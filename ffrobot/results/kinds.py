@@ -1,20 +1,235 @@
-"""What results files have of a single kind of analysis: how it is written, and what the verdict says of it."""
+"""What results files have of a single kind of analysis: how it is written and read, and what the verdict says of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
+from ..common.arrays import Array, ComplexArray
+from ..common.hdf5 import fields_in
+from ..common.meanings import names_of, write_record
 from ..common.structs import struct
+from ..mbs.quantities.motion import body_motion, modal_rates, reported_points
 from .actuators import write_placement, write_tracking
-from .linear import write_joint_conditions, write_linear, write_loop, write_zero_dynamics
 from .verdict import millimeters
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # most scenes have none of these
+    from ..actuation.control.linear import LinearModels
+    from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace
+    from ..actuation.control.loop import LoopRecord
+    from ..actuation.control.metrics import Metrics
+    from ..mbs.analysis.operating_points import RobotAtRest
+    from ..mbs.inversion.motors_only import AroundPath
     from ..mbs.run.record import Run
+
+MATRICES = names_of("LinearModel")
+NAMES = ("state_names", "input_names", "output_names")
+LISTED = 3  # natural frequencies
+
+
+def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
+    """Write linear/ of an analysis, and its joint conditions.
+
+    Models (T, …), poles, frequencies, shapes of all bodies, reach; zeros (T, most, 2) are nan where there are fewer.
+    """
+    n_v, models = run.model.tree.n_v, linear.models
+    write_joint_conditions(group, run, linear)
+    if run.space.is_plane:
+        models = tuple(
+            replace(model, transformation=_of_frames(run, k) @ model.transformation[:n_v])
+            for k, model in enumerate(models)
+        )
+    group = group.create_group("linear")
+    for key in MATRICES:
+        group[key] = np.array([getattr(model, key) for model in models])
+    for key in NAMES:
+        group.attrs[key] = list(getattr(models[0], key))
+    group["frequency"] = np.array([modes.frequency for modes in linear.modes])
+    group["damping_ratio"] = np.array([modes.damping_ratio for modes in linear.modes])
+    _write_poles(group, np.array([modes.poles.ravel() for modes in linear.modes]))
+    for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
+        group[kind] = np.array([reach.measure for reach in reaches])
+        group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
+    _write_shapes(group, run, np.array([modes.motion.real for modes in linear.modes]))
+    group.attrs["advice"] = linear.advice
+    for k, (pair, every) in enumerate(linear.zeros.items(), 1):
+        values = np.full((len(every), max(len(zeros.values) for zeros in every), 2), np.nan)
+        for row, zeros in zip(values, every, strict=True):
+            row[: len(zeros.values)] = np.column_stack([zeros.values.real, zeros.values.imag])
+        dataset, half = group.create_dataset(f"zeros/{k}", data=values), len(pair) // 2
+        dataset.attrs.update(columns=["real", "imaginary"], inputs=list(pair[:half]), outputs=list(pair[half:]))
+        dataset.attrs["minimum_phase"] = [zeros.minimum_phase for zeros in every]
+
+
+def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | RobotAtRest) -> None:
+    """Write joints_locked/ and joints_compliant/ of an analysis: frequencies, modes, compliance."""
+    for condition in details.conditions[0]:
+        states, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
+        own["frequency"] = np.array([one.modes.frequency for one in states])
+        own["damping_ratio"] = np.array([one.modes.damping_ratio for one in states])
+        _write_shapes(own, run, np.array([one.modes.motion.real for one in states]))
+        for point in states[0].compliance:
+            own[f"compliance/{point}"] = np.array([one.compliance[point] for one in states])
+
+
+def at_rest_in_words(group: h5py.Group) -> str:
+    """Natural frequencies with motors at rest, and the least stiffness of a point, at the first time of an analysis."""
+    if not any(key.startswith("joints_") for key in group):
+        return ""
+    from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
+
+    texts = []
+    for condition, name in ((LOCKED, "joints locked"), (COMPLIANT, "compliant gears")):
+        if (state := group.get(f"joints_{condition}")) is None:
+            continue
+        frequency = state["frequency"][0]
+        lowest = ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:LISTED])
+        least = [
+            (stiffness.least, point)
+            for point, C in state.get("compliance", {}).items()
+            if (stiffness := translational_stiffness(C[0])) is not None and np.isfinite(stiffness.least)
+        ]
+        of_point = f"; least stiffness {min(least)[0] / 1e3:.4g} N/mm at {min(least)[1]}" if least else ""
+        texts.append(f"{name} {lowest} Hz{of_point}" if lowest else f"{name}: rigid")
+    return "; ".join(texts)
+
+
+def _write_shapes(group: h5py.Group, run: Run, along_v: Array) -> None:
+    """modes/: displacement, turn and modal coordinates of bodies by modes with rates `along_v` (T, f, coordinates)."""
+    along_v = along_v[:, :, : run.model.tree.n_v]  # motors behind gears come last
+    T, f, n_v = along_v.shape
+    moving = replace(run, time=np.repeat(run.time, f), q=np.repeat(run.q, f, 0), v=along_v.reshape(T * f, n_v))
+    space, turning = run.space, "angle" if run.space.is_plane else "rotation"
+    for name in reported_points(run) if T * f else ():
+        body = body_motion(moving, name)
+        rates = {"position": space.along(body.velocity), turning: space.about(body.angular_velocity)}
+        rates["modal"] = body.modal_velocity
+        for key, values in rates.items():
+            group[f"modes/{name}/{key}"] = values.reshape(T, f, *values.shape[1:])
+
+
+def _of_frames(run: Run, row: int) -> Array:
+    """(coordinates, n_v) rates of place, angle and modes of each body that moves in the plane, by v."""
+    n_v, space = run.model.tree.n_v, run.space
+    moving = replace(run, time=np.repeat(run.time[row], n_v), q=np.repeat(run.q[row : row + 1], n_v, 0), v=np.eye(n_v))
+    rates = []
+    for name in reported_points(run):
+        body = body_motion(moving, name)
+        turn = space.about(body.angular_velocity)
+        rates += [space.along(body.velocity).T, turn[None], modal_rates(moving, name).T]
+    return np.concatenate(rates)
+
+
+def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
+    """Write zero_dynamics/ of an analysis with motors only."""
+    from ..mbs.inversion.motors_only import is_minimum_phase
+
+    entry, inversion = group.create_group("zero_dynamics"), around.inversion
+    assert inversion is not None
+    linear = inversion.linearisation
+    entry["time"] = linear.times
+    entry["zeros"] = np.stack([linear.zeros.real, linear.zeros.imag], axis=2)
+    entry.attrs.update(columns=["real", "imaginary"], factor=inversion.servo.factor)
+    entry.attrs.update(unmet_force=inversion.unmet, off_rest=inversion.off_rest)
+    entry.attrs["minimum_phase"] = is_minimum_phase(linear)
+
+
+def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController, ...]:
+    """The controllers of a loop that has linear ones, at each instant of their schedule."""
+    from ..actuation.control.linear_model import SampledController
+
+    group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
+    inputs, outputs = tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"])
+    step = float((time[-1] - time[0]) / (len(time) - 1))
+    states = tuple(f"state/{k}" for k in range(1, group["A"].shape[-1] + 1))
+    times = group["time"][()] if "time" in group else time[:1]
+    along = (np.reshape(group[key], (len(times), *group[key].shape[-2:])) for key in "ABCD")
+    names: dict[str, Any] = {"state_names": states, "input_names": inputs, "output_names": outputs, "sample_time": step}
+    matrices = (dict(zip("ABCD", of, strict=True)) for of in zip(*along, strict=True))
+    return tuple(SampledController(**names | of, time=float(t)) for of, t in zip(matrices, times, strict=True))
+
+
+def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
+    """The linear models of an analysis that has them."""
+    from ..actuation.control.linear_model import LinearModel
+
+    group, time = file[f"{analysis}/linear"], file[f"{analysis}/time"][()]
+    names: dict[str, Any] = {key: tuple(str(name) for name in group.attrs[key]) for key in NAMES}
+    models = []
+    for k, t in enumerate(time):
+        matrices = {key: np.asarray(group[key][k], dtype=float) for key in MATRICES}
+        models.append(LinearModel(**names | matrices, time=float(t)))
+    return tuple(models)
+
+
+def save_models(models: Sequence[StateSpace], path: Path) -> None:
+    """Write models to .npz or .mat: one as it is, several with a first axis over their times."""
+    if len(models) == 1:
+        models[0].save(path)
+        return
+    from ..actuation.control.linear_model import save_arrays
+
+    first, every = models[0].arrays(), [model.arrays() for model in models]
+    along = (key for key, value in first.items() if isinstance(value, np.ndarray) or key == "time")
+    save_arrays(first | {key: np.array([of[key] for of in every]) for key in along}, path)
+
+
+def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
+    """Write tip_error and control/ of a closed loop: samples, and metrics and names as attributes."""
+    metrics, error = record.metrics, group.create_dataset("tip_error", data=record.tip_error)
+    error.attrs.update(peak=metrics.tip_error_max, peak_time=record.tip_error_peak_time, rms=metrics.tip_error_rms)
+    group = group.create_group("control")
+    write_record(group, record)
+    write_record(group, metrics)
+    for key in ("inputs", "outputs", "warnings", "advice"):
+        group.attrs[key] = list(getattr(record, key))
+    if record.feedback:
+        laws = list(record.feedback.values())
+        for key in "ABCD":
+            every = np.array([getattr(of, key) for of in laws])
+            group[f"controller/{key}"] = every if len(laws) > 1 else every[0]
+        if len(laws) > 1:
+            group["controller/time"] = list(record.feedback)
+        group["controller"].attrs.update(inputs=list(laws[0].outputs), outputs=list(laws[0].inputs))
+    if record.poles is not None:
+        _write_poles(group, _by_size(record.poles))
+    if (margins := record.margins) is not None:
+        group.attrs.update(spectral_radius=margins.radius, gain_margin=margins.gain, delay_margin=margins.delay)
+    if (estimate := record.estimate) is not None:
+        group = group.create_group("estimate")
+        for name, values in zip(estimate.names, estimate.values.T, strict=True):
+            if not name.startswith("point/"):
+                group[f"rate/{name.removesuffix('/rate')}" if name.endswith("/rate") else name] = values
+        if estimate.position.size:  # of the tip also its standard deviation and its distance from the truth
+            for key in ("position", "error", "sigma"):
+                group[f"points/{estimate.tip}/{key}"] = getattr(estimate, key)
+        group.attrs.update(nees=estimate.nees, inside=estimate.inside)
+        _write_poles(group, _by_size(estimate.poles))
+
+
+def _by_size(poles: ComplexArray) -> ComplexArray:
+    """Those (k,) of a sampled loop, the smallest first, in an order that round-off does not change."""
+    from ..actuation.control.zeros import by_side
+
+    return poles[by_side(poles, np.zeros(len(poles)))]
+
+
+def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
+    group["pole"] = np.stack([poles.real, poles.imag], axis=-1)
+    group["pole"].attrs["columns"] = ["real", "imaginary"]
+
+
+def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
+    """The metrics among the attributes of control/."""
+    from ..actuation.control.metrics import Metrics
+
+    return Metrics(**fields_in(attributes, Metrics))
+
 
 About = Mapping[str, Any]
 

@@ -18,7 +18,7 @@ TIME, SAMPLES = "time", "control/time"
 
 
 def labelled(results: Datasets, analysis: str, histories: Sequence[str]) -> Dataset:
-    """All `histories` of an analysis, and the samples of a closed loop; see `AnalysisAccess.to_xarray`."""
+    """All `histories` of an analysis, and the samples of a closed loop; see `Results.to_xarray`."""
     names = [name for name in histories if name != TIME]
     if results.has(f"{analysis}/{SAMPLES}"):
         inside = results.names(f"{analysis}/control")

@@ -27,9 +27,9 @@ MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
 
 
 def peaking(result: AnalysisResult) -> Iterator[tuple[str, Array]]:
-    """Name in its analysis and values (T, …) of what has peaks; the moment in a joint of the plane is its own.
+    """Name and values (T, …) of each history of an analysis that has peaks, at all times of `result.histories`.
 
-    Of all of it, or where only parts are wanted, these and what comes without further evaluation.
+    In SI units and along the axes of the scene. Where only parts are wanted: these, and what costs no evaluation.
     """
     of, wants = result.histories, result.wants
     run, space = of.run, of.run.space

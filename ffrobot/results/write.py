@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 
+from ..common.arrays import Indices
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
@@ -15,19 +18,27 @@ from ..common.hdf5 import image_of, in_memory
 from ..common.meanings import write_record
 from ..common.version import VERSION
 from ..mbs.fields.steps import DATASET, METHOD
+from ..mbs.model.truncation import modes_kept
 from ..mbs.posture.redundancy import resolving_joints
-from ..mbs.quantities.motion import constraint_violation
+from ..mbs.quantities.motion import (
+    body_motion,
+    constraint_violation,
+    joint_motion,
+    plane_angle,
+    point_motion,
+    point_names,
+    reported_points,
+)
+from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
 from ..mbs.run.record import Details, Run
 from ..run.result import AnalysisResult, Solution
 from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
 from .judging import write_off_path
 from .kinds import own_results
-from .motion import write_bodies, write_joints, write_paths, write_points, write_stress
 from .peaks import peaking, write_peaks
 from .resume import write_state
-
-FORMAT_VERSION = 1
 
 
 def write_results(solution: Solution, path: Path) -> None:
@@ -52,13 +63,9 @@ def results_image(solution: Solution) -> bytes:
 
 def _write_head(file: h5py.File, solution: Solution) -> None:
     """What every results file says of itself, of the scene, and of the files of modal bodies."""
-    file.attrs["format"] = FORMAT
-    file.attrs["format_version"] = FORMAT_VERSION
-    file.attrs[MARK] = CHECKSUM
-    file.attrs["ffrobot_version"] = VERSION
-    file.attrs["name"] = solution.scene.name
-    file.attrs["scene"] = solution.scene.text
-    file.attrs["space"] = solution.scene.space
+    scene = solution.scene
+    file.attrs.update({MARK: CHECKSUM, "format": FORMAT, "format_version": 1, "ffrobot_version": VERSION})
+    file.attrs.update(name=scene.name, scene=scene.text, space=scene.space)
     files = {
         name: {"path": str(body.path.absolute()), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
         for name, body in solution.bodies.items()
@@ -78,10 +85,10 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if joints := resolving_joints(run.model):
         group.attrs.update({"redundancy": run.model.scene.redundancy, "resolved_by": joints})
     if wants("bodies"):
-        write_bodies(group, solution, result)
+        _write_bodies(group, solution, result)
     _write_forces(group, solution, result)
     if wants("points"):
-        write_points(group, result)
+        _write_points(group, result)
     if wants("feasibility") and result.actuation is not None:
         write_feasibility(group, solution, result.actuation.feasibility)
     for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
@@ -116,14 +123,14 @@ def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult)
     """Of an analysis: joints/, trajectories/, actuation_points/, stress/ and pzt/, and all that has peaks."""
     histories, wants = result.histories, result.wants
     if wants("joints"):
-        write_joints(group, solution, result)
+        _write_joints(group, solution, result)
     for body, forces in result.point_forces.items() if wants("actuation_points") else ():
         points = group.create_group(f"actuation_points/{body}")
         write_point_forces(points, solution.points[body], forces, result.run.space)
     for body, stress in histories.stresses.items() if wants("stress") else ():
-        write_stress(group.create_group(f"stress/{body}"), stress, histories.outputs)
+        _write_stress(group.create_group(f"stress/{body}"), stress, histories.outputs)
     if wants("trajectories"):
-        write_paths(group, result)
+        _write_paths(group, result)
     if wants("pzt") and result.actuation is not None:
         write_voltages(group, solution, result.actuation)
     with_peaks = {name: values for name, values in peaking(result) if wants(name)}
@@ -133,10 +140,9 @@ def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult)
 def _write_run(group: h5py.Group, outcome: Run) -> None:
     """What is known of a run whether it has outputs or not: its analysis, how it went, its times and steps."""
     analysis, run = outcome.analysis, outcome.statistics
-    group.attrs["kind"] = analysis.kind
+    group.attrs.update(kind=analysis.kind, tolerance=analysis.tolerance)
     group.attrs["integrator"] = run.integrator.name if analysis.is_integrated else "none"
     group.attrs["integrator_reason"] = run.integrator.reason if analysis.is_integrated else ""
-    group.attrs["tolerance"] = analysis.tolerance
     group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
     group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
     for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
@@ -169,3 +175,100 @@ def _write_judgement(group: h5py.Group, solution: Solution, result: AnalysisResu
         group.attrs["check_modes"] = json.dumps(dict(check.modes))
         if check.least_voltage is not None:
             group.attrs["check_least_voltage"] = check.least_voltage
+
+
+def _write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """Write bodies/ of an analysis; modes of planar scenes are those that move in the plane."""
+    run, histories = result.run, result.histories
+    forces = actuator_forces(histories.run)
+    for name in reported_points(run):
+        body, moved = solution.bodies[name].spatial, body_motion(run, name)
+        F_p, T = None if forces is None else forces.modal[name][histories.outputs], body.modal_transform
+        about = "modes of the modal body file"
+        if run.space.is_plane and T.shape[1] < T.shape[0]:  # of those that move in the plane
+            group[f"bodies/{name}/modal_transform"] = T
+            about = "modes of the modal body file are modal_transform times these"
+            p, p_dot = (np.linalg.lstsq(T, values.T, rcond=None)[0].T for values in (moved.modal, moved.modal_velocity))
+            F_p, moved = None if F_p is None else F_p @ T, replace(moved, modal=p, modal_velocity=p_dot)
+        angle = plane_angle(run, name) if run.space.is_plane else moved.orientation
+        for key, values in moved.within(run.space, angle).datasets.items():
+            group[f"bodies/{name}/{key}"] = values
+        if F_p is not None:
+            group[f"bodies/{name}/modal_force"] = F_p
+        if run.space.is_plane or name in solution.links:
+            group[f"bodies/{name}"].attrs.update({"modal_coordinates": about, "modes_kept": modes_kept(body)})
+        if name in solution.divided:
+            group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
+    for name, link in result.bending.items():
+        about = group[f"bodies/{name}"].attrs
+        about.update(largest_deflection=link.deflection, largest_rotation=link.rotation)
+        about.update(position_error=link.missing.of_length, relative_error=link.missing.of_deflections)
+        for key in ("foreshortening", "foreshortening_moment", "stiffness_change"):
+            about[key] = getattr(link, key)
+
+
+def _write_points(group: h5py.Group, result: AnalysisResult) -> None:
+    """Write points/ of an analysis, except quantities with peaks."""
+    run = result.run
+    for place in point_names(run):
+        if result.wants(f"points/{place}"):
+            for key, values in point_motion(run, place).within(run.space).datasets.items():
+                if key != "deflection":  # which has peaks
+                    group[f"points/{place}/{key}"] = values
+        if result.wants(f"points/{place}/predicted_shift") and place in result.predicted_shift:
+            group[f"points/{place}/predicted_shift"] = run.space.along(result.predicted_shift[place])
+
+
+def _write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> None:
+    """Write stresses of a body at stress points and on its surface at `outputs`, and the data for them."""
+    recovery = stress.recovery.at(outputs)
+    group.attrs["method"] = recovery.method
+    group["modal"] = recovery.modal
+    group["loads"] = recovery.sizes
+    group["loads"].attrs.create("columns", list(recovery.loads), dtype=h5py.string_dtype())
+    if recovery.sections is not None:
+        write_record(group.create_group("layers"), recovery.sections)
+    for name, point in stress.points.items():
+        group[f"points/{name}/stress"] = point.stress[outputs]
+        group[f"points/{name}/stress"].attrs["columns"] = ["xx", "yy", "zz", "yz", "xz", "xy"]
+    if stress.surface is not None:
+        group["surface/position_of_max"] = stress.surface.position_of_max[outputs]
+
+
+def _write_paths(group: h5py.Group, result: AnalysisResult) -> None:
+    """Write trajectories/ of an analysis: prescribed or followed paths, constant before and after their duration.
+
+    Of paths made of legs also when they begin and are over, and what was found for them.
+    """
+    run, details = result.run, result.run.details
+    inside = np.clip(run.time, 0.0, run.analysis.last_time)
+    errors = {} if details.held is None else details.held.path_errors(run.time, run.q)
+    for trajectory in run.model.scene.trajectory if errors else followed_trajectories(run):
+        entry = group.create_group(f"trajectories/{trajectory.name}")
+        if errors:
+            entry["error"] = errors[trajectory.name]
+        entry.attrs["components"] = list(trajectory.force_components)
+        if functions := list(trajectory.components.values()):
+            target = [function.sample(inside)[0] for function in functions]
+            entry["target"] = target[0] if trajectory.coordinate_of else np.stack(target, axis=1)
+        if (path := trajectory.path) is not None:
+            entry.attrs.update(begin=path.begin, end=path.end, stretch=trajectory.stretch)
+            if trajectory.shaper is not None and trajectory.shaper.frequency is not None:
+                entry.attrs["shaper_frequency"] = np.atleast_1d(trajectory.shaper.frequency)
+
+
+def _write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """Write joints/ of an analysis, except quantities with peaks."""
+    run = result.run
+    for joint in solution.scene.joint:
+        entry = group.create_group(f"joints/{joint.name}")
+        entry.attrs["type"] = joint.type
+        if result.sharing is not None and joint.name in result.sharing.components:
+            entry.attrs["indeterminate"] = list(result.sharing.components[joint.name])
+        if (moving := joint_motion(run, joint.name)) is not None:
+            entry["coordinate"] = np.squeeze(moving[0], 1) if len(joint.units) == 1 else moving[0]
+        if (motor := motor_motion(run, joint.name)) is not None:
+            entry["motor_coordinate"] = motor[0]
+            entry["motor_angle"] = entry["motor_coordinate"]  # the same dataset under its former name
+        if (gear := gear_motions(run).get(joint.name)) is not None:
+            entry.attrs["unresolved"] = gear.unresolved

@@ -31,7 +31,10 @@ SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measure
 
 
 def reported_modes(result: AnalysisResult) -> Reported:
-    """Return what `modes = "auto"` compares, by kind; moments on joints and paths over the largest length of links."""
+    """Return what `modes = "auto"` compares, (T, …) by kind and name: deflections (m), forces (N), voltages (V).
+
+    Torques of motors (N·m) as they are, moments on joints and paths over the largest length of links.
+    """
     run = result.run
     nodes = [node for node in run.model.tree.nodes if node.body.n_modes]
     size = max((node.body.length or 0.0 for node in nodes), default=0.0) or 1.0
@@ -141,7 +144,7 @@ def _ratio(now: Mapping[str, float], before: Mapping[str, float]) -> float:
 
 
 def difference(now: Reported, before: Reported) -> dict[str, float]:
-    """Return, by kind, the largest difference of two solves relative to the peak of its quantity."""
+    """Return, by kind, the largest difference of two solves relative to the peak of the quantity, `now`."""
     errors = {}
     for kind, quantities in now.items():
         peaks = {name: np.abs(values).max(initial=0.0) for name, values in quantities.items()}

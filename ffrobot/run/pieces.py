@@ -22,7 +22,7 @@ from ..scene.pieces import bodies_in_pieces, places_on_pieces
 from ..scene.scene import Scene
 from .prepared import Prepared
 
-MOST = 64
+MOST = 64  # pieces of a link
 
 
 def links_in_pieces(prepared: Prepared) -> dict[str, LinkInPieces]:
@@ -67,7 +67,7 @@ def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
 
 
 def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
-    """Return deflections of flexible bodies (of links in pieces, the worst piece) and whether they can be divided.
+    """Largest deflections in a run by flexible body (of links in pieces, the worst piece), and whether it divides.
 
     In motion with the largest errors of any link for all: errors of one link move and load all others.
     """

@@ -85,7 +85,7 @@ class Histories:
     Attributes:
         prepared: the scene.
         run: at these times.
-        outputs: (T,) which of the times are outputs.
+        outputs: (T,) numbers of the times that are outputs.
     """
 
     prepared: Prepared = field(repr=False)
@@ -94,7 +94,7 @@ class Histories:
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:
-        """Forces in joints by name."""
+        """Forces (N) and moments (N·m) in joints at these times, by the joint's name."""
         return reactions(self.run)
 
     @cached_property
@@ -113,13 +113,13 @@ class Histories:
 
     @cached_property
     def stresses(self) -> Mapping[str, BodyStress]:
-        """By body, where modal body files hold modal stresses."""
+        """Stresses (Pa) by body, where modal body files have modal stresses."""
         prepared = self.prepared
         return find_stresses(self.run, prepared.parts or prepared.bodies, prepared.patches, prepared.divided)
 
     @cached_property
     def point_forces(self) -> Mapping[str, PointForces]:
-        """At actuation points, by body."""
+        """Forces (N) at actuation points, by body."""
         return _point_forces(self.prepared, self.run)
 
 
@@ -176,12 +176,12 @@ class AnalysisResult:
 
     @cached_property
     def totals(self) -> tuple[Energies, Momentum]:
-        """Of the robot."""
+        """Energies (J) and momentum (kg·m/s, kg·m²/s) of the robot at outputs."""
         return totals(self.run)
 
     @cached_property
     def point_forces(self) -> Mapping[str, PointForces]:
-        """At actuation points, by body."""
+        """Forces (N) at actuation points at outputs, by body."""
         of = self.histories
         return of.point_forces if of.run is self.run else _point_forces(self.prepared, self.run)
 
@@ -192,7 +192,7 @@ class AnalysisResult:
 
     @cached_property
     def settling(self) -> Mapping[str, Settling]:
-        """By point, of a run that goes on after the paths that it, or the analysis that it replays, follows."""
+        """Residual vibration by point, of a run that goes on after the paths that it, or its actuation, follows."""
         run, analysis = self.run, self.run.analysis
         if not isinstance(analysis, TimedAnalysis) or run.status != "completed":
             return {}
@@ -228,7 +228,7 @@ class AnalysisResult:
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:
-        """Forces in joints by name."""
+        """Forces (N) and moments (N·m) in joints at outputs, by the joint's name."""
         of, outputs = self.histories.reactions, self.histories.outputs
         return {joint: Wrench(acting.force[outputs], acting.moment[outputs]) for joint, acting in of.items()}
 
@@ -245,7 +245,7 @@ class AnalysisResult:
 
     @cached_property
     def mode_error(self) -> float | None:
-        """Estimated for too few modes, of peaks; None where it is not known."""
+        """Estimated error of too few modes, relative to peaks; None where it is not known."""
         error = mode_error(modes_in_motion(self.run)) if self._is_integrated else None
         return None if error is None else hypot(error, phase_error(self._start))
 

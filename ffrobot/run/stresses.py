@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 def find_stresses(
     run: Run, bodies: Mapping[str, LoadedBody], patches: Mapping[str, LinkPatches], divided: Mapping[str, BodyInPieces]
 ) -> dict[str, BodyStress]:
-    """Compute stresses by body; those of links in pieces from their pieces, which are among `bodies`.
+    """Compute stresses (Pa) of a run by body; those of links in pieces from their pieces, which are among `bodies`.
 
     By mode acceleration where files and loads allow it. By mode displacement of links that patches stiffen otherwise
     than by bending in the plane, and of pieces with such patches, as static stresses of their files are those of the

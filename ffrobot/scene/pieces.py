@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @struct
 class BodyInPieces:
-    """Division of a body, and the names of its pieces as bodies, from root to tip."""
+    """Division of a body into pieces, and their names as bodies, from root to tip."""
 
     cut: CutLink
     names: tuple[str, ...]

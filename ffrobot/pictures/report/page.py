@@ -18,7 +18,7 @@ from ...common.version import VERSION
 from ...mbs.inversion.zero_dynamics import is_unstable
 from ...results.file import Results
 from ...results.joints import joint_coordinates
-from ...results.linear import read_metrics
+from ...results.kinds import read_metrics
 from ...results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
 from ...results.verdict import millimeters, number
 from ..figures.shared import bending_points
