@@ -118,7 +118,7 @@ from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.field_types import Vector2, Vector3
 from ffrobot.mbs.fields.spelling import Spelled, place
 from ffrobot.mbs.joints.joint import Along, LoopEquation
-from ffrobot.mbs.joints.moving_joint import AxialJoint
+from ffrobot.mbs.joints.joint import AxialJoint
 
 
 class SlotJoint(AxialJoint):

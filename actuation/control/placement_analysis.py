@@ -17,8 +17,9 @@ from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_poi
 from ...mbs.fields.field_types import Reference
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.model.gears import with_compliance
+from ...mbs.model.motors import motor_forces
 from ...mbs.run.record import Run
-from ...mbs.run.replay import motor_forces_of
+from ...mbs.run.replay import supplied_in
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, link_patches
@@ -81,7 +82,8 @@ class PatchPlacement(InstantAnalysis):
             source = context.outcomes[self.source]
             run = of_earlier(source, self).at([row_at(model.scene.path, self, source, t) for t in self.times])
             of_link = _patches(context, wanted.body)
-            F_p = of_link.modes[link.layout.label].forces(of_link.on_link(motor_forces_of(source).modal))
+            modal = motor_forces(source.model, source.q, supplied_in(source)).modal
+            F_p = of_link.modes[link.layout.label].forces(of_link.on_link(modal))
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
         run, about = find_operating_points(context, self)
         at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])

@@ -101,7 +101,7 @@ class RigidArm:
         friction = -resistance(self._model, q[None], v[None])[0]
 
         def moments(target: Array) -> Array:
-            signs = self._system.row_signs
+            signs = self._model.row_signs
             multipliers = self._system.core.evaluate(q, v, signs * target, friction, None)[1]
             return -(signs * multipliers)[self._motors]
 

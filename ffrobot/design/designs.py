@@ -21,7 +21,7 @@ from ..common.outputs import protected
 from ..common.parallel import processes as of_mpi
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import DEEPEST
-from ..mbs.fields.steps import DATASET
+from ..mbs.fields.field_types import DATASET
 from ..mbs.scene.analysis import IntegratedAnalysis, TimedAnalysis
 from ..mbs.tracking.tracking import Tracking
 from ..results.file import Results

@@ -8,8 +8,8 @@ chapter 23). One unit more room in g_i lowers F by λ_i.
 Gradients are from few runs: one design beside for each variable, or a central pair. The step follows from the noise ε
 of the runs: with h = 2 √ε of a number, noise and curvature of a one-sided difference are alike (Gill, Murray & Wright,
 Practical Optimization, 1981, section 8.6). Where designs beside take the steps of the base again
-(`mbs/fields/steps.py`), ε is round-off, and one-sided differences are all that is wanted. One more run has all numbers
-changed at once, to the other sides: what it leaves of the sum of the differences tells their error.
+(`mbs/fields/field_types.py`), ε is round-off, and one-sided differences are all that is wanted. One more run has all
+numbers changed at once, to the other sides: what it leaves of the sum of the differences tells their error.
 
 Runs that choose their own steps differ by their tolerance. There the first gradient of a search takes pairs; their
 second differences take the curvature out of later one-sided ones. Peaks are followed at their own time (envelope

@@ -1,6 +1,6 @@
 """Derivatives of responses by numbers of a scene and its links: `ffrobot sensitivity`.
 
-Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/steps.py`). The
+Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/field_types.py`). The
 noise of their differences is round-off, 1e-13 to 1e-11 of a response after thousands of steps and with new modes of
 links. Truncation grows with the number of periods that vibrations pass through. So the
 steps of every key are small, three of two sizes (`THREE`), which check each other. Others follow where derivatives err

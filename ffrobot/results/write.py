@@ -17,7 +17,7 @@ from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.meanings import write_record
 from ..common.version import VERSION
-from ..mbs.fields.steps import DATASET, METHOD
+from ..mbs.fields.field_types import DATASET, METHOD
 from ..mbs.model.truncation import modes_kept
 from ..mbs.posture.redundancy import resolving_joints
 from ..mbs.quantities.motion import (

@@ -17,7 +17,7 @@ from ..mbs.joints.joint import MotorLimits
 from ..mbs.linear.vibration import PathFrequencies, frequencies_along
 from ..mbs.model.model import Model
 from ..mbs.scene.analysis import TimedAnalysis
-from ..mbs.scene.motion_keys import Shaper
+from ..mbs.scene.trajectories import Shaper
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:

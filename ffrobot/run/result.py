@@ -26,7 +26,6 @@ from ..mbs.quantities.attachment_error import (
     start_of_motion,
 )
 from ..mbs.quantities.motion import point_names, reported_points
-from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
 from ..mbs.quantities.stress import BodyStress
@@ -34,6 +33,7 @@ from ..mbs.quantities.supply import Energies, Momentum, actuator_forces, gear_mo
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.run.gears import unresolved_gears
 from ..mbs.run.record import Run
+from ..mbs.run.stops import path_warnings
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis, TimedAnalysis
 from .actuation import Actuation, find_actuation
 from .pieces import bending_of_links, links_in_pieces, make_whole_links

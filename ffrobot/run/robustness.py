@@ -19,7 +19,7 @@ from ..common.errors import SolveError
 from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.operating_points import locked_motors
-from ..mbs.joints.moving_joint import GearedJoint
+from ..mbs.joints.joint import GearedJoint
 from ..mbs.joints.twist_spring import stiffer
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
@@ -30,8 +30,8 @@ from ..mbs.model.model import Model
 from ..mbs.run.context import place_of
 from ..mbs.run.gears import with_motor_coordinates
 from ..mbs.run.record import Run
+from ..mbs.scene.analysis import Robustness
 from ..mbs.scene.loads import Load
-from ..mbs.scene.robustness import Robustness
 from ..scene.scene import Scene
 
 SAMPLED = 0.25  # of the rate with which damping acts on bending links, 1/sample time: half of it per unit of bandwidth

@@ -25,7 +25,7 @@ from ..mbs.fields.spelling import PLANAR, SPATIAL
 from ..mbs.joints.joint import JointRecord
 from ..mbs.scene.analysis import Analysis, Surroundings
 from ..mbs.scene.bodies import BodyKeys
-from ..mbs.scene.planar_spelling import in_3d
+from ..mbs.scene.mechanism import in_3d
 from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS
 from .scene import Scene, SceneKeys

@@ -15,7 +15,7 @@ from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.link_records.families import FAMILIES
 from ..mbs.fields.field_types import split_point
-from ..mbs.joints.weld import WeldJoint
+from ..mbs.joints.joints import WeldJoint
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.mechanism import MechanismKeys
 from .scene import Scene

@@ -10,6 +10,7 @@ import ast
 import math
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NoReturn
 
 from .._core import Op, TimeFunction
@@ -113,7 +114,12 @@ class _Translation:
             self._fail(node, "nested too deeply")
         match node:
             case ast.Constant(value=value):
-                return self._literal(node, value)
+                if isinstance(value, bool) or not isinstance(value, int | float):
+                    self._fail(node, f"{value!r} is not a real number")
+                if abs(value) > MAX_LITERAL:
+                    self._fail(node, f"a number beyond {MAX_LITERAL:g}")
+                self._push(float(value))
+                return True
             case ast.Name(id=name):
                 return self._name(node, name)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -136,7 +142,16 @@ class _Translation:
             self._fail(node, "nested too deeply")
         match node:
             case ast.Compare(left=left, ops=comparisons, comparators=right):
-                return self._compare(node, [left, *right], comparisons, nesting + 1)
+                constant = True
+                for k, (comparison, pair) in enumerate(zip(comparisons, pairwise([left, *right]), strict=True)):
+                    op = _COMPARISONS.get(type(comparison))
+                    if op is None:
+                        name = type(comparison).__name__
+                        self._fail(node, f"comparison {name} is not available", "available: < <= > >=")
+                    holds = self._apply(node, op, [self.number(operand, nesting + 2) for operand in pair])
+                    # a < b < c is a < b and b < c, as Python means it
+                    constant = self._apply(node, Op.logical_and, [constant, holds]) if k else holds
+                return constant
             case ast.BoolOp(op=operator, values=values):
                 op = Op.logical_and if isinstance(operator, ast.And) else Op.logical_or
                 constant = self.condition(values[0], nesting + 1)
@@ -147,14 +162,6 @@ class _Translation:
                 return self._apply(node, Op.logical_not, [self.condition(operand, nesting + 1)])
             case _:
                 self._fail(node, "where needs a comparison", "such as t < 0.5")
-
-    def _literal(self, node: ast.expr, value: object) -> bool:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self._fail(node, f"{value!r} is not a real number")
-        if abs(value) > MAX_LITERAL:
-            self._fail(node, f"a number beyond {MAX_LITERAL:g}")
-        self._push(float(value))
-        return True
 
     def _name(self, node: ast.expr, name: str) -> bool:
         if name in _FUNCTIONS or name == "where":
@@ -202,20 +209,6 @@ class _Translation:
             constants += [self.number(argument, nesting + 1) for argument in node.args[1:]]
             return self._apply(node, Op.select, constants)
         return self._apply(node, _FUNCTIONS[name], [self.number(node.args[0], nesting + 1)])
-
-    def _compare(
-        self, node: ast.expr, operands: Sequence[ast.expr], comparisons: Sequence[ast.cmpop], nesting: int
-    ) -> bool:
-        """Write a < b < c as a < b and b < c, as Python means it."""
-        constant = True
-        for k, comparison in enumerate(comparisons):
-            op = _COMPARISONS.get(type(comparison))
-            if op is None:
-                self._fail(node, f"comparison {type(comparison).__name__} is not available", "available: < <= > >=")
-            pair = [self.number(operand, nesting + 1) for operand in operands[k : k + 2]]
-            holds = self._apply(node, op, pair)
-            constant = self._apply(node, Op.logical_and, [constant, holds]) if k else holds
-        return constant
 
     def _apply(self, node: ast.expr, op: Op, constant: Sequence[bool]) -> bool:
         """Append `op`, or its result when all its operands are constant."""

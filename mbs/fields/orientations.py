@@ -39,11 +39,11 @@ class OrientationLaw:
         return _core.TurningLaw(kind, list(self.functions), reference)
 
     def sample(self, times: Array) -> Array:
-        """Return triads A (T, 3, 3), axes in columns; of a direction by the smallest turn that brings z onto it."""
+        """Return triads A (T, 3, 3), axes in columns, at `times` (T,), s; of a direction by z's smallest turn."""
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
     def rates(self, times: Array) -> tuple[Array, Array]:
-        """ω and α (T, 3) in global axes; of a direction, without spin about it."""
+        """Return ω (rad/s) and α (rad/s²), (T, 3), in global axes; of a direction without spin about it."""
         _, omega, alpha = self.in_core.sample(times)
         return omega, alpha
 
@@ -65,12 +65,13 @@ def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:
 
 
 def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
-    """Rotation vectors (T, 3) of triads A (T, 3, 3) against their middle, and its own: see `orientation_of`.
+    """Return rotation vectors (T, 3), rad, of triads A (T, 3, 3) against their middle, and its own.
 
     A straight line between two of them is a turn about a fixed axis where these are all there are.
     Raises `InputError` where orientations are too far apart, which calls them `each` and a number.
     """
-    middle = _middle(A)
+    U, _, V = np.linalg.svd(A.mean(axis=0))  # the rotation nearest to all is the polar factor of their mean
+    middle = of_quaternion(quaternions(U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V))
     psi = logarithm(A @ middle.T)
     if (far := np.linalg.norm(psi, axis=1)).max() > WIDEST:
         raise InputError(
@@ -79,10 +80,3 @@ def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
         )
     x, y, z = as_list(logarithm(middle))
     return psi, (x, y, z)
-
-
-def _middle(A: Array) -> Array:
-    """The rotation nearest to all of A (T, 3, 3): the polar factor of their mean."""
-    U, _, V = np.linalg.svd(A.mean(axis=0))
-    middle: Array = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    return of_quaternion(quaternions(middle))

@@ -24,7 +24,7 @@ SAME_TIME = 1e-12  # of a motion's duration: breaks nearer to each other are one
 
 @struct
 class Piecewise:
-    """n components over time: polynomials between `breaks` (k + 1,), s; at rest outside, with their values there.
+    """n components (m, rad) over time: polynomials between `breaks` (k + 1,), s; outside they rest where they are.
 
     coefficients: (k, order, n), highest power first, in powers of t − left break.
     """
@@ -53,16 +53,16 @@ class Piecewise:
 
     @property
     def first(self) -> Array:
-        """Initial value (n,)."""
+        """Initial value (n,), m or rad."""
         return as_floats(self.coefficients[0, -1])
 
     @property
     def last(self) -> Array:
-        """Final value (n,)."""
+        """Final value (n,), m or rad."""
         return as_floats(shifted(self.coefficients[-1], self.end - self.breaks[-2])[-1])
 
     def sample(self, times: Array, derivative: int = 0) -> Array:
-        """Return a derivative (T, n) at `times` (T,), s; at jumps that of the following piece."""
+        """Return a derivative (T, n), m or rad per sᵏ, at `times` (T,), s; at jumps that of the following piece."""
         t = np.clip(times, self.begin, self.end)
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.coefficients) - 1)
         powers = range(self.coefficients.shape[1] - 1, derivative - 1, -1)
@@ -260,7 +260,12 @@ def path_of(legs: Legs) -> Piecewise:
 def _joined(legs: Legs) -> Piecewise:
     """p₀ + Σ (p_{i+1} − p_i) s_i(t − t_i)."""
     changes = np.diff(legs.places, axis=0)
-    laws = [law.moved(legs.stretch) for law in _laws(legs, changes)]
+    kind = legs.profile, legs.smoothness
+    if legs.durations is not None:
+        laws = [law_in(duration, *kind) for duration in legs.durations]
+    else:
+        laws = [law_within(float(way), legs.limits, *kind) for way in np.linalg.norm(changes, axis=1)]
+    laws = [law.moved(legs.stretch) for law in laws]
     begin, moving = legs.start, []
     for k, (law, change) in enumerate(zip(laws, changes, strict=True)):
         if k and legs.holds[k - 1]:
@@ -272,13 +277,6 @@ def _joined(legs: Legs) -> Piecewise:
     check_durations([law.end for law in laws], begin)
     rest = Piecewise(moving[0].breaks[:2], legs.places[None, :1])
     return superposed([rest, *moving])
-
-
-def _laws(legs: Legs, changes: Array) -> Sequence[Piecewise]:
-    if legs.durations is not None:
-        return [law_in(duration, legs.profile, legs.smoothness) for duration in legs.durations]
-    ways = np.linalg.norm(changes, axis=1)
-    return [law_within(float(way), legs.limits, legs.profile, legs.smoothness) for way in ways]
 
 
 def _peak(motion: Piecewise, order: int) -> float:

@@ -292,7 +292,7 @@ def _accelerations(times: Array, values: Array) -> Array:
 
 
 def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
-    """Return midpoints (T − 1,) of `times` (T,), s, and the mean rates (T − 1, columns) of `values` there."""
+    """Return midpoints (T − 1,) of `times` (T,), s, and mean rates (T − 1, columns), per s, of `values`."""
     return (times[1:] + times[:-1]) / 2, np.diff(values, axis=0) / np.diff(times)[:, None]
 
 
@@ -330,7 +330,7 @@ def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]
 
 
 def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = True) -> Piecewise:
-    """The spline of a degree through `values` (T, n) at `nodes` (T,), s.
+    """Return the spline of a degree through `values` (T, n), of any unit, at `nodes` (T,), s.
 
     With `at_rest` its first two derivatives vanish at both ends.
     """

@@ -30,9 +30,8 @@ from ..model.model import Model
 from ..run.context import Context
 from ..run.integrators import Choice
 from ..run.record import ADVICE, Details, Prescription, Run, Statistics
-from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
+from ..scene.analysis import Analysis, Check, Robustness, TimedAnalysis, output_times
 from ..scene.mechanism import MechanismScene
-from ..scene.robustness import Robustness
 from .servo import Servo, Stopped, make_servo
 from .stable_inversion import Inversion, invert, shape_of
 from .zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along

@@ -1,1 +1,1 @@
-"""Joints, one file for each type: its keys, its constraints, its coordinate."""
+"""Joints: their keys, constraints and coordinates."""

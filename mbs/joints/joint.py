@@ -9,23 +9,27 @@ from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.rotations import of_rpy
+from ...common.rotations import of_rpy, smallest_turn
 from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import (
     GROUND,
     Name,
+    NotNegative,
+    Positive,
     Quantity,
     Reference,
     Side,
+    Vector3,
     body_of,
     loaded_reference,
     split_point,
 )
-from ..fields.spelling import IN_SPACE, Vector
+from ..fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Spelled, Vector, as_written
+from .twist_spring import StiffnessSteps
 
 
 class MotorLimits(NamedTuple):
@@ -45,11 +49,11 @@ class Friction:
     speed: float
 
     def resistance(self, rate: Array) -> Array:
-        """C γ̇ + τ_c tanh(γ̇/γ̇_s) at rates γ̇ of any shape."""
+        """Return c γ̇ + τ_c tanh(γ̇/γ̇_s), N·m or N, at rates γ̇ (…,), rad/s or m/s."""
         return self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
 
     def slope(self, rate: Array) -> Array:
-        """Return the derivative of the friction torque by γ̇: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+        """Return c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s), N·m·s/rad or N·s/m, at rates γ̇ (…,), rad/s or m/s."""
         return self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
 
 
@@ -174,7 +178,7 @@ class JointRecord(Record):
         return of_rpy(*self.rpy)
 
     def triads(self) -> tuple[Array, Array]:
-        """Columns (3, 3): axes of the joint on its first side and on its second one, in the axes of the sections."""
+        """Return the joint's axes (3, 3), columns, on its first and its second side, in axes of the sections."""
         return np.eye(3), self.orientation.T
 
     def outward_triads(self, backwards: bool) -> tuple[Array, Array]:
@@ -191,15 +195,15 @@ class JointRecord(Record):
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:
-        """Coordinates q (q_count,) from the scene's values of the position."""
+        """Return q (q_count,) from the scene's values of the position, rad or m."""
         return coordinates
 
     def velocity(self, rates: Array) -> Array:
-        """Velocities v (freedoms,) from the scene's values of the rates."""
+        """Return v (freedoms,) from the scene's values of the rates, rad/s or m/s."""
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
-        """Return coordinates (…, k) in the scene's order from q (…, q_count); likewise rates from v."""
+        """Return coordinates (…, k), rad or m, in the scene's order from q (…, q_count); likewise rates from v."""
         return q
 
     # What a motor and a gear add; joints that can have them override this.
@@ -210,8 +214,8 @@ class JointRecord(Record):
 
     @property
     def asks_for_motor(self) -> bool:
-        """Whether the scene explicitly gives the joint a motor."""
-        return False
+        """Whether the scene sets `motor = true`."""
+        return bool(getattr(self, "motor", False))
 
     @property
     def motor_limits(self) -> tuple[MotorLimits, ...]:
@@ -238,3 +242,124 @@ class JointRecord(Record):
         """Keys that require its coordinate in the tree; where it closes a loop only a rotor's exists."""
         keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
         return tuple(key for key in keys if getattr(self, key, None))
+
+
+Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
+Range = tuple[Quantity, Quantity]
+
+
+class MovingJoint(JointRecord):
+    """A joint with coordinates, which motors may drive. Joints with several take lists of limits, one for each."""
+
+    motor: bool | None = None
+    """Presence of motors; by default in open chains only, and not in spherical and free joints."""
+    position_limit: Annotated[Range | tuple[Range, ...] | None, Spelled(Range, as_written)] = None
+    """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts beyond it; a warning has
+    time and size of the excess."""
+    moment_limit: Limit | None = None
+    """Largest torque, N·m (sliding: force, N), at the joint: after the gear."""
+    speed_limit: Limit | None = None
+    """Largest rate of the joint, rad/s (sliding: m/s)."""
+    power_limit: Limit | None = None
+    """Largest mechanical power, W."""
+    viscous_friction: NotNegative = 0.0
+    """Viscous coefficient c, N·m·s/rad (sliding: N·s/m)."""
+    coulomb_friction: NotNegative = 0.0
+    """Coulomb torque τ_c, N·m (sliding: N)."""
+    friction_speed: Positive = 0.01
+    """Rate at which dry friction has 76 % of its size, tanh 1, rad/s (sliding: m/s)."""
+
+    @model_validator(mode="after")
+    def _has_friction(self) -> Self:
+        if "friction_speed" in self.model_fields_set and not self.coulomb_friction:
+            raise ValueError('expected the key "friction_speed" only with coulomb_friction, found it alone')
+        return self
+
+    @model_validator(mode="after")
+    def _limits_fit(self) -> Self:
+        count = len(self.units)
+        for key in ("moment_limit", "speed_limit", "power_limit"):
+            value = getattr(self, key)
+            if value is not None and np.size(value) != count:
+                wanted = "a number" if count == 1 else f"{count} numbers, one for each coordinate"
+                raise ValueError(f"expected {wanted} in {key}, found {np.size(value)}")
+        for lowest, highest in self.position_limits:
+            if not lowest < highest:
+                raise ValueError(f"expected position_limit = [least, largest], found [{lowest:g}, {highest:g}]")
+        return self
+
+    @property
+    def position_limits(self) -> tuple[tuple[float, float], ...]:
+        """Least and largest value of each coordinate (rad or m); infinite where not given."""
+        value, count = self.position_limit, len(self.units)
+        if value is None:
+            return super().position_limits
+        ranges = tuple(each for each in value if isinstance(each, tuple)) or ((float(value[0]), float(value[1])),)  # type: ignore[arg-type]
+        if len(ranges) != count:
+            wanted = "one pair [least, largest]" if count == 1 else f"{count} pairs [least, largest]"
+            raise ValueError(f"expected {wanted} in position_limit, found {len(ranges)}")
+        return ranges
+
+    def has_motor(self, default: bool) -> bool:
+        """Whether motors drive the joint; `default` if the scene does not specify it."""
+        return default if self.motor is None else self.motor
+
+    @property
+    def motor_limits(self) -> tuple[MotorLimits, ...]:
+        """Limits of the motors for each coordinate, N·m, rad/s, W or N, m/s, W; infinite if not given."""
+        count = len(self.units)
+        limits = (self.moment_limit, self.speed_limit, self.power_limit)
+        rows = [np.broadcast_to(np.inf if limit is None else limit, count).tolist() for limit in limits]
+        return tuple(MotorLimits(*of_one) for of_one in zip(*rows, strict=True))
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """Friction along each coordinate; empty where there is none."""
+        if not (self.viscous_friction or self.coulomb_friction):
+            return ()
+        return (Friction(self.viscous_friction, self.coulomb_friction, self.friction_speed),) * len(self.units)
+
+
+class AxialJoint(MovingJoint):
+    """A joint whose motion is along or about an axis, z of its triads."""
+
+    axis: Annotated[Vector3, NormalInPlane(SPATIAL)] = Field(default=None, validate_default=True)
+    """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
+
+    @model_validator(mode="after")
+    def _axis_has_direction(self) -> Self:
+        check_direction("axis", self.axis)
+        return self
+
+    def triads(self) -> tuple[Array, Array]:
+        """Return triads (3, 3) with z along the axis."""
+        first = smallest_turn(np.array(self.axis))
+        return first, self.orientation.T @ first
+
+
+class GearedJoint(AxialJoint):
+    """A joint with one coordinate, whose motor may drive it by a rotor and a gear, rigid or compliant."""
+
+    gear_ratio: Positive = 1.0
+    """Rotor turns per turn of the joint (sliding: rotor rotation per joint displacement, rad/m)."""
+    rotor_inertia: NotNegative = 0.0
+    """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
+    stiffness: Positive | StiffnessSteps | None = None
+    """Stiffness of a compliant gear, N·m/rad (sliding: N/m), or { values = [K1, K2, …], torques = [T1, …] } in steps of
+    its torque (force); default: rigid."""
+    damping: NotNegative = 0.0
+    """Damping of that gear, N·m·s/rad (sliding: N·s/m)."""
+
+    @model_validator(mode="after")
+    def _has_rotor_behind_spring(self) -> Self:
+        if self.stiffness is None and self.damping:
+            raise ValueError('expected the key "damping" only with stiffness, found it alone')
+        if self.stiffness is not None and not self.rotor_inertia:
+            raise ValueError("expected a rotor_inertia above 0 with stiffness, found none: the rotor turns freely")
+        return self
+
+
+def check_direction(key: str, axis: Sequence[float]) -> None:
+    """Raise `ValueError` for an axis without direction."""
+    if not any(axis):
+        raise ValueError(f"expected {key} with a direction, found {list(axis)}")

@@ -54,20 +54,20 @@ class TwistSpring:
 
     @property
     def torques(self) -> tuple[float, ...]:
-        """N·m at the knots."""
+        """Torques at the knots, N·m."""
         steps = np.diff(self.knots, prepend=0.0) * np.array(self.slopes[:-1])
         return tuple(np.cumsum(steps).tolist())
 
     def moment(self, twist: Array) -> Array:
-        """N·m of twists of any shape, rad."""
+        """Return torques (…,), N·m, of twists (…,), rad."""
         return _piecewise(twist, self.slopes, self.knots)
 
     def twist(self, moment: Array) -> Array:
-        """Rad that torques of any shape, N·m, take."""
+        """Return twists (…,), rad, under torques (…,), N·m."""
         return _piecewise(moment, tuple(1.0 / k for k in self.slopes), self.torques)
 
     def slope(self, twist: Array) -> Array:
-        """N·m/rad at twists of any shape, rad."""
+        """Return stiffness (…,), N·m/rad, at twists (…,), rad."""
         return np.array(self.slopes)[np.searchsorted(self.knots, np.abs(twist))]
 
 

@@ -199,7 +199,7 @@ class Statics:
         independent = _independent(J[:, free])
         J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
         Q = at.Q * self.sizes - relief.load
-        missed = self.system.row_signs * at.value / self.row_sizes - relief.way
+        missed = self.model.row_signs * at.value / self.row_sizes - relief.way
         multipliers = np.linalg.lstsq(J[:, free].T, Q[free], rcond=DEPENDENT)[0]
         elastic = np.zeros_like(Q)
         for node in self.model.tree.nodes:
@@ -216,7 +216,7 @@ class Statics:
 
     def stiffness(self, q: Array, at: Balance) -> Array:
         """∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), exact."""
-        multipliers = at.multipliers / self.row_sizes * self.system.row_signs
+        multipliers = at.multipliers / self.row_sizes * self.model.row_signs
         core, scene = self.system.core, self.system.scene
         K = core.stiffness_at_rest(scene, self.t, q, multipliers, at.independent)
         return as_floats(K * self.sizes * self.sizes[:, None])
@@ -250,7 +250,7 @@ class Statics:
     def _at_rest(self, q: Array) -> tuple[_core.ForcesAtRest, Array]:
         """What the core finds at q (n_q,), and C_v (rows, n_v) in natural sizes."""
         at = self.system.core.forces_at_rest(self.system.scene, self.t, q)
-        return at, as_floats((self.system.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes)
+        return at, as_floats((self.model.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes)
 
     def _natural(self, q: Array) -> Array:
         """|q| (n_v,) in natural sizes, 1 of orientations; of links without loads, not 0 but round-off."""

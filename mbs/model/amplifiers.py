@@ -37,7 +37,7 @@ class Hysteresis:
 
     @property
     def inverse(self) -> Hysteresis:
-        """Voltages that patches take to act as wanted, from rest on."""
+        """Hysteresis of the voltages, V, that patches take to act as wanted, from rest on."""
         W = np.cumsum(self.weights, axis=0)
         weights = np.diff(1.0 / W, axis=0, prepend=0.0)
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
@@ -52,7 +52,7 @@ class Hysteresis:
         return as_floats((self.weights * plays).sum(axis=-2))
 
     def output(self, V: Array) -> Array:
-        """Return the voltages (T, k) that patches act under of V (T, k), straight between these, from rest."""
+        """Return the voltages (T, k) that patches act under of V (T, k), V, straight between these, from rest."""
         acting, z = np.empty_like(V), np.zeros_like(self.weights)
         turns = np.flatnonzero(np.diff(np.sign(np.diff(V, axis=0)), axis=0).any(axis=1)) + 2
         begins = np.union1d(turns, np.arange(0, len(V), CHUNK))
@@ -69,7 +69,7 @@ class Played:
         self._of, self._z = of, np.zeros_like(of.weights)
 
     def at(self, V: Array, last: Array | None = None) -> Array:
-        """Return the voltages (k,) that patches act under at V (k,), on their way to the `last` (k,)."""
+        """Return the voltages (k,) that patches act under at V (k,), V, on their way to the `last` (k,)."""
         output = self._of.acting(self._of.plays(self._z, V))
         self._z = self._of.plays(self._z, V if last is None else last)
         return output
@@ -143,7 +143,7 @@ class Amplifiers:
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
         """Voltages (T, k), V, that patches act under at `times` (T,), s, of `wanted` (T, k), linear between.
 
-        `strain` (T, k) as before.
+        `strain` (T, k), A: see `advance`.
         """
         wanted = self.compensator.output(wanted)
         late = [np.interp(times - d, times, V) for d, V in zip(self.delay, wanted.T, strict=True)]

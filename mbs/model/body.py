@@ -37,19 +37,19 @@ class Stiffening:
     S_turned: Array
 
     def at(self, point: str) -> Array:
-        """Return geometric stiffness (6, n, n) by force and moment at a point; zero if unknown."""
+        """Return geometric stiffness (6, n, n), 1/s² by N and N·m along x, y, z at a point; zero if unknown."""
         n = self.K_s.shape[-1]
         return self.K_points.get(point, np.zeros((6, n, n)))
 
     def transformed(self, T: Array) -> Stiffening:
-        """Return the stiffness in coordinates p' with p = T p'."""
+        """Return the stiffness in coordinates p' with p = T p', T (n, m)."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
     def with_payload(self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array) -> Stiffening:
-        """Add a rigid mass (kg) at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV about its center.
+        """Add a rigid mass (kg) at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m².
 
-        position (3,) and `phi` = Φ_r (3, n) of the point. What is d from it moves by (exp φ~ − 1) d besides, so that
+        `position` (3,), m, and `phi` = Φ_r (3, n) of the point. What is d from it moves by (exp φ~ − 1) d too, so that
         pᵀG p = pᵀK p + pᵀK_r p × d − φ × (φ × d), with φ = Φ_r p, K along and K_r about the axes.
         """
         by_arm = self._by_arm(point, phi)
@@ -77,7 +77,7 @@ class Stiffening:
         return as_floats(by_arm + np.einsum("lb,aamn->lbmn", np.eye(3), turning) - turning)
 
 
-def stiffening_of(body: ModalBody, *, is_planar: bool = False) -> Stiffening | None:
+def stiffening_of(body: ModalBody, *, is_planar: bool) -> Stiffening | None:
     """Return the geometric stiffness in a modal body; None if the file lacks what 3D or planar motion needs.
 
     With K of its d'Alembert loads: K_s,i = −K(t_i), K_r,i = −K(r_i), K_ω,ii = K(omega_ii), K_ω,ij = ½ K(omega_ij).
@@ -183,12 +183,12 @@ class Body(Invariants):
 
     @property
     def inertia_slope(self) -> Array:
-        """J1 (3, 3, n): J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
+        """J1 (3, 3, n), √kg·m: J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
         return 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
 
     @property
     def spin(self) -> Array:
-        """h0 (3, n): h0_a = ε_abc Ī_bc, and h_s about the axis of a line of mass."""
+        """h0 (3, n), √kg·m: h0_a = ε_abc Ī_bc, and h_s about the axis of a line of mass."""
         h: Array = np.einsum("abc,bcn->an", LEVI_CIVITA, self.I_bar)
         h[0] += self.h_spin
         return h
@@ -213,7 +213,7 @@ class Reduction:
 
 
 def transformed(body: Body, T: Array, stiffness: Array) -> Body:
-    """The body in coordinates p' with p = T p', T (n, m), in which m_ff is the identity and K_ff diag(stiffness)."""
+    """Return the body by p' with p = T p', T (n, m), in which m_ff is the identity, K_ff diag(stiffness), rad²/s²."""
     return replace(
         body,
         stiffness=stiffness,
@@ -290,7 +290,7 @@ def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_p
 
 
 def rigid_body(name: str, mass: float, center: Array, inertia: Array, points: Mapping[str, Array]) -> Body:
-    """A body without modes, of `mass` (kg) at `center` (3,) (m) with `inertia` (3, 3) about it (kg·m²); body axes."""
+    """A body without modes: `mass`, kg, at `center` (3,), m, with `inertia` (3, 3), kg·m², about it, `points`, m."""
     places = {label: np.asarray(position, dtype=float) for label, position in points.items()}
     if "mid" not in places and {"root", "tip"} <= places.keys():
         places["mid"] = (places["root"] + places["tip"]) / 2
@@ -336,7 +336,7 @@ class Section(NamedTuple):
 
 
 def bent_section(body: Body, point: str, p: Array) -> Section:
-    """A point of a body, bent by p (…, n)."""
+    """Return a point of a body in its axes, bent by p (…, n), √kg·m."""
     at = body.points[point]
     u, phi = at.position + p @ at.translation.T, p @ at.rotation.T
     if body.stiffening is None:

@@ -18,9 +18,9 @@ from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import smallest_turn
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
-from ..joints.free import FreeJoint
+from ..fields.spelling import NORMAL
 from ..joints.joint import JointRecord
-from ..joints.planar_joint import PlanarJoint
+from ..joints.joints import FreeJoint, PlanarJoint
 from ..scene.mechanism import MechanismScene
 from ..scene.topology import Edge, spanning_forest
 from ..scene.trajectories import Trajectory
@@ -49,16 +49,23 @@ def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
 
 def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:
     if path.coordinate_of is not None:
-        yield _coordinate_row(scene, tree, path, path.coordinate_of)
+        joint = next(each for each in scene.joint if each.name == path.coordinate_of)
+        label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
+        if len(joint.units) != 1:
+            raise InputError(
+                f"{label}: expected a joint with one coordinate", f'"{joint.name}", {len(joint.units)} coordinates'
+            )
+        if path.motor is not None and joint not in scene.motor_joints:
+            raise InputError(f"{label}: expected a joint with a motor", f'"{joint.name}", which has none')
+        yield row_of_joint(tree, joint, path.name, path.components["value"])
         return
     unit, ground = np.eye(3), tree.section(GROUND)
     if path.angle is not None:
-        section, triad = tree.section(path.angle), smallest_turn(np.array(path.turning_axis))
+        section, triad = tree.section(path.angle), smallest_turn(np.array(path.axis or NORMAL))
         target = path.components["value"]
         yield ConstraintRow(path.name, "turn", ground, section, triad[:, 2], triad[:, 0], target=target)
         return
-    assert path.point is not None
-    section = tree.section(path.point)
+    section = tree.section(str(path.point))
     for component, target in path.components.items():
         e = unit["xyz".index(component)]
         yield ConstraintRow(path.name, "point", ground, section, e, e, target=target)
@@ -67,21 +74,9 @@ def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> 
     if path.tool_axis is None:
         yield from (ConstraintRow(path.name, "rotation", ground, section, e, e, law=path.orientation) for e in unit)
     else:
-        tool = section._replace(triad=section.triad @ np.array(path.tool_triad))
+        tool = section._replace(triad=section.triad @ smallest_turn(np.array(path.tool_axis)))
         for f in unit[:2]:
             yield ConstraintRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
-
-
-def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory, name: str) -> ConstraintRow:
-    joint = next(each for each in scene.joint if each.name == name)
-    label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
-    if len(joint.units) != 1:
-        raise InputError(
-            f"{label}: expected a joint with one coordinate", f'"{joint.name}", {len(joint.units)} coordinates'
-        )
-    if path.motor is not None and joint not in scene.motor_joints:
-        raise InputError(f"{label}: expected a joint with a motor", f'"{joint.name}", which has none')
-    return row_of_joint(tree, joint, path.name, path.components["value"])
 
 
 def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
@@ -95,9 +90,9 @@ def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: Ti
 def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
     """Raise `InputError` for a reference to a point that its body has not."""
     for reference in scene.references():
-        if reference.kind != "body" or reference.body_and_point is None:
+        if (place := reference.body_and_point) is None:
             continue
-        body, point = reference.body_and_point
+        body, point = place
         if point not in bodies[body].points:
             known = bodies[body].points
             raise InputError(

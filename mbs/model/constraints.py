@@ -101,9 +101,9 @@ class Constraints(Kinematics):
             largest_step=farthest,
         )
 
-    def velocities(self, q: Array, v: Array, t: float = 0.0, locked: Booleans | None = None) -> Array:
-        """V (n_v,) moved onto Ċ = 0 at q (n_q,) and t (s) by the least change of joints not `locked` (n_v,)."""
-        scales, now = self._joint_sizes if locked is None else np.where(locked, 0.0, self._joint_sizes), np.array([t])
+    def velocities(self, q: Array, v: Array, locked: Booleans | None = None) -> Array:
+        """Return v (n_v,) moved onto Ċ = 0 at q (n_q,) and t = 0 by the least change of joints not `locked` (n_v,)."""
+        scales, now = self._joint_sizes if locked is None else np.where(locked, 0.0, self._joint_sizes), np.zeros(1)
         (C_v,), (C_dot,) = self.natural_gradients(q[None], now, scales), self.rates(q[None], v[None], now)
         moved: Array = v - scales * np.linalg.lstsq(C_v, C_dot / self._row_sizes, rcond=1e-10)[0]
         return moved
@@ -118,7 +118,7 @@ class Constraints(Kinematics):
         return self.core.mobilities(self.scene, as_list(times), q, is_path, self._length, loop_rank)
 
     def ratios(self, q: Array, times: Array, rank: int) -> Array:
-        """Return smallest over largest nonzero singular value (T,) of all rows, by their `rank`, as in `mobilities`."""
+        """Return ratios (T,) of smallest to largest of `rank` singular values of all rows: see `mobilities`."""
         is_path = [False] * len(self._rows)
         motions = self.core.mobilities(self.scene, as_list(times), q, is_path, self._length, rank)
         return np.array([at.loop_ratio for at in motions])

@@ -66,7 +66,7 @@ def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink
 
 
 def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
-    """Return the matrix (N, n) from modes of a link in 3D to modes of its pieces, both of the files.
+    """Return the matrix (N, n), without unit, from modes of a link in 3D to modes of its pieces, both of the files.
 
     Pieces are given by where they begin, m from the root, from the root to the tip. Planes of bending, twist and
     stretch do not couple, so that their rigidities are of no account.

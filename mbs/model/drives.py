@@ -11,14 +11,14 @@ from .._core import ForceSource, TimeFunction
 
 
 class Drive(NamedTuple):
-    """Force that is a function of time, and its generalized direction (n_v,)."""
+    """Force that is a function of time, N or N·m, and its generalized direction (n_v,)."""
 
     direction: Array
     size: TimeFunction
 
 
 class PointDrive(NamedTuple):
-    """Forces and moments of time on "BODY.POINT", by component ("x" … "mz"), global axes."""
+    """Forces (N) and moments (N·m) of time on "BODY.POINT", by component ("x" … "mz"), global axes."""
 
     point: str
     components: Mapping[str, TimeFunction]

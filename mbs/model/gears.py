@@ -12,13 +12,12 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..joints.joint import Friction, JointRecord
-from ..joints.moving_joint import GearedJoint
+from ..joints.joint import Friction, GearedJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.analysis import Analysis
 from .drives import Drive
 from .model import Model
-from .nodes import ConstraintRow, Node, Section
+from .nodes import ConstraintRow, Node
 from .tree import CompliantGear, KinematicTree
 
 
@@ -45,7 +44,14 @@ def with_compliance(model: Model) -> Model:
     elastic = elastic_joints(model)
     if not elastic or model.tree.gears:
         return model
-    tree = model.tree.with_outputs([_output(node) for node in elastic])
+    none = {"stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0}
+    labels = [f"{node.joint.name}/rotor" for node in elastic]
+    tree = model.tree.with_outputs(
+        [
+            (node.joint.model_copy(update={"name": label, **none}), label, node.outer if node.backwards else node.inner)
+            for node, label in zip(elastic, labels, strict=True)
+        ]
+    )
     outputs = tree.nodes[-len(elastic) :]
     without = {node.body.name: node.joint.model_copy(update={"rotor_inertia": 0.0}) for node in elastic}
     rigid = {node.body.name: replace(node, joint=without[node.body.name]) for node in elastic}
@@ -102,14 +108,6 @@ def _rows_at_motors(model: Model, tree: KinematicTree) -> Iterator[ConstraintRow
             yield replace(row, a=output.inner, b=output.outer, coordinate=output.v.start, sign=1.0)
 
 
-def _output(node: Node) -> tuple[JointRecord, str, Section]:
-    """The joint, name and place of the output of the gear in the joint of `node`."""
-    label = f"{node.joint.name}/rotor"
-    none = {"stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0}
-    joint = node.joint.model_copy(update={"name": label, **none})
-    return joint, label, node.outer if node.backwards else node.inner
-
-
 def compliance(node: Node) -> tuple[TwistSpring, float] | None:
     """Return spring and damping (N·m·s/rad, N·s/m) of the gear in a body's inboard joint; None if it is rigid."""
     joint = node.joint
@@ -137,7 +135,7 @@ def _of_frictions(tree: KinematicTree, v: Array, of: Callable[[Friction, Array],
 
 
 def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
-    """K and D (n_v, n_v) of compliant gears, along v, at q (n_q,)."""
+    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,)."""
     K, D = np.zeros((2, tree.n_v, tree.n_v))
     for gear in tree.gears:
         twist = np.zeros(tree.n_v)

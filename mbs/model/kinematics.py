@@ -41,10 +41,6 @@ class ModelParts(NamedTuple):
     gravity: Array
     cut: tuple[CutPlace, ...]
 
-    def model(self) -> _core.SpatialModel:
-        """Return the model of the core."""
-        return _core.SpatialModel(self.bodies, self.ground, self.rows, self.wrenches, self.gravity)
-
 
 class Markers:
     """Markers on bodies of a tree and on the ground, created on request.
@@ -80,18 +76,34 @@ class Markers:
             return row_model
         a, b = self.place(row.a), self.place(row.b)
         if row.law is not None:  # see ConstraintRow: of "dot" rows it is that of b
-            turning = (-1, self._turning_marker(row.law))
-            a, b = (a, turning) if row.kind == "dot" else (turning, b)
+            number = next((number for number, known in self.turning if known is row.law), None)
+            if number is None:
+                self._ground.append(Section(-1, f"turning {len(self.turning)}", np.eye(3), np.zeros(3)))
+                number = len(self._ground) - 1
+                self.turning.append((number, row.law))
+            a, b = (a, (-1, number)) if row.kind == "dot" else ((-1, number), b)
         row_model.a, row_model.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
         row_model.f, row_model.g, row_model.coordinate = np.array(row.f), np.array(row.g), row.coordinate
         return row_model
 
     def bodies(self, driven: Booleans | None = None) -> list[_core.SpatialBody]:
         """Return the core's bodies with all markers; `driven` (n_v,): coordinates along which given forces act."""
-        return [
-            carried_body(node, *sides, markers, driven is not None and bool(driven[node.v].any()))
-            for node, sides, markers in zip(self._nodes, self._sides, self.of_bodies, strict=True)
-        ]
+        bodies = []
+        for node, (inner, outer), markers in zip(self._nodes, self._sides, self.of_bodies, strict=True):
+            body = _core.SpatialBody()
+            body.name, (body.parent, body.parent_marker), body.inboard_marker = node.body.name, inner, outer[1]
+            body.joint = getattr(_core.JointKind, node.joint.type)
+            body.lead = float(getattr(node.joint, "rise", 0.0))
+            body.driven = driven is not None and bool(driven[node.v].any())
+            # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
+            body.of_section = moves(node)
+            # A rotor sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer
+            # one, with N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N. In prismatic joints it spins with the coordinate.
+            body.rotor_inertia, ratio = rotor(node)
+            body.gear_ratio = 1.0 - ratio if node.backwards and node.joint.type == "revolute" else ratio
+            body.data = _data(node.body, markers)
+            bodies.append(body)
+        return bodies
 
     def standing(self) -> list[_core.SpatialMarker]:
         """Return the markers on the ground."""
@@ -110,29 +122,6 @@ class Markers:
             scene.turn_marker(number, law.in_core)
         return scene
 
-    def _turning_marker(self, law: OrientationLaw) -> int:
-        """Number of the ground's marker that turns as `law` says; made where it is new."""
-        for number, known in self.turning:
-            if known is law:
-                return number
-        self._ground.append(Section(-1, f"turning {len(self.turning)}", np.eye(3), np.zeros(3)))
-        self.turning.append((len(self._ground) - 1, law))
-        return len(self._ground) - 1
-
-
-def carried_body(node: Node, inner: Placed, outer: Placed, markers: list[Section], driven: bool) -> _core.SpatialBody:
-    """A body with its `markers` on its joint, between the places `inner` and `outer`; `driven`: forces act along it."""
-    body = _core.SpatialBody()
-    body.name, (body.parent, body.parent_marker), body.inboard_marker = node.body.name, inner, outer[1]
-    body.joint = getattr(_core.JointKind, node.joint.type)
-    body.lead = float(getattr(node.joint, "rise", 0.0))
-    body.driven = driven
-    # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
-    body.of_section = moves(node)
-    body.rotor_inertia, body.gear_ratio = _rotor(node)
-    body.data = _data(node.body, markers)
-    return body
-
 
 def moves(node: Node) -> bool:
     """Whether modes move the section of the body at its joint."""
@@ -141,7 +130,7 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return Φ over Φ_r (6, n) and the position (3,), m, of a section; six K (n, n) if it moves to second order."""
+    """Return Φ over Φ_r (6, n), 1/√kg and 1/(√kg·m), position (3,), m, of a section; six K (n, n) if it has any."""
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
@@ -150,16 +139,6 @@ def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
         n = body.n_modes
         K[3:] = section.turned(np.reshape(K[3:], (3, n * n))).reshape(3, n, n)
     return np.vstack([at.translation, section.turned(at.rotation)]), at.position, K
-
-
-def _rotor(node: Node) -> tuple[float, float]:
-    """Inertia of the rotor in a joint and its ratio on the inner section.
-
-    It sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer one, with
-    N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N. In prismatic joints it spins with the coordinate alone.
-    """
-    inertia, ratio = rotor(node)
-    return inertia, 1.0 - ratio if node.backwards and node.joint.type == "revolute" else ratio
 
 
 def _data(body: Body, markers: list[Section]) -> _core.SpatialData:
@@ -195,7 +174,7 @@ MOTION = 18  # numbers of one motion in the core: r, F, velocity, omega
 
 
 class Motion(NamedTuple):
-    """Motion of a triad over states: position r (T, 3), m, axes F (T, 3, 3), velocity and angular velocity (T, 3)."""
+    """Motion of a triad, global axes: r (T, 3), m, axes F (T, 3, 3), velocity, m/s, angular velocity, rad/s, (T, 3)."""
 
     r: Array
     F: Array
@@ -232,7 +211,7 @@ class Kinematics:
         return cls(nodes, [*points, *still])
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """Return positions and motions at states q (T, n_q) and v (T, n_v), by default at rest."""
+        """Return positions (m) and motions (m/s, rad/s) at q (T, n_q) and v (T, n_v), by default at rest."""
         rates = np.zeros((len(q), self.core.n_v)) if v is None else v
         return Places(
             self._numbers, self.core.motions(q, rates).reshape(len(q), len(self.nodes) + len(self._numbers), MOTION)

@@ -55,7 +55,7 @@ class States(Protocol):
 
 
 class KnownStates(NamedTuple):
-    """States q (T, n_q), v and a (T, n_v) of a tree."""
+    """States q (T, n_q), v and a (T, n_v) of a tree: m, rad, √kg·m and these per s and s²."""
 
     q: Array
     v: Array
@@ -88,7 +88,7 @@ class MotionForces:
         return Wrench(on_section.force, on_section.moment + self.of_rotor(number))
 
     def of_rotor(self, number: int) -> Array:
-        """Rate (T, 3) of the angular momentum of the rotor in the joint that carries body no. `number`."""
+        """Rate (T, 3), N·m, of the angular momentum of the rotor in the joint that carries body no. `number`."""
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
@@ -131,15 +131,15 @@ def _motion(table: Array, number: int) -> SectionMotion:
 
 
 def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
-    """Return forces under multipliers (T, rows) and all given forces of the system at `times` (T,), s."""
-    of_core = multipliers * system.row_signs
+    """Return forces under multipliers (T, rows), N or N·m, and all given forces at `times` (T,), s."""
+    of_core = multipliers * system.model.row_signs
     forces = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
     return MotionForces(system, forces)
 
 
 def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
-    """Return forces in joints and constraints of multipliers (T, rows) alone, at q (T, n_q)."""
-    forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.row_signs)
+    """Return forces in joints and constraints of multipliers (T, rows), N or N·m, alone."""
+    forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.model.row_signs)
     return MotionForces(system, forces)
 
 
@@ -159,18 +159,19 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
 
 
 def required_forces(model: Model, state: States, times: Array) -> Array:
-    """Inverse dynamics M v̇ − Q (T, n_v) along v; Q: gravity, elasticity, friction and the scene's loads."""
+    """Inverse dynamics M v̇ − Q (T, n_v), N, N·m, N/√kg; Q: gravity, elasticity, friction, the scene's loads."""
     system = MultibodySystem(model)
     return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
 
 
 def row_accelerations(system: MultibodySystem, state: States, times: Array) -> Array:
-    """Acceleration error C̈ (T, rows) of constraints and their targets at `times` (T,), s; 0 where they hold."""
-    return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
+    """Acceleration error C̈ (T, rows), m/s² or rad/s², of constraints and their targets at `times` (T,), s."""
+    of_core = system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a)
+    return of_core * system.model.row_signs
 
 
 def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
-    """Mass matrices M (T, n_v, n_v) at q (T, n_q), from required forces of unit accelerations."""
+    """Mass matrices M (T, n_v, n_v), kg, kg·m², 1 of modes, at q (T, n_q), from forces of unit accelerations."""
     T, n = len(q), model.tree.n_v
     system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a

@@ -17,7 +17,7 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.rotations import skew
 from ...fe_models.modal_body.lumped_masses import attached_integrals, with_added
-from ..joints.weld import WeldJoint
+from ..joints.joints import WeldJoint
 from ..scene.bodies import Payload, tensor
 from ..scene.mechanism import MechanismKeys
 from .body import Body, BodyPoint, rigid_body, transformed
@@ -85,7 +85,7 @@ def _uncoupled(body: Body, m_ff: Array, added: Array | None = None) -> Body:
 
 
 def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
-    """T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and that stiffness (n,).
+    """Return T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and that stiffness (n,), rad²/s².
 
     Modes that do not feel each other stay apart, so that the coordinates keep their families: those of a round link
     that bend it in one plane and the other, with equal frequencies, are not mixed. Those that do are in ascending order
@@ -101,7 +101,7 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
 
 
 def coupled_blocks(*matrices: Array) -> list[Indices]:
-    """Numbers of the modes that feel each other in any of the matrices (n, n), set by set."""
+    """Return numbers of modes that any of the matrices (n, n) couples, set by set."""
     coupled = np.eye(len(matrices[0]), dtype=bool)
     for matrix in matrices:
         scale = np.sqrt(np.diag(matrix))

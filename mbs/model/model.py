@@ -35,6 +35,11 @@ class Model:
         """Whether rows (rows,) close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 
+    @property
+    def row_signs(self) -> Array:
+        """Signs (rows,): −1 if the core's row counts the tree's coordinate, not the joint's."""
+        return np.array([row.sign for row in self.rows])
+
     @cached_property
     def constraints(self) -> Constraints:
         """The constraint rows in the core."""
@@ -56,7 +61,7 @@ class Model:
         return np.array([column for columns in self.motors.values() for column in columns], dtype=np.intp)
 
     def by_motor(self, values: Array) -> dict[str, Array]:
-        """Return columns of `values` (…, motors and any others) by joint with motors."""
+        """Return columns of `values` (…, motors and any others), in their unit, by joint with motors."""
         motors = self.motors
         parts = np.split(values, np.cumsum([len(columns) for columns in motors.values()]), axis=-1)
         return dict(zip(motors, parts[:-1], strict=True))
@@ -94,7 +99,7 @@ class Model:
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
     def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
-        """Along v of the tree (k, n_v): k forces (n, k) on the modes of the files of bodies, as far as these are in it.
+        """Return directions (k, n_v) along v of k forces (n, k), N/√kg, on the modes of files of bodies.
 
         Gradients of what depends on modal coordinates are alike.
         """

@@ -73,37 +73,26 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
-    """Generalized forces −C_sᵀλ_s (T, n_v) of path constraints at q (T, n_q), `times` (T,), multipliers λ (T, rows)."""
-    signs = np.array([row.sign for row in model.rows])
-    return driven_mechanism(model).path_forces(as_list(times), q, multipliers * signs)
+    """Generalized forces −C_sᵀλ_s (T, n_v), N, N·m, N/√kg, of path constraints with multipliers λ (T, rows)."""
+    return driven_mechanism(model).path_forces(as_list(times), q, multipliers * model.row_signs)
 
 
-class InCore(NamedTuple):
-    """Axes and origin of a body in the core's frame, whose place suits the joints."""
+def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
+    """Return axes (3, 3) and origin (3,), m, of all bodies in the core's frames of them, at q (n_q,).
 
-    axes: Array
-    origin: Array
-
-
-def frames_in_core(model: Model, core: _core.SpatialModel, q: Array) -> list[InCore]:
-    """Return the frames of all bodies for the core, at q (n_q,)."""
-    places = model.tree.places(q[None])
-    own = [places.frame(number) for number in range(len(model.tree.nodes))]
-    return [
-        InCore(frame.R.T @ at.F[0], frame.R.T @ (at.r[0] - frame.r))
-        for frame, at in zip(core.frames(q, np.zeros(model.tree.n_v)), own, strict=True)
-    ]
+    The core has frames where they suit the joints.
+    """
+    places, frames = model.tree.places(q[None]), driven_system(model).core.frames(q, np.zeros(model.tree.n_v))
+    own = [places.frame(number) for number in range(len(frames))]
+    return [(of.R.T @ at.F[0], of.R.T @ (at.r[0] - of.r)) for of, at in zip(frames, own, strict=True)]
 
 
 def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Array) -> dict[str, Array]:
-    """Return, by body, path forces (T, 6 + n) on it alone: on its frame, in its axes, and on its modes."""
-    system = driven_system(model)
+    """Return, by body, path forces (T, 6 + n) on it: N, N·m on its frame in its axes, N/√kg on its modes."""
     driven = driven_mechanism(model, has_motors=False)
-    on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * system.row_signs)
+    on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * model.row_signs)
     by_body = {}
-    for node, (axes, origin), forces in zip(
-        model.tree.nodes, frames_in_core(model, system.core, q[0]), on_bodies, strict=True
-    ):
+    for node, (axes, origin), forces in zip(model.tree.nodes, frames_in_core(model, q[0]), on_bodies, strict=True):
         force, moment = forces[:, :3], forces[:, 3:6]
         on_frame = [force @ axes, (moment - np.cross(origin, force)) @ axes]
         by_body[node.body.name] = np.hstack([*on_frame, forces[:, 6:]])
@@ -111,7 +100,7 @@ def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Arr
 
 
 class SplitForces(NamedTuple):
-    """τ (T, k), N·m or N, by joint, EᵀF_p (T, n_v) and multipliers λ_c (T, constraint equations of loops)."""
+    """τ (T, k), N·m or N, by joint, EᵀF_p (T, n_v), N/√kg, and λ_c (T, constraint equations of loops), N or N·m."""
 
     moments: dict[str, Array]
     left: Array
@@ -119,13 +108,13 @@ class SplitForces(NamedTuple):
 
 
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
-    """Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q), by the core (core/recursion/inverse/motors.h)."""
+    """Solve Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q): mbs/core/recursion/inverse/motors.h."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
     return SplitForces(model.by_motor(tau), left, multipliers)
 
 
 def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
-    """Return motor torques, and modal forces by body in the modes of the modal body files."""
+    """Return motor torques and modal forces that make `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q)."""
     moments, left, _ = split_forces(model, q, wanted)
     stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)

@@ -49,8 +49,10 @@ def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
     """Return the mechanism in its plane; None without one. `is_path` (rows,): rows that must be kept."""
     if any(marker.turns for marker in parts.ground) or not all(body.joint in PLANAR for body in parts.bodies):
         return None
-    frames = list(_frames(parts))
-    for normal in _normals(parts, frames):
+    frames = _frames(parts)
+    turning = (_core.JointKind.revolute, _core.JointKind.planar)
+    axes = [frame.carrier[:, 2] for body, frame in zip(parts.bodies, frames, strict=True) if body.joint in turning]
+    for normal in axes[:1] or np.eye(3)[::-1]:  # the first axis that turns, else those of the global planes
         try:
             return _Reduction(parts, frames, normal).plane(is_path)
         except AcrossError:
@@ -66,8 +68,8 @@ class _Frame(NamedTuple):
     carrier: Array
 
 
-def _frames(parts: ModelParts) -> Iterator[_Frame]:
-    frames: list[_Frame] = []
+def _frames(parts: ModelParts) -> list[_Frame]:
+    frames = list[_Frame]()
     for body in parts.bodies:
         markers = parts.ground if body.parent < 0 else parts.bodies[body.parent].data.markers
         inner, outer = markers[body.parent_marker], body.data.markers[body.inboard_marker]
@@ -75,14 +77,7 @@ def _frames(parts: ModelParts) -> Iterator[_Frame]:
         carrier = R @ inner.triad
         own = carrier @ outer.triad.T
         frames.append(_Frame(r + R @ inner.position - own @ outer.position, own, carrier))
-        yield frames[-1]
-
-
-def _normals(parts: ModelParts, frames: Sequence[_Frame]) -> list[Array]:
-    """Of planes in which it may move: about the first axis that turns, or one of the global planes."""
-    turning = (_core.JointKind.revolute, _core.JointKind.planar)
-    axes = [frame.carrier[:, 2] for body, frame in zip(parts.bodies, frames, strict=True) if body.joint in turning]
-    return axes[:1] or list(np.eye(3)[::-1])
+    return frames
 
 
 def _ends(row: _core.ConstraintModel) -> tuple[int, int, int, int]:
@@ -118,13 +113,12 @@ class _Reduction:
         ground = [planar_marker(marker, self._ground) for marker in self._parts.ground]
         gravity = np.ascontiguousarray(self._ground[:2] @ self._parts.gravity)
         model = _core.PlanarModel(bodies, ground + self._shifted, rows, self._parts.wrenches, gravity)
-        cut = tuple(self._cut(place) for place in self._parts.cut)
-        return Plane(model, self._ground, np.array(followed, dtype=int), np.column_stack(spread), cut)
-
-    def _cut(self, place: CutPlace) -> CutPlace:
-        axis = self._of_marker(self._parts.wrenches[place.a]) @ place.axis
-        axis[slice(0, 2) if place.turns else 2] = 0.0
-        return place._replace(axis=axis)
+        cut = []
+        for place in self._parts.cut:
+            axis = self._of_marker(self._parts.wrenches[place.a]) @ place.axis
+            axis[slice(0, 2) if place.turns else 2] = 0.0
+            cut.append(place._replace(axis=axis))
+        return Plane(model, self._ground, np.array(followed, dtype=int), np.column_stack(spread), tuple(cut))
 
     def _rows(self, is_path: Booleans) -> tuple[list[_core.ConstraintModel], list[int], list[Array]]:
         """Rows of the plane, which ones in space they follow, and columns of `spread`."""
@@ -150,10 +144,11 @@ class _Reduction:
         """Rows of a loop that hold one way in several directions, k among them, where the plane is oblique to these."""
         rows, ends = self._parts.rows, _ends(self._parts.rows[k])
         ways = (_core.ConstraintKind.point, _core.ConstraintKind.slide)
-        enforced = [
-            i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0
-        ]  # none that rotors follow
-        same = [i for i in enforced if rows[i].kind == rows[k].kind and _ends(rows[i]) == ends]
+        same = [  # none that rotors follow
+            i
+            for i, row in enumerate(rows)
+            if row.kind in ways and row.coordinate < 0 and row.kind == rows[k].kind and _ends(row) == ends
+        ]
         return same if k in same and any(_is_mixed(self._direction(rows[i])) for i in same) else []
 
     def _together(self, group: Sequence[int]) -> Iterator[tuple[_core.ConstraintModel, Array]]:
@@ -176,7 +171,6 @@ class _Reduction:
 
     def _body(self, number: int) -> _core.PlanarBody:
         body, axes = self._parts.bodies[number], self._axes[number]
-        data = body.data
         normal = self._normal @ self._frames[number].carrier  # in axes of the joint
         off = abs(normal[2]) if body.joint == _core.JointKind.prismatic else np.linalg.norm(normal - np.eye(3)[2])
         if off > EXACT and body.joint != _core.JointKind.weld:
@@ -184,7 +178,7 @@ class _Reduction:
         planar = _core.PlanarBody()
         for key in SHARED:
             setattr(planar, key, getattr(body, key))
-        planar.joint, planar.data = PLANAR[body.joint], planar_data(data, axes)
+        planar.joint, planar.data = PLANAR[body.joint], planar_data(body.data, axes)
         return planar
 
     def _row(self, row: _core.ConstraintModel) -> _core.ConstraintModel | None:
@@ -215,16 +209,12 @@ class _Reduction:
         turned = float(np.arctan2(x_a * y_b - y_a * x_b, x_a * x_b + y_a * y_b))
         flat.kind, flat.f = _core.ConstraintKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
         if abs(turned) > EXACT:
-            flat.a = self._turned(row.a, -turned)
+            if row.a.body >= 0:
+                raise AcrossError
+            marker = planar_marker(self._parts.ground[row.a.marker], self._ground)
+            marker.angle -= turned
+            flat.a = self._added(marker)
         return flat
-
-    def _turned(self, at: _core.MarkerAt, angle: float) -> _core.MarkerAt:
-        """A marker of the ground in the place of another one, its axes turned by `angle`."""
-        if at.body >= 0:
-            raise AcrossError
-        marker = planar_marker(self._parts.ground[at.marker], self._ground)
-        marker.angle += angle
-        return self._added(marker)
 
     def _added(self, marker: _core.PlanarMarker) -> _core.MarkerAt:
         self._shifted.append(marker)
@@ -234,21 +224,18 @@ class _Reduction:
         """A point of the ground from which f in the plane measures what it does in space: d_n is a constant."""
         if row.kind != _core.ConstraintKind.point or row.a.body >= 0:
             raise AcrossError
-        a = self._ground @ self._parts.ground[row.a.marker].position
+        a, b = self._ground @ self._parts.ground[row.a.marker].position, row.b.body
+        r, R = (np.zeros(3), np.eye(3)) if b < 0 else self._frames[b][:2]
+        height = self._normal @ (r + R @ self._marker(row.b).position)  # over the plane through the origin: b keeps it
         marker = _core.PlanarMarker()
-        marker.position = a[:2] - f[:2] * (f[2] * (self._height(row.b) - a[2]) / (f[:2] @ f[:2]))
+        marker.position = a[:2] - f[:2] * (f[2] * (height - a[2]) / (f[:2] @ f[:2]))
         marker.Phi = np.zeros((3, 0))
         return self._added(marker)
 
-    def _height(self, at: _core.MarkerAt) -> float:
-        """Of a marker over the plane through the origin, m: it keeps it."""
-        markers = self._parts.ground if at.body < 0 else self._parts.bodies[at.body].data.markers
-        r, R = (np.zeros(3), np.eye(3)) if at.body < 0 else self._frames[at.body][:2]
-        return float(self._normal @ (r + R @ markers[at.marker].position))
+    def _marker(self, at: _core.MarkerAt) -> _core.SpatialMarker:
+        return (self._parts.ground if at.body < 0 else self._parts.bodies[at.body].data.markers)[at.marker]
 
     def _of_marker(self, at: _core.MarkerAt) -> Array:
         """(3, 3) rows: axes of a planar marker in those of its triad."""
-        if at.body < 0:
-            return axes_of_triad(self._parts.ground[at.marker].triad.T @ self._normal)
-        markers = self._parts.bodies[at.body].data.markers
-        return axes_of_triad(markers[at.marker].triad.T @ self._axes[at.body][2])
+        normal = self._normal if at.body < 0 else self._axes[at.body][2]
+        return axes_of_triad(self._marker(at).triad.T @ normal)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,25 +12,12 @@ from ...common.arrays import Array, Booleans, Integers
 from ...common.errors import InputError
 from .. import _core
 from ..joints.joint import Friction
-from ..scene.loads import OF_POINT, Load
+from ..scene.loads import OF_POINT
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .kinematics import CutPlace, Markers, ModelParts, Placed, rows_of
 from .model import Model
 from .nodes import Section
 from .plane import Plane, in_plane
-from .projection import EXACT
-
-
-class Derivatives(NamedTuple):
-    """Derivatives by increments δ of q, by v and by generalized forces, all along v (n_v)."""
-
-    # a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are. Springs in gears
-    # are left as they are: see `gear_matrices`
-    a_q: Array
-    a_v: Array
-    a_f: Array
-    value_q: Array  # (rows, n_v) of the values of rows, and of their rates by v
-    rate_q: Array  # (rows, n_v) of their rates
 
 
 class Integrated(NamedTuple):
@@ -65,16 +52,24 @@ class MultibodySystem:
         self._of_motion = [(wrench, load.force) for (wrench, _), load in at_loads if load.force is not None]
         replayed = drives.replayed.at_points if drives.replayed else {}
         self._numbers_at = [(self._wrench(tree.section(at)), of) for at, of in replayed.items()]
-        self._cut = [one for one in model.cut if one.is_loaded]
+        self._cut = [one for one in model.cut if one.friction is not None or one.loads]
         measures = (one.row for one in self._cut)
         cut = tuple(CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f) for row in measures)
         self._check()
-        moments = [drive for load in model.scene.load if load.joint in tree.carried for drive in self._drives(load)]
+        moments = [
+            Drive(direction, moment)
+            for load in model.scene.load
+            if load.joint in tree.carried
+            for direction, moment in zip(model.along(load.joint), load.moments, strict=True)
+        ]
         self._along = [*moments, *model.modal_loads, *drives.along]
         driven = self._driven((*commands, *(drives.replayed.commands if drives.replayed else ())))
         bodies, ground = self._markers.bodies(driven), self._markers.standing()
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
-        with_moments = self._with_moments(cut)
+        # Where none acts, pins in the plane pass no moment on
+        with_moments = {number for number, of in (*self._at_points, *self._numbers_at) if not set("xyz").issuperset(of)}
+        with_moments.update(number for number, _ in self._of_motion)
+        with_moments.update(number for place in cut for number in (place.a, place.b))
         for number, at in enumerate(wrenches):
             at.only_forces = number not in with_moments
         self._parts = ModelParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity), cut)
@@ -82,7 +77,7 @@ class MultibodySystem:
     @cached_property
     def core(self) -> _core.SpatialModel:
         """The 3D model of the core."""
-        return self._parts.model()
+        return _core.SpatialModel(*self._parts[:-1])
 
     @cached_property
     def scene(self) -> _core.TreeScene:
@@ -98,11 +93,6 @@ class MultibodySystem:
         if not all(function.is_planar for _, function in self._of_motion):
             return None
         return in_plane(self._parts, ~self.model.loop_rows)
-
-    def lie_in_plane(self, directions: Sequence[Array]) -> bool:
-        """Whether the mechanism moves in a plane, in which `directions` (3,), global axes, lie, too."""
-        plane = self.plane
-        return plane is not None and all(abs(plane.axes[2] @ direction) <= EXACT for direction in directions)
 
     @cached_property
     def integrated(self) -> Integrated:
@@ -128,7 +118,7 @@ class MultibodySystem:
     def multipliers(self, of_core: Array) -> Array:
         """Return multipliers (T, rows) of the model from those of `integrated`; 0 for omitted or dependent rows."""
         of_rows = of_core if self.plane is None else of_core @ self.plane.spread.T
-        return of_rows * self.row_signs
+        return of_rows * self.model.row_signs
 
     @property
     def sections(self) -> list[Section]:
@@ -141,14 +131,7 @@ class MultibodySystem:
 
     def forward_model(self) -> _core.ForwardModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
-        parts = self._parts
-        return _core.ForwardModel(parts.bodies, parts.ground, parts.rows, parts.wrenches, parts.gravity, self.scene)
-
-    def _with_moments(self, cut: Sequence[CutPlace]) -> set[int]:
-        """Numbers of wrenches that may have a moment; where there is none, pins in the plane pass none on."""
-        at_points = (number for number, of in (*self._at_points, *self._numbers_at) if not set("xyz").issuperset(of))
-        of_motion = (number for number, _ in self._of_motion)
-        return {*at_points, *of_motion, *(number for place in cut for number in (place.a, place.b))}
+        return _core.ForwardModel(*self._parts[:-1], self.scene)
 
     def _driven(self, commands: Sequence[Command]) -> Booleans:
         """(n_v,) along which coordinates given forces act, of which inverse analyses have none."""
@@ -175,19 +158,14 @@ class MultibodySystem:
                     "it second",
                 )
 
-    @property
-    def row_signs(self) -> Array:
-        """Signs (rows,): −1 if the core's row counts the tree's coordinate, not the joint's."""
-        return np.array([row.sign for row in self.model.rows])
+    def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> _core.Derivatives:
+        """Return derivatives by increments of q, by v and by generalized forces, along v, under the scene's loads.
 
-    def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
-        """Return derivatives of accelerations and rows by q, v and forces, at time t (s) under the scene's loads.
-
-        `supplied` (n_v,) acts beside loads, friction and springs in gears. Rows that depend on others at q, v are left
-        out.
+        Those of accelerations (n_v, n_v), and of the core's rows (rows, n_v), at t (s), q (n_q,) and v (n_v,); rows
+        that depend on others there are left out. `supplied` (n_v,), N·m or N, acts beside loads and friction. Springs
+        in gears are left as they are: see `gear_matrices`.
         """
-        slopes, signs = self.core.derivatives(self.scene, t, q, v, supplied), self.row_signs[:, None]
-        return Derivatives(slopes.a_q, slopes.a_v, slopes.a_f, signs * slopes.value_q, signs * slopes.rate_q)
+        return self.core.derivatives(self.scene, t, q, v, supplied)
 
     def _follow(self, plane: Plane | None) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
@@ -208,26 +186,17 @@ class MultibodySystem:
         for gear in self.model.tree.gears:
             motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
             scene.add_gear(motor, joint, gear.sign, gear.spring.slopes, gear.spring.knots, gear.damping)
-        self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
-        scene.modal_amplitude_limits = [node.body.largest_moment for node in self.model.tree.nodes]
-        has_loops = bool(self.model.loop_rows.any())
-        scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
-        scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
-        return scene
-
-    def _act_along_cut(self, scene: _core.TreeScene, places: Sequence[CutPlace]) -> None:
-        """Friction and loads of joints at which loops are cut."""
+        places = self._parts.cut if plane is None else plane.cut
         for number, (one, place) in enumerate(zip(self._cut, places, strict=True)):
             friction = one.friction or Friction(0.0, 0.0, 1.0)
             scene.add_cut_joint(*place, friction.viscous, friction.coulomb, friction.speed)
             for load in one.loads:
                 scene.add_cut_load(number, load, one.row.sign)
-
-    def _drives(self, load: Load) -> Iterator[Drive]:
-        """Directions (n_v,) and sizes of the moments of a joint."""
-        assert load.joint is not None
-        for direction, moment in zip(self.model.along(load.joint), load.moments, strict=True):
-            yield Drive(direction, moment)
+        scene.modal_amplitude_limits = [node.body.largest_moment for node in self.model.tree.nodes]
+        has_loops = bool(self.model.loop_rows.any())
+        scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
+        scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
+        return scene
 
     def _wrench(self, section: Section) -> int:
         """Number of a wrench on a section, made for it."""
@@ -244,18 +213,11 @@ def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrde
     """Forces of commands that are held, in their order."""
     hold = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
     for number, command in enumerate(commands):
-        for share in _frame_shares(model, *command.frame) if command.frame is not None else ():
-            hold.add_frame_motor(number, *share)
+        if command.frame is None:
+            continue
+        node = model.tree.nodes[command.frame[0]]
+        for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
+            if section.body >= 0 and (of := model.tree.nodes[section.body]).body.n_modes:
+                Phi_r, axis = rows_of(of.body, section)[0][3:], command.frame[1] * side * section.triad[:, 2]
+                hold.add_frame_motor(number, of.p_q.start, of.p_v.start, Phi_r, axis)
     return hold
-
-
-def _frame_shares(model: Model, body: int, sign: float) -> Iterator[tuple[int, int, Array, Array]]:
-    """Of the motor on frames along the joint that carries a body, for each side with modes.
-
-    Where the modes are in q and in v, Φ_r (3, n) of the section and the joint's axis there.
-    """
-    node = model.tree.nodes[body]
-    for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
-        if section.body >= 0 and (of := model.tree.nodes[section.body]).body.n_modes:
-            axis = sign * side * section.triad[:, 2]
-            yield of.p_q.start, of.p_v.start, rows_of(of.body, section)[0][3:], axis

@@ -21,9 +21,8 @@ from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, quoted
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
-from ..joints.free import FreeJoint
 from ..joints.joint import Friction, JointRecord
-from ..joints.planar_joint import PlanarJoint
+from ..joints.joints import FreeJoint, PlanarJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.mechanism import MechanismScene
 from ..scene.topology import Topology
@@ -95,7 +94,11 @@ class KinematicTree:
         nodes, q, v = [], 0, 0
         for number, (name, carrier) in enumerate(topology.carriers.items()):
             body = by_name[name]
-            joint = _at_origin(name, floating) if carrier is None else joints[carrier.joint]
+            if carrier is None:
+                kind = "free" if floating is FreeJoint else "planar"
+                joint: JointRecord = floating.model_construct(name=name, type=kind, between=(GROUND, f"{name}.frame"))
+            else:
+                joint = joints[carrier.joint]
             backwards = carrier is not None and joint.between[0] == carrier.own
             inner, outer = self.section(GROUND), Section(number, "", AXES, np.zeros(3))
             if carrier is not None:
@@ -185,11 +188,6 @@ class KinematicTree:
         return self._known
 
 
-def _at_origin(body: str, floating: type[FreeJoint | PlanarJoint]) -> JointRecord:
-    kind = "free" if floating is FreeJoint else "planar"
-    return floating.model_construct(name=body, type=kind, between=(GROUND, f"{body}.frame"))
-
-
 class CutCoordinate(NamedTuple):
     """A coordinate of a joint at which a loop is cut."""
 
@@ -199,11 +197,6 @@ class CutCoordinate(NamedTuple):
     friction: Friction | None  # along it
     loads: tuple[TimeFunction, ...]  # given forces of time along it, N·m or N
     guess: float  # of its first value, as [initial] has it, else 0
-
-    @property
-    def is_loaded(self) -> bool:
-        """Whether something acts along it."""
-        return self.friction is not None or bool(self.loads)
 
     def resistance(self, rate: Array) -> Array:
         """Friction (T,) at the coordinate's rate, N·m or N."""

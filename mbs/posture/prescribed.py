@@ -59,8 +59,7 @@ def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, time
             f"{model.scene.path}: no posture was found at t = {times[int(is_met.argmin())]:g} s: the prescribed shape"
             " takes the trajectories out of reach"
         )
-    signs = np.array([row.sign for row in model.rows])
-    return Prescribed(states.q, states.v, states.a, states.multipliers * signs, states.required)
+    return Prescribed(states.q, states.v, states.a, states.multipliers * model.row_signs, states.required)
 
 
 def left_slopes(

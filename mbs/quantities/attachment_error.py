@@ -199,14 +199,14 @@ def missed_by_pieces(pieces: Sequence[PieceInMotion]) -> Array:
 
 
 def ends_in_equations(body: Body, p: Array) -> RodEnds:
-    """Return the ends of a piece as its equations contain them, at p (T, n)."""
+    """Return the ends of a piece as its equations contain them, at p (T, n), √kg·m."""
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)
     return RodEnds(as_floats(back @ exponential(tip.phi)), as_floats(np.einsum("tij,tj->ti", back, tip.u - root.u)))
 
 
 def rod_ends(modal: ModalBody, p: Array) -> RodEnds:
-    """Return the ends of the rod with the strains of p (T, n of the file)."""
+    """Return the ends of the rod with the strains of p (T, n), √kg·m, of the file."""
     x = np.linspace(0.0, modal.length, 2 * INTERVALS + 1)  # with the middles of intervals
     places, h = [modal.interpolate(at) for at in x], x[2]
     phi, u = (

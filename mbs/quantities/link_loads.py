@@ -37,7 +37,13 @@ def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Return the loads on `bodies`; empty if motors turn frames, as these act at no interface."""
     if run.model.scene.motors == "frame":
         return {}
-    return _link_loads(run, bodies, _with_motors(run))
+    model, behind = run.model, behind_gears(run)
+    if not run.is_prescribed or model.loop_rows.sum() + len(model.motor_columns) != int(model.tree.joint_columns.sum()):
+        return _link_loads(run, bodies, acting_forces(behind))
+    # Motors carry the motion, in place of forces on its paths
+    multipliers = np.zeros_like(run.multipliers)
+    multipliers[:, model.loop_rows] = split_forces(model, run.q, required_forces(model, run, run.time)).loops
+    return _link_loads(run, bodies, motion_forces(system_of(behind), behind, run.time, multipliers))
 
 
 def loads_in_equations(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
@@ -58,9 +64,12 @@ def _link_loads(run: Run, bodies: Iterable[str], forces: MotionForces) -> dict[s
         for payload in run.model.scene.payload:
             body, point = split_point(payload.point)
             if body == name and not turns_as_a_body(run.model.scene, payload):  # others are bodies of their own
-                at_points[point] = at_points.get(point, 0.0) + _of_mass(run, payload)
+                at_points[point] = at_points.get(point, 0.0) + _of_mass(run, payload, F)
         a, alpha, omega = forces.of_body(number)
-        sizes = _of_frame(*np.hsplit(_in_axes_of(F, (a - gravity, alpha, omega)), 3))
+        # The d'Alembert forces of the frame's motion
+        a, alpha, omega = np.hsplit(_in_axes_of(F, (a - gravity, alpha, omega)), 3)
+        sizes = {f"{load}_{axis}": of[:, k] for load, of in (("t", a), ("r", alpha)) for k, axis in enumerate("xyz")}
+        sizes |= {f"omega_{pair}": omega[:, i] * omega[:, j] for pair, (i, j) in PAIRS.items()}
         for point, wrench in at_points.items():
             sizes |= dict(zip(interface_load_names([point]), wrench.T, strict=True))
         loads[name] = LinkLoads(sizes, left)
@@ -83,28 +92,8 @@ def _in_axes_of(F: Array, vectors: Iterable[Array]) -> Array:
     return np.hstack([np.einsum("tji,tj->ti", F, x) for x in vectors])
 
 
-def _of_frame(a: Array, alpha: Array, omega: Array) -> dict[str, Array]:
-    """Sizes of the d'Alembert forces of the frame's motion, (T, 3) each in its axes; gravity is taken off a."""
-    sizes = {f"t_{axis}": column for axis, column in zip("xyz", a.T, strict=True)}
-    sizes |= {f"r_{axis}": column for axis, column in zip("xyz", alpha.T, strict=True)}
-    return sizes | {f"omega_{name}": omega[:, i] * omega[:, j] for name, (i, j) in PAIRS.items()}
-
-
-def _of_mass(run: Run, payload: Payload) -> Array:
+def _of_mass(run: Run, payload: Payload, F: Array) -> Array:
     """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
     of_point = acting_forces(run).of_point(payload.point)
     force = -payload.mass * (of_point.a - np.array(run.model.scene.gravity))
-    F = places(run).frame(run.model.tree.index[split_point(payload.point)[0]]).F
     return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))
-
-
-def _with_motors(run: Run) -> MotionForces:
-    """Where motors carry the motion, without forces on its paths: these stay where the motors do not fit."""
-    model = run.model
-    if not run.is_prescribed or model.loop_rows.sum() + len(model.motor_columns) != int(model.tree.joint_columns.sum()):
-        return acting_forces(behind_gears(run))
-    total = required_forces(model, run, run.time)
-    multipliers = np.zeros_like(run.multipliers)
-    multipliers[:, model.loop_rows] = split_forces(model, run.q, total).loops
-    behind = behind_gears(run)
-    return motion_forces(system_of(behind), behind, run.time, multipliers)

@@ -16,7 +16,6 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
 from ..model.known_motion import MotionForces, Wrench, multiplier_forces
-from ..model.nodes import Node
 from ..posture.posture import SINGULAR
 from ..run.record import Run
 from ..scene.loads import OF_POINT
@@ -35,7 +34,7 @@ def reactions(run: Run) -> Mapping[str, Wrench]:
 
 
 def reactions_of_loops(run: Run, forces: Array) -> Mapping[str, Wrench]:
-    """Return reactions of forces (T, loop rows) along the rows that close loops."""
+    """Return reactions of forces (T, loop rows), N or N·m, along the rows that close loops."""
     multipliers = np.zeros_like(run.multipliers)
     multipliers[:, run.model.loop_rows] = -forces
     return _carried(run, multiplier_forces(system_of(run), run.q, run.time, multipliers), run.q)
@@ -50,17 +49,13 @@ def _carried(run: Run, forces: MotionForces, q: Array) -> dict[str, Wrench]:
             wrenches[row.owner] = wrenches[row.owner].plus(on_b) if row.owner in wrenches else on_b
     loops = {joint.name for joint in model.tree.loops}
     for node, carried in zip(model.tree.nodes, forces.carried(q), strict=False):
-        if node.joint.name not in loops:
-            wrenches[node.joint.name] = _on_second(run, node, carried)
+        if node.joint.name in loops:
+            continue
+        if node.backwards:  # the second side is the inner one
+            outer, inner = (places(run).at(section).r for section in (node.outer, node.inner))
+            carried = Wrench(-carried.force, -carried.moment).seen_from(outer - inner)
+        wrenches[node.joint.name] = carried
     return wrenches
-
-
-def _on_second(run: Run, node: Node, on_outer: Wrench) -> Wrench:
-    """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
-    if not node.backwards:
-        return on_outer
-    outer, inner = (places(run).at(section).r for section in (node.outer, node.inner))
-    return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
 
 
 OPEN = 1e-6  # share of a component in reactions that change together, above which it is open
@@ -122,7 +117,7 @@ def _multipliers_of_loops(run: Run) -> tuple[Array, Integers]:
     if plane is None:
         return np.eye(int(is_loop.sum())), np.flatnonzero(is_loop)
     of_loops = is_loop[plane.followed]
-    B = system_of(run).row_signs[:, None] * plane.spread
+    B = run.model.row_signs[:, None] * plane.spread
     return B[np.ix_(is_loop, of_loops)], plane.followed[of_loops]
 
 

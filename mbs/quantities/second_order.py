@@ -47,7 +47,7 @@ class LoadedPoint(NamedTuple):
 
 @struct
 class ModalLoads:
-    """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,).
+    """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,), rad²/s².
 
     `support`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
     """
@@ -72,7 +72,7 @@ class ModalLoads:
 
 
 def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
-    """Means of the loads at `time` (T,) over the link's lowest period: it cannot follow loads that last shorter.
+    """Return means of the loads at `time` (T,), s, over the link's lowest period: it cannot follow shorter ones.
 
     The loads themselves if they stay below those that buckle the link.
     """
@@ -191,7 +191,7 @@ def missing_to_second_order(
 
 
 def largest_rotations(link: ModalBody, p: Array) -> Rotations:
-    """Return the largest rotations of sections, rad, over p (T, n) of the file."""
+    """Return the largest rotations of sections, rad, over p (T, n), √kg·m, of the file."""
     stations, x = link.stations, link.stations.position[:, 0]
     chord = (stations.translation[-1] - stations.translation[0]) / (x[-1] - x[0])
     shapes = stations.rotation - np.stack([stations.rotation[0, 0], -chord[2], chord[1]])  # (k, 3, n)
@@ -199,7 +199,7 @@ def largest_rotations(link: ModalBody, p: Array) -> Rotations:
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
-    """Return the largest displacement of stations over p (T, n) of the file, relative to the length."""
+    """Return the largest displacement of stations over p (T, n), √kg·m, of the file, relative to the length."""
     return _largest(p, link.stations.translation) / link.length
 
 
@@ -217,7 +217,7 @@ def _largest(p: Array, shapes: Array) -> float:
 
 
 def largest_lengths(p: Array, shapes: Array) -> Array:
-    """Return the largest length (T,) at p (T, n) of what moves by `shapes` (k, axes, n), such as stations of a link.
+    """Return the largest length (T,), m or rad, at p (T, n), √kg·m, of what moves by `shapes` (k, axes, n).
 
     One k after the other: all of them at once do not fit into memory in long runs.
     """

@@ -70,7 +70,9 @@ def commanded_rest(commanding: Run) -> Rest | None:
     analysis, model = commanding.analysis, commanding.details.held or commanding.model
     if not isinstance(analysis, TimedAnalysis) or commanding.status != "completed":
         return None
-    since, end = end_of_paths(model.scene.trajectory, analysis), analysis.last_time
+    end = analysis.last_time
+    ends = [_end(target, end, _breaks(path)) for path in model.scene.trajectory for _, target in path.targets]
+    since = max([*ends, *(_end(shape, end, shape.switches()) for _, shape, _ in analysis.prescribed())], default=0.0)
     if not since < commanding.time[-1] or not any(row.is_trajectory for row in model.rows):
         return None
     q = commanding.q[-1]
@@ -102,13 +104,6 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     if np.linalg.eigvalsh(scale[:, None] * K * scale)[0] < FREE:
         return 0.0
     return float(np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True)[0]) / (2 * np.pi))
-
-
-def end_of_paths(paths: Sequence[Trajectory], analysis: TimedAnalysis) -> float:
-    """Return the time (s) from which all targets are constant."""
-    shapes = (function for _, function, _ in analysis.prescribed())
-    ends = [_end(target, analysis.last_time, _breaks(path)) for path in paths for _, target in path.targets]
-    return max([*ends, *(_end(function, analysis.last_time, function.switches()) for function in shapes)], default=0.0)
 
 
 def _breaks(path: Trajectory) -> Sequence[float]:

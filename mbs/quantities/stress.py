@@ -73,7 +73,7 @@ class SectionLoads:
     modal_force: Array  # (T, n) what they do to the modes of the modal body file, N/√kg
 
     def shares(self, x: Array) -> Array:
-        """Return weights (m, g) of places for sections at x (m,): linear interpolation below one patch."""
+        """Return weights (m, g), without unit, of places for sections at x (m,), m: linear below one patch."""
         shares = np.zeros((len(x), len(self.x)))
         for k, (start, end) in enumerate(self.edges):
             own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))
@@ -94,7 +94,7 @@ class Recovery:
 
     @property
     def cases(self) -> Array:
-        """Sizes (T, n + l + …) of modes, loads and sections, each with its own stress."""
+        """Sizes (T, n + l + …) of modes (√kg·m), loads and sections (N, N·m), each with its own stress."""
         sections = () if self.sections is None else (self.sections.moment, self.sections.force)
         return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
@@ -123,21 +123,17 @@ def mode_acceleration(
     if not known:
         return mode_displacement(p)
     names = tuple(name for name in known if np.any(loads[name]))
-    work = work_on_modes(body.S_bar, body.I_bar, body.interfaces, _spin_in_static_stresses(body))
+    # Static stresses count the inertia of a line of mass about it, but for files of 0.1
+    column = body.stress_loads.index("r_x") if "r_x" in body.stress_loads else None
+    static = [point.static for point in body.stress.values() if point.static is not None]
+    has_spin = column is not None and any(np.any(stress[:, column]) for stress in static)
+    work = work_on_modes(body.S_bar, body.I_bar, body.interfaces, body.h_spin if has_spin else None)
     sizes = np.array([loads[name] for name in names]).reshape(-1, len(p)).T
     forces = sizes @ np.array([work[name] for name in names]).reshape(-1, body.mode_count)
     if sections is not None:
         forces = forces + sections.modal_force
-    static = forces @ T @ np.linalg.solve(T.T @ body.stiffness @ T, T.T)
-    return Recovery(METHODS[1], p - static, names, sizes, sections)
-
-
-def _spin_in_static_stresses(body: ModalBody) -> Array | None:
-    """h_spin (n,) where static stresses count the inertia of a line of mass about it; files of 0.1 do not."""
-    static = [point.static for point in body.stress.values() if point.static is not None]
-    column = body.stress_loads.index("r_x") if "r_x" in body.stress_loads else None
-    counted = column is not None and any(np.any(stress[:, column]) for stress in static)
-    return body.h_spin if counted else None
+    p_s = forces @ T @ np.linalg.solve(T.T @ body.stiffness @ T, T.T)
+    return Recovery(METHODS[1], p - p_s, names, sizes, sections)
 
 
 def has_stresses(body: ModalBody) -> bool:
@@ -146,7 +142,7 @@ def has_stresses(body: ModalBody) -> bool:
 
 
 def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
-    """Stresses over a motion wherever the file of `body` has those of modes."""
+    """Return stresses over a motion wherever the file of `body` has those of modes."""
     points = {}
     for name, point in body.stress.items():
         stress = recovery.cases @ _cases(body, recovery, point.position[:1], point.stress[None], point.static)[0].T

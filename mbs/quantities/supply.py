@@ -23,7 +23,7 @@ from .motion import system_of
 
 
 def path_force(run: Run, trajectory: str) -> Array:
-    """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""
+    """Return −λ (T, m) of a path: forces (N) on the point, then moments (N·m) about global axes."""
     chosen = [k for k, row in enumerate(run.model.rows) if row.is_trajectory and row.owner == trajectory]
     return -run.multipliers[:, chosen]
 
@@ -130,7 +130,7 @@ class Momentum:
 
 
 def totals(run: Run) -> tuple[Energies, Momentum]:
-    """Energies and momentum of all bodies and rotors."""
+    """Return energies and momentum of all bodies and rotors."""
     run = behind_gears(run)
     system = system_of(run)
     sums = system.core.states_totals(system.scene, run.q, run.v)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import ceil, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +18,6 @@ from ...common.arrays import Array
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
-from ..model.body import Body
-from ..model.nodes import Node
 from ..run.record import Run
 from .link_loads import loads_in_equations
 from .motion import constraint_rows, cut_motions, node_of, places
@@ -123,22 +120,48 @@ def enough_pieces(shortening: float, count: int) -> int:
 def link_bending(run: Run, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
     """Return the deflection measures of flexible bodies of the equations; `links` are their modal bodies."""
     loads = loads_in_equations(run, links) if len(run.time) else {}
-    bendings = {}
-    for name, link in links.items():
-        body, sizes = node_of(run, name).body, loads[name].sizes if name in loads else {}
-        p = run.q[:, node_of(run, name).p_q] @ body.modal_transform.T
-        on_modes = _on_modes(link, run, name, sizes) if body.n_modes else None
-        on_modes = None if on_modes is None else lasting(on_modes, run.time)
-        bent = LinkInRun(p, body.modal_transform, on_modes, body.stiffening is not None, run.is_at_rest)
-        bendings[name] = bending_of_link(link, bent, _largest_force(body, sizes, len(p)))
-    return bendings
+    return {
+        name: _bending_of(run, name, link, loads[name].sizes if name in loads else {}) for name, link in links.items()
+    }
+
+
+def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]) -> Bending:
+    """Of one link under loads of `sizes` (T,) by the names of `fe_models.modal_body.unit_loads`."""
+    body, T = node_of(run, name).body, node_of(run, name).body.modal_transform
+    own = run.q[:, node_of(run, name).p_q]
+    p, force = own @ T.T, np.zeros(len(own))
+    for point in body.points:
+        parts = [sizes[load] for axis in "xyz" if (load := f"force/{point}/{axis}") in sizes]
+        force = np.maximum(force, np.linalg.norm(parts, axis=0)) if parts else force
+    deflection, rotation, shortening = shape_from_chord(link, p)
+    peaks = (deflection / link.length, rotation, shortening, force * shortening)
+    w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
+    change, missing, rotations = StiffnessChange(), Missing(0.0, 0.0), largest_rotations(link, p)
+    if body.n_modes:
+        on_modes = lasting(_on_modes(link, run, name, sizes), run.time)
+        change = stiffness_change(on_modes)
+        if body.stiffening is not None:
+            displacement = largest_displacement(link, p)
+            missing = missing_to_second_order(displacement, s / link.length, rotations, change.largest)
+        else:
+            stations, places = link.stations.translation @ T, link.stations.position
+            missing = missing_to_first_order(on_modes, own, stations, places, link.length, is_at_rest=run.is_at_rest)
+    return Bending(
+        deflection=w,
+        rotation=phi,
+        foreshortening=s,
+        foreshortening_moment=moment,
+        stiffness_change=change.largest,
+        length=link.length,
+        is_stiffened=body.stiffening is not None,
+        missing=missing,
+        rotations=rotations,
+        buckling=change.buckling,
+    )
 
 
 def _on_modes(link: ModalBody, run: Run, name: str, sizes: Mapping[str, Array]) -> ModalLoads:
-    """Loads of `sizes` (T,) on a body, whether their geometric stiffness is in the equations or not.
-
-    Loads by the names of `fe_models.modal_body.unit_loads`; those alone of which the file has a geometric stiffness.
-    """
+    """Loads of `sizes` (T,) of which the file has a geometric stiffness, whether it is in the equations or not."""
     node = node_of(run, name)
     T, n = node.body.modal_transform, len(node.body.stiffness)
     K = {load: T.T @ of_load @ T for load, of_load in link.geometric_stiffness.items()}
@@ -155,77 +178,19 @@ def _on_modes(link: ModalBody, run: Run, name: str, sizes: Mapping[str, Array]) 
     }
     support = points.get(node.outer.point)
     if support is not None:
-        counts = np.eye(6)
-        counts[3:, 3:] = _turns_that_count(run, node)
+        # Of rotations at the joint what is left without those that it is free to, unless trajectories prescribe them
+        counts, axis = np.eye(6), node.outer.triad[:, 2:]
+        along = [row for row in run.model.rows if row.is_trajectory and row.kind == "coordinate"]
+        free = (node.joint.guess_units or node.joint.units).count("rad")
+        if free and node.joint.name not in map(run.model.joint_of, along):
+            counts[3:, 3:] = np.eye(3) - axis @ axis.T if free == 1 else 0.0
         support = LoadedPoint(support.position, counts @ support.by_modes, np.tensordot(counts, support.K, axes=1))
     K_known = np.array([K[load] for load in known]).reshape(-1, n, n)
     return ModalLoads(f, K_known, node.body.stiffness, tuple(points.values()), support)
 
 
-def _turns_that_count(run: Run, node: Node) -> Array:
-    """(3, 3), axes of the body: what is left of a rotation of its section at a joint without those that it is free to.
-
-    What trajectories hold is not free. Joints that turn about more than one axis leave nothing.
-    """
-    along = [row for row in run.model.rows if row.is_trajectory and row.kind == "coordinate"]
-    if node.joint.name in map(run.model.joint_of, along):
-        return np.eye(3)
-    free = (node.joint.guess_units or node.joint.units).count("rad")
-    axis = node.outer.triad[:, 2:]
-    return np.eye(3) - axis @ axis.T if free == 1 else np.eye(3) * (free == 0)
-
-
-def _largest_force(body: Body, sizes: Mapping[str, Array], count: int) -> Array:
-    """(T,) N, of the forces at the interfaces of a body."""
-    largest = np.zeros(count)
-    for point in body.points:
-        parts = [sizes[load] for axis in "xyz" if (load := f"force/{point}/{axis}") in sizes]
-        if parts:
-            largest = np.maximum(largest, np.linalg.norm(parts, axis=0))
-    return largest
-
-
-class LinkInRun(NamedTuple):
-    """A link in a run: p (T, n_file) of its file, which is T times that of the equations; its loads if it has modes."""
-
-    p: Array
-    T: Array
-    loads: ModalLoads | None
-    is_stiffened: bool
-    is_at_rest: bool
-
-
-def bending_of_link(link: ModalBody, run: LinkInRun, force: Array) -> Bending:
-    """Return the deflection measures of one link; `force` (T,), N, is the largest at an interface."""
-    deflection, rotation, shortening = shape_from_chord(link, run.p)
-    peaks = (deflection / link.length, rotation, shortening, force * shortening)
-    w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    change = StiffnessChange() if run.loads is None else stiffness_change(run.loads)
-    rotations = largest_rotations(link, run.p)
-    if run.loads is None:
-        missing = Missing(0.0, 0.0)
-    elif run.is_stiffened:
-        missing = missing_to_second_order(largest_displacement(link, run.p), s / link.length, rotations, change.largest)
-    else:
-        p, stations = run.p @ np.linalg.pinv(run.T).T, link.stations.translation @ run.T
-        places = link.stations.position
-        missing = missing_to_first_order(run.loads, p, stations, places, link.length, is_at_rest=run.is_at_rest)
-    return Bending(
-        deflection=w,
-        rotation=phi,
-        foreshortening=s,
-        foreshortening_moment=moment,
-        stiffness_change=change.largest,
-        length=link.length,
-        is_stiffened=run.is_stiffened,
-        missing=missing,
-        rotations=rotations,
-        buckling=change.buckling,
-    )
-
-
 def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
-    """Largest deflection (m) and section rotation (rad) from the chord, and foreshortening (m), each (T,).
+    """Return largest deflection (m), section rotation (rad) from the chord, foreshortening (m), (T,), at p (T, n).
 
     Across along y and z: v' = φ_z, w' = −φ_y.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from ...common.arrays import Array, Indices, as_list
 from ...common.structs import struct
 from .. import _core
+from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive
 from ..model.known_motion import State
@@ -20,13 +21,20 @@ from ..model.model import Model
 from ..model.motors import integrated_mechanism
 from ..model.system import MultibodySystem, zero_order_hold
 from ..posture.limits import left_ranges, watch_limits
-from ..posture.posture import NEARLY_SINGULAR, SINGULAR, describe_branches, describe_posture, worst_posture
+from ..posture.posture import (
+    JUMP,
+    NEARLY_SINGULAR,
+    SINGULAR,
+    describe_branches,
+    describe_loops,
+    describe_posture,
+    worst_posture,
+)
 from ..posture.reach import out_of_reach
 from ..posture.start import rank_of_redundant_loops
 from ..scene.analysis import IntegratedAnalysis
-from .diagnosis import find_cause
-from .integrator_choice import choose_integrator
-from .integrators import EXPLICIT, Choice, beyond_round_off, integration_controls, with_steps_of
+from .integrator_choice import TOO_STIFF, choose_integrator, fastest_friction
+from .integrators import EXPLICIT, Choice, beyond_round_off, integration_controls, unmet, with_steps_of
 from .record import Continuation, Run, Statistics
 from .samples import LOOKS, about_highest, in_order, new_samples, reached_samples, some_of, telling
 from .stops import ENDS, stops
@@ -329,3 +337,100 @@ def _ends_in_posture(run: _core.TreeRun) -> bool:
     if run.status == _core.IntegrationStatus.step_underflow and run.singular_at == run.time_reached:
         return run.least_ratio < NEARLY_SINGULAR
     return run.status == _core.IntegrationStatus.diverged and run.least_ratio < SINGULAR
+
+
+FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
+
+
+def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
+    """A sentence with advice, the likely causes of a failure, the more certain first; empty where nothing is found.
+
+    A target that is not a number, a link bent too far, a load that jumps, friction, a singular posture of loops; where
+    steps became too short, the integrator.
+    """
+    t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
+
+    def accelerations() -> Array:
+        return _core.tree_outputs(system.core, system.scene, [t], np.array(run.last)[None]).accelerations
+
+    causes = (
+        not_a_number(_targets(system), accelerations, t)
+        or _too_far_bent(system, at)
+        or load_jump(_loads(system), t)
+        or _friction(system, analysis, choice, at)
+        or describe_loops(system.model, t, at.q, at.v)
+    )
+    if causes or run.status != _core.IntegrationStatus.step_underflow:
+        return causes
+    if choice.name == "generalized-alpha":
+        return (
+            f"a tolerance of {analysis.tolerance:g} is below what generalized-alpha reaches here: at order 2 it takes"
+            ' steps too short to advance, down to round-off; loosen the tolerance, or use integrator = "radau" or'
+            ' "dop853"'
+        )
+    return unmet(choice, run)
+
+
+def _targets(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
+    for row in system.model.rows:
+        functions = row.law.functions if row.law is not None else () if row.target is None else (row.target,)
+        yield from ((f'trajectory "{row.owner}"', function) for function in functions)
+
+
+def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Callable[[], Array], t: float) -> str:
+    """Return which labelled target is not finite at t (s), or that accelerations are not finite; else ""."""
+    for label, target in targets:
+        if not np.isfinite(target(t)).all():
+            return f"{label} has no finite value, velocity or acceleration there"
+    if not np.isfinite(accelerations()).all():
+        return "the accelerations there are no finite numbers: a load or a target grows without bound"
+    return ""
+
+
+def _too_far_bent(system: MultibodySystem, at: State) -> str:
+    """The link that is bent most: |p|/√J is the mean of its deflection against its radius of gyration."""
+    nodes = [node for node in system.model.tree.nodes if node.body.n_modes]
+    bent = [(float(np.linalg.norm(at.q[of.p_q]) / np.sqrt(of.body.largest_moment)), of.body.name) for of in nodes]
+    most, name = max(bent, default=(0.0, ""))
+    if not most > FAR_BENT:
+        return ""
+    return (
+        f'"{name}" is bent by {100 * most:.0f} % of its length, which violates small deformations. Possible causes: a'
+        " path too fast, a load beyond buckling, a spin that needs geometric_stiffening = true, a link too soft,"
+        " or an arm without motors that falls apart"
+    )
+
+
+def _loads(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
+    for load in system.model.scene.load:
+        for name, size in load.components.items():
+            component = name.removesuffix("[0]") if len(load.moments) == 1 else name
+            yield f'load on "{load.point or load.joint or load.pzt}", {component},', size
+
+
+def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
+    """Return which labelled load jumps at t (s), or has no finite value from there on; else "".
+
+    Functions of Python may have values alone: the changes just before and just after t tell what is no jump.
+    """
+    dt = 1e-9 * max(t, 1e-9)
+    for label, size in loads:
+        values = [size(t + k * dt) for k in (-3, -1, 1, 3)]
+        if not (np.isfinite(values[2]) | ~np.isfinite(values[1])).all():
+            return f"{label} has no finite value, slope or curvature after that time"
+        first, before, after, last = (value[0] for value in values)
+        change = abs(after - before) - abs(before - first) - abs(last - after)
+        if change > JUMP * max(abs(before), abs(after)):
+            return f"{label} jumps from {before:.6g} to {after:.6g} there: round it off, or loosen the tolerance"
+    return ""
+
+
+def _friction(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
+    rate, joint = fastest_friction(system, at)
+    if rate * analysis.end <= TOO_STIFF:
+        return ""
+    implicit = 'integrator = "radau", ' if choice.name in EXPLICIT else ""
+    return (
+        f"friction of {joint} brings it to rest within {1 / rate:.1e} s, which steps of {choice.name} cannot follow:"
+        f" use {implicit}less friction or a larger friction_speed"
+    )

@@ -56,23 +56,25 @@ def supplied_through_gears(run: Run) -> Supplied:
     elastic = [] if model.tree.gears else elastic_joints(model)
     if not elastic:
         return Supplied(motor_forces(model, run.q, wanted), {})
-    _refuse_loads(model, elastic)
-    compliant, torques = with_compliance(model), rotor_torques(model, run, time)
+    for load in model.scene.load:
+        if any(load.joint == node.joint.name for node in elastic):
+            raise InputError(
+                f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and equilibria",
+                f'one on "{load.joint}"',
+            )
+    compliant, torques, known = with_compliance(model), rotor_torques(model, run, time), []
+    for node in elastic:
+        joint, (inertia, N) = node.joint.name, rotor(node)
+        where = f'{model.scene.path}: joint "{joint}"'
+        spring = GearSpring(*(compliance(node) or (TwistSpring((np.inf,)), 0.0)), inertia * N**2, where)
+        known.append((joint, spring, N * torques[:, model.tree.index[node.body.name]], _along(node, run)))
     rigid = required_forces(compliant, _in_motor_coordinates(compliant, run, None), time)
     is_found, change = bool(twists) and all(of.torque is not None for of in twists.values()), np.inf
     for passes in count(1):
         forces = motor_forces(model, run.q, wanted + felt)
         gears = {
-            node.joint.name: _gear(
-                model=model,
-                state=run,
-                time=time,
-                node=node,
-                torque=torques[:, model.tree.index[node.body.name]],
-                forces=forces,
-                twists=twists,
-            )
-            for node in elastic
+            joint: gear_motion(spring, time, forces.moments[joint][:, 0], torque, along, twists.get(joint))
+            for joint, spring, torque, along in known
         }
         if is_found:
             break
@@ -82,38 +84,11 @@ def supplied_through_gears(run: Run) -> Supplied:
             of = gears[gear.joint.joint.name].twist
             felt[:, gear.joint.v.start] += gear.sign * (gear.spring.moment(of[:, 0]) + gear.damping * of[:, 1])
         change, last = float(np.abs(felt - before).max(initial=0.0)), change
-        if change <= REPEATS * float(np.abs(felt).max(initial=0.0)):
-            break
-        if passes > len(elastic) and change > CONTRACTS * last:
+        repeats = change <= REPEATS * float(np.abs(felt).max(initial=0.0))
+        if repeats or (passes > len(elastic) and change > CONTRACTS * last):
             break
     moments = {**forces.moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
     return Supplied(replace(forces, moments=moments), gears)
-
-
-def _refuse_loads(model: Model, elastic: Sequence[Node]) -> None:
-    for load in model.scene.load:
-        if any(load.joint == node.joint.name for node in elastic):
-            raise InputError(
-                f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and equilibria",
-                f'one on "{load.joint}"',
-            )
-
-
-def _gear(
-    model: Model,
-    state: States,
-    time: Array,
-    node: Node,
-    torque: Array,
-    forces: MotorForces,
-    twists: Mapping[str, GearCurve],
-) -> GearMotion:
-    """Of the gear in the joint of `node`, whose rotor takes `torque` (T,), J u̇, where it is rigid."""
-    joint, (inertia, N) = node.joint.name, rotor(node)
-    where = f'{model.scene.path}: joint "{joint}"'
-    spring = GearSpring(*(compliance(node) or (TwistSpring((np.inf,)), 0.0)), inertia * N**2, where)
-    moment, along = forces.moments[joint][:, 0], _along(node, state)
-    return gear_motion(spring, time, moment, N * torque, along, twists.get(joint))
 
 
 def _along(node: Node, state: States) -> Array:
@@ -162,7 +137,7 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
 
 
 def with_motors(model: Model, rigid: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:
-    """Q, v, a (T, …) of `model`, which has compliant gears, from those with `rigid` gears and the gears' motions."""
+    """Return q, v, a (T, …) of `model`, which has compliant gears, from those with `rigid` ones and `gears`."""
     known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
     more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
     return [np.hstack(pair) for pair in zip(rigid, more, strict=True)]
@@ -186,9 +161,9 @@ class GearSpring(NamedTuple):
 def gear_motion(
     spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: GearCurve | None = None
 ) -> GearMotion:
-    """Return the motion of a gear from torque `tau` (T,) with a rigid gear, of which its rotor takes `rotor` (T,).
+    """Return the motion of a gear from `tau` (T,), N·m, with a rigid gear, of which its rotor takes `rotor` (T,), N·m.
 
-    `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t), and τ(t), where they are known.
+    `gamma` (T, 3): the joint's coordinate, rad, its rate and acceleration. `curve`: δ(t), τ(t), where they are known.
     Raises `InputError` if damping delays the twist so much that torques do not determine it.
     """
     lasts, longest = spring.damping / min(spring.spring.slopes), SLOWEST * (time[-1] - time[0])

@@ -139,11 +139,8 @@ def faster_of(
     step `starts` times; `cost` of a step of it, in DOP853's.
     """
     # damped more than critically a vibration falls faster than it would swing
-    duration, top, scale = (
-        float(np.ptp(times)),
-        (frequency * np.maximum(1.0, 2 * damping_ratio)).max(),
-        tolerance / 1e-4,
-    )
+    top = (frequency * np.maximum(1.0, 2 * damping_ratio)).max()
+    duration, scale = float(np.ptp(times)), tolerance / 1e-4
     phase = partial(_ringing_phase, frequency, damping_ratio, excited, duration)
     explicit = phase(RULE.negligible_dop853 * tolerance) / (RULE.resolved_dop853 * scale ** (1 / 8))
     implicit = phase(RULE.negligible_radau * tolerance) / (RULE.resolved_radau * scale ** (1 / 5))
@@ -187,16 +184,6 @@ def with_steps_of(analysis: IntegratedAnalysis, end: float, choose: Callable[[],
         return Choice(steps.method, REPEATED)
     choice = choose()
     return choice._replace(candidates=()) if analysis.keep_steps and choice.name in EXPLICIT else choice
-
-
-def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
-    """A sentence where steps have become too short with a method of order 2; empty with any other."""
-    if choice.name != "generalized-alpha":
-        return ""
-    return (
-        f"a tolerance of {analysis.tolerance:g} is below what generalized-alpha reaches here: at order 2 it takes steps"
-        ' too short to advance, down to round-off; loosen the tolerance, or use integrator = "radau" or "dop853"'
-    )
 
 
 def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> str:

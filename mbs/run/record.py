@@ -47,7 +47,7 @@ class Statistics:
     """Statistics of a run; `cause` is the reason of an early end at `time_reached`, s.
 
     `warnings` are on what is left open. `step_ends` (N,), in s, with which the run can be repeated, if it was asked for
-    them; see `fields.steps`.
+    them; see `field_types.Steps`.
     """
 
     status: str = "completed"

@@ -17,15 +17,13 @@ from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.model import Model
 from ..model.motors import (
-    MotorForces,
     driven_mechanism,
-    driven_system,
     frames_in_core,
     integrated_mechanism,
-    motor_forces,
     path_forces,
 )
 from ..model.nodes import ConstraintRow
+from ..model.projection import EXACT
 from ..model.system import MultibodySystem
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
@@ -54,7 +52,12 @@ def supplied(run: Run, most: Array, patches: Mapping[str, PatchedLink], *, limit
     In the order of `Model.motors`, N·m or N on second sides, then of `patches`, V.
     """
     if run.prescribed is not None and run.prescribed.voltages:
-        return _with_known_voltages(run, most, patches, limited=limited)
+        torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))
+        voltages: list[TimeFunction] = []
+        for name, of_link in patches.items():
+            ends = of_link.amplifiers.range if limited else ()
+            voltages += functions_within(run.prescribed.voltages[name], *ends)
+        return _core.ForcesOfBoth(torques, _core.ForcesOfTime(voltages)) if voltages else torques
     links = [(*_reached(run.model, of.to_reached), of.allocation(limited=limited)) for of in patches.values()]
     return _found(run, lambda driven: _core.actuator_reader(driven, most, links), MultibodySystem(run.model))
 
@@ -67,18 +70,6 @@ def _reached(model: Model, to_reached: Mapping[str, Array]) -> tuple[int, Array]
     for node in nodes:
         reached[:, node.p_v.start - first : node.p_v.stop - first] = to_reached[node.body.name] @ node.body.on_file.T
     return first, reached
-
-
-def _with_known_voltages(
-    run: Run, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool
-) -> _core.ForceSource:
-    torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))
-    assert run.prescribed is not None
-    voltages: list[TimeFunction] = []
-    for name, of_link in patches.items():
-        curve = run.prescribed.voltages[name]
-        voltages += functions_within(curve, *of_link.amplifiers.range) if limited else functions_within(curve)
-    return _core.ForcesOfBoth(torques, _core.ForcesOfTime(voltages)) if voltages else torques
 
 
 def functions_within(curve: PPoly, least: Array | float = -np.inf, most: Array | float = np.inf) -> list[TimeFunction]:
@@ -129,8 +120,9 @@ def path_numbers(run: Run) -> OfPaths:
         in_plane = [(at[k], number, sign) for k, number, sign in parts]
         return _core.path_reader(driven, system.plane.axes.T, in_plane, count)
 
-    ways = [row.f for _, row, *_ in on_points if row.kind == "point"]
-    are_in_plane = system.lie_in_plane(ways)  # else joints carry what is across it
+    # Joints carry what is across the plane
+    plane, ways = system.plane, [row.f for _, row, *_ in on_points if row.kind == "point"]
+    are_in_plane = plane is not None and all(abs(plane.axes[2] @ way) <= EXACT for way in ways)
     source = _found(run, reader, system if are_in_plane else None)
     turned = {point for _, row, point, _ in on_points if row.kind != "point"}
     components = {
@@ -149,7 +141,7 @@ def _sides(model: Model, row: ConstraintRow) -> Iterator[tuple[str, float]]:
 
 def point_numbers(run: Run, chosen: Mapping[str, PointsOfBody]) -> _core.ForceSource:
     """Driving forces at the actuation points, global axes: three numbers of each component."""
-    tree, in_core = run.model.tree, frames_in_core(run.model, driven_system(run.model).core, run.q[0])
+    tree, in_core = run.model.tree, frames_in_core(run.model, run.q[0])
     bodies = [(tree.index[name], *in_core[tree.index[name]], *of_body.of_core()) for name, of_body in chosen.items()]
     return _found(run, lambda driven: _core.point_reader(driven, bodies))
 
@@ -163,11 +155,6 @@ def _found(run: Run, reader: Reader, system: MultibodySystem | None = None) -> _
     equations, shape, near, *_ = run.prescribed
     motion = equations()
     return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
-
-
-def motor_forces_of(run: Run) -> MotorForces:
-    """Return τ (N·m or N) and modal forces F_p of a run, its gears rigid (see `mbs.model.motors`)."""
-    return motor_forces(run.model, run.q, supplied_in(run))
 
 
 def supplied_in(run: Run) -> Array:

@@ -4,6 +4,7 @@ THE list of kinds is `ffrobot.scene.kinds`. Times in s.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from math import pi
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...common.errors import did_you_mean, either, quoted
 from ...common.keys import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record
 from .._core import TimeFunction
-from ..fields.field_types import KeptSteps, Name, Positive, Referring
+from ..fields.field_types import KeptSteps, Name, NotEmpty, NotNegative, Positive, Referring
 
 TIGHTEST_TOLERANCE = 1e-10  # round-off in the forces of stiff links is not far below
 
@@ -144,8 +145,22 @@ class TimedAnalysis(Analysis):
 
     @model_validator(mode="after")
     def _divides(self) -> Self:
-        if self.end and self.output_step:
-            check_steps(self.end, self.output_step)
+        """Raise `ValueError` unless the outputs 0, step, 2 step, … end exactly at `end`."""
+        end, step = self.end, self.output_step
+        if not (end and step):
+            return self
+        ratio = end / step
+        if ratio > MOST_OUTPUTS:
+            raise ValueError(
+                f"expected at most {MOST_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}"
+            )
+        count = round(ratio)
+        # 0.1/0.001 is not whole in binary; anything beyond round-off is meant otherwise.
+        if count < 1 or abs(ratio - count) > 1e-9 * ratio:
+            raise ValueError(
+                f"expected an output_step that divides end = {end:g} into equal steps, found {step:g} (such as"
+                f" {end / max(1, count):.9g})"
+            )
         return self
 
     @property
@@ -269,15 +284,27 @@ def output_times(end: float, step: float, before: float = 0.0, after: float = 0.
     return times
 
 
-def check_steps(end: float, step: float) -> None:
-    """Raise `ValueError` unless the outputs 0, step, 2 step, … end exactly at `end`."""
-    ratio = end / step
-    if ratio > MOST_OUTPUTS:
-        raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found output_step = {step:g} up to end = {end:g}")
-    count = round(ratio)
-    # 0.1/0.001 is not whole in binary; anything beyond round-off is meant otherwise.
-    if count < 1 or abs(ratio - count) > 1e-9 * ratio:
-        near = end / max(1, count)
-        raise ValueError(
-            f"expected an output_step that divides end = {end:g} into equal steps, found {step:g} (such as {near:.9g})"
-        )
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class Robustness(Record):
+    """Deviations from the model, each alone, under which the torques and voltages of the result are simulated again.
+
+    The summary has the largest distance of the tip from the computed motion: open loop, and with a sampled PD
+    controller of the joints in addition, on quantized encoders and without rate sensors. Encoders of joints with
+    compliant gears are on the motors.
+    """
+
+    sample_time: Positive = 1e-3
+    """Time for which a zero-order hold keeps commands, and between samples of the controller, s."""
+    parameters: Annotated[tuple[Share, ...], NotEmpty] = (0.01, 0.05)
+    """Relative changes of the stiffness and of the mass of all flexible links, in both directions."""
+    gears: tuple[Share, ...] = (0.1,)
+    """Relative changes of the stiffness of compliant gears, in both directions."""
+    force: NotNegative = 0.01
+    """Constant force on the tip, along each axis in turn, N."""
+    resolution: Positive = 2 * pi / 2**20
+    """Increment of the encoders, rad at the joint (prismatic: m)."""
+    bandwidth: Positive | None = None
+    """Bandwidth of the joint controller, critically damped with rigid links, rad/s; default: half the lowest natural
+    frequency of links and compliant gears, less where its samples are too slow for these."""

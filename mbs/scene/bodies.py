@@ -54,13 +54,6 @@ def check_inertia(inertia: Inertia) -> Inertia:
     return inertia
 
 
-def _about_center(J: float) -> Vector3:
-    """Of a rigid body of a planar scene, by its moment of inertia about z."""
-    if not J >= 0:
-        raise ValueError(f"expected a moment of inertia not below 0, found {J:g}")
-    return inertia_about_z(J)
-
-
 PRIMITIVES = ("box", "cylinder", "sphere")
 
 
@@ -93,7 +86,7 @@ class RigidBody(Record):
 
     mass: Positive
     """Mass, kg."""
-    inertia: Annotated[Inertia, Spelled(float, _about_center), AfterValidator(check_inertia)]
+    inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z), AfterValidator(check_inertia)]
     """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about z."""
     center: Vector
     """Center of mass, m, axes of the body."""

@@ -60,19 +60,14 @@ def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
         if root in carriers:
             continue
         carriers[root] = None
-        candidates: list[tuple[int, int]] = []
-        _add(candidates, touching[root], joints)
+        candidates = sorted((joints[number].rank, number) for number in touching[root])
         while candidates:
             _, number = heappop(candidates)
             own, other = sorted(joints[number].between, key=lambda side: body_of(side) in carriers)
             if body_of(own) not in carriers:
                 carriers[body_of(own)] = Carrier(number, own, other)
-                _add(candidates, touching[body_of(own)], joints)
+                for following in touching[body_of(own)]:
+                    heappush(candidates, (joints[following].rank, following))
     del carriers[GROUND]
     carrying = {carrier.joint for carrier in carriers.values() if carrier is not None}
     return Topology(carriers, tuple(number for number in range(len(joints)) if number not in carrying))
-
-
-def _add(candidates: list[tuple[int, int]], numbers: Sequence[int], joints: Sequence[Edge]) -> None:
-    for number in numbers:
-        heappush(candidates, (joints[number].rank, number))

@@ -1,21 +1,184 @@
 """Trajectories of a scene, key by key: motion that is specified. SI units; angles in rad."""
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Annotated, Self
+from itertools import pairwise
+from math import inf
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import ValidationInfo, model_validator
+from numpy.typing import ArrayLike
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ...common.arrays import Array, as_rows
+from ...common.arrays import Array
 from ...common.errors import InputError, did_you_mean, quoted
-from ...common.rotations import of_rpy, smallest_turn
+from ...common.rotations import of_rpy
+from ...common.validation import Record
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
+from ..fields.field_types import (
+    Expression,
+    Name,
+    NotNegative,
+    PointReference,
+    Positive,
+    Quantity,
+    Referring,
+    Vector3,
+    WaypointTable,
+    one_of,
+    present,
+)
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
-from ..fields.paths import Piecewise
+from ..fields.paths import SMOOTHNESS, Legs, PathLimits, Piecewise, impulses, path_of, shaped
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 from ..fields.waypoints import Waypoints
-from .motion_keys import LIMITS, MotionKeys, OfPlaces, Place
+
+Place = Quantity | tuple[Quantity, ...]
+MOST_PLACES = 1000
+OfPlaces = Field(min_length=2, max_length=MOST_PLACES)
+LIMITS = ("speed", "acceleration", "jerk")
+OF_LEGS = ("hold", "blend", "duration", *LIMITS, "start", "stretch", "fastest")  # a table of waypoints has its times
+
+
+class Shaper(Record):
+    """Input shaping: delayed shares of the motion cancel their vibrations (Singer and Seering 1990).
+
+    The default `frequency` is that of the robot's lowest vibrations on the constrained path, averaged over it.
+    """
+
+    kind: Literal["none", "zv", "zvd", "ei"]
+    """Shaper: "zv" is shortest, "zvd" and "ei" take twice as long and are robust against a wrong frequency; "none" does
+    nothing."""
+    frequency: Positive | tuple[Positive, ...] | None = None
+    """Frequencies of the vibrations, Hz: one or several; by default those of the robot."""
+    damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Damping ratio of these vibrations; by default that of the robot, and 0 with `frequency`."""
+    modes: Annotated[int, Field(gt=0, le=4)] = 1
+    """Number of the robot's lowest vibrations."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.frequency is not None and "modes" in self.model_fields_set:
+            raise ValueError('expected one of the keys "frequency" and "modes", found both')
+        return self
+
+    @property
+    def asks_robot(self) -> bool:
+        """Whether the frequencies of the robot have to be computed first."""
+        return self.kind != "none" and self.frequency is None
+
+    def shape(self, motion: Piecewise) -> Piecewise:
+        """The motion, shaped for each frequency; unchanged as long as there is none."""
+        if self.kind == "none" or self.frequency is None:
+            return motion
+        for frequency in np.atleast_1d(self.frequency):
+            motion = shaped(motion, impulses(self.kind, float(frequency), self.damping_ratio or 0.0))
+        return motion
+
+
+class MotionKeys(Referring):
+    """Keys of the motion of a trajectory."""
+
+    via: Annotated[tuple[Place, ...], OfPlaces] | None = None
+    """Waypoints from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""
+    profile: Literal["rest-to-rest", "s-curve", "trapezoid", "spline"] | None = None
+    """Law of motion between waypoints: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
+    through the rows of `waypoints` (their default)."""
+    smoothness: Annotated[int, Field(ge=1, le=6)] | None = None
+    """Number of continuous derivatives; by default 4 of rest-to-rest, 2 of s-curve, 1 of trapezoid."""
+    speed: Positive | None = None
+    """Largest speed along the path, m/s or rad/s."""
+    acceleration: Positive | None = None
+    """Largest acceleration along the path, m/s² or rad/s²."""
+    jerk: Positive | None = None
+    """Largest jerk along the path, m/s³ or rad/s³."""
+    duration: Positive | tuple[Positive, ...] | None = None
+    """Duration of each path segment, s, instead of limits: one for all, or one each."""
+    start: NotNegative = 0.0
+    """Start of the first path segment, s."""
+    hold: NotNegative | tuple[NotNegative, ...] = 0.0
+    """Rest at each intermediate waypoint, s: one for all, or one each."""
+    blend: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
+    """Overlap of path segments at waypoints without hold, as a share of the shorter one; 0: a stop at each waypoint."""
+    stretch: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+    """Time-scaling factor of all path segments."""
+    fastest: bool = False
+    """Search for the smallest `stretch` at which motors and patches satisfy their limits in the first inverse analysis.
+    """
+    shaper: Shaper | None = None
+    """Input shaper that does not excite vibrations of certain frequencies."""
+
+    @field_validator("waypoints", check_fields=False)
+    @classmethod
+    def _of_its_joint(cls, table: Waypoints | None, info: ValidationInfo) -> Waypoints | None:
+        joint = info.data.get("joint") or info.data.get("motor")
+        return table if table is None or joint is None else table.of_joint(joint)
+
+    def check_motion(self, places: Mapping[int, str], waypoints: Waypoints | None) -> None:
+        """Raise `ValueError` for keys that do not fit each other, or places that are none of these.
+
+        `places` says by their number of components how they are written.
+        """
+        given = [key for key in (*OF_LEGS, "profile", "smoothness", "shaper") if key in self.model_fields_set]
+        if self.via is None and waypoints is None and given:
+            raise ValueError(f'expected {quoted(given)} only with "via" or "waypoints", found neither')
+        if waypoints is not None:
+            if refused := [key for key in given if key in OF_LEGS]:
+                raise ValueError(f'expected {quoted(refused)} only with "via", found them with "waypoints"')
+            if self.profile in (None, "spline") and self.smoothness is not None:
+                raise ValueError('expected no key "smoothness" with profile = "spline", found it there')
+        if self.via is not None:
+            self._check_via(self.via, places)
+
+    def _check_via(self, via: tuple[Place, ...], places: Mapping[int, str]) -> None:
+        sizes = {int(np.size(place)) for place in via}
+        if not sizes <= set(places) or len(sizes) > 1:
+            wanted = " or ".join(places.values()) + (", all alike," if len(places) > 1 else "")
+            raise ValueError(f"expected {wanted} in via, found {[list(p) if isinstance(p, tuple) else p for p in via]}")
+        if self.profile == "spline":
+            raise ValueError('expected profile = "spline" only with "waypoints", found it with "via"')
+        for k, (place, following) in enumerate(pairwise(via), 1):
+            if place == following:
+                raise ValueError(f"expected places in via that differ (a rest is a hold), found no. {k} twice")
+        for key, count in (("duration", len(via) - 1), ("hold", len(via) - 2)):
+            value = getattr(self, key)
+            if isinstance(value, tuple) and len(value) != count:
+                raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
+        if self.fastest and "stretch" in self.model_fields_set:
+            raise ValueError('expected one of the keys "fastest" and "stretch", found both')
+        limits = [key for key in LIMITS if getattr(self, key) is not None]
+        if bool(limits) == (self.duration is not None):
+            given = "both" if limits else "neither"
+            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {given}')
+        if self.profile in ("s-curve", "trapezoid") and limits == ["speed"]:
+            raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
+        if self.profile == "trapezoid" and self.jerk is not None:
+            raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
+
+    def along_table(self, waypoints: Waypoints) -> Piecewise:
+        """The motion of all columns of a table."""
+        if self.profile in (None, "spline"):
+            return self._shaped(waypoints.spline)
+        times = waypoints.times
+        return self._through(waypoints.values, float(times[0]), np.diff(times))
+
+    def through(self, places: Array) -> Piecewise:
+        """Return the motion through the points of `via` (k + 1, n), m or rad, or some of their components."""
+        return self._through(places, self.start, self.duration)
+
+    def _shaped(self, motion: Piecewise) -> Piecewise:
+        return motion if self.shaper is None else self.shaper.shape(motion)
+
+    def _through(self, places: Array, start: float, duration: ArrayLike | None) -> Piecewise:
+        profile, count = self.profile or "rest-to-rest", len(places) - 1
+        assert profile != "spline"
+        limits = PathLimits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
+        durations = None if duration is None else tuple(np.broadcast_to(duration, count).tolist())
+        holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
+        smoothness = self.smoothness or SMOOTHNESS[profile]
+        more = {"blend": self.blend, "stretch": self.stretch}
+        return self._shaped(path_of(Legs(places, start, profile, smoothness, limits, durations, holds=holds, **more)))
+
 
 PLACES = ("x", "y", "z")
 SUBJECTS = ("point", "joint", "angle", "motor")
@@ -94,8 +257,10 @@ class Trajectory(MotionKeys):
         of_point = {2: OF_POINT[2]} if is_planar(info) else OF_POINT
         self.check_motion(of_point if subject == "point" else {1: "numbers"}, self.waypoints)
         self._check_orientation()
-        self._check_poses()
-        self._check_size()
+        with np.errstate(all="ignore"):
+            paths = [path for path in (self.path, self._turning) if path is not None]
+        if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
+            raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
         return self
 
     def _check_columns(self, given: list[str], allowed: tuple[str, ...]) -> None:
@@ -130,11 +295,9 @@ class Trajectory(MotionKeys):
             raise ValueError('expected the key "tool_axis" with direction: which direction of the section, found none')
         if self.tool_axis is not None and not any(self.tool_axis):
             raise ValueError(f"expected tool_axis with a direction, found {list(self.tool_axis)}")
-
-    def _check_poses(self) -> None:
         if not self._has_poses:
             return
-        if keys := [key for key in ORIENTATIONS if getattr(self, key) is not None]:
+        if keys:
             raise ValueError(f"expected an orientation either in via or by {quoted(keys)}, found both")
         if self.duration is None:
             limits = [key for key in LIMITS if getattr(self, key) is not None]
@@ -147,12 +310,6 @@ class Trajectory(MotionKeys):
         except InputError as error:
             raise ValueError(f"via: {error}") from None
 
-    def _check_size(self) -> None:
-        with np.errstate(all="ignore"):
-            paths = [path for path in (self.path, self._turning) if path is not None]
-        if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
-            raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
-
     def changed(self, **keys: object) -> Self:
         """Return the trajectory with some keys replaced."""
         return type(self)(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
@@ -161,11 +318,6 @@ class Trajectory(MotionKeys):
     def coordinate_of(self) -> str | None:
         """The joint whose coordinate, or whose motor's, follows it."""
         return self.joint if self.motor is None else self.motor
-
-    @property
-    def turning_axis(self) -> Vector3:
-        """Axis of an absolute angle."""
-        return self.axis or (0.0, 0.0, 1.0)
 
     @property
     def force_components(self) -> tuple[str, ...]:
@@ -221,12 +373,6 @@ class Trajectory(MotionKeys):
         if self.rpy is not None:
             return OrientationLaw("rpy", self.rpy)
         return None if self.direction is None else OrientationLaw("direction", self.direction)
-
-    @property
-    def tool_triad(self) -> tuple[tuple[float, ...], ...]:
-        """Triad of the section with z along the tool axis, rows."""
-        assert self.tool_axis is not None
-        return tuple(map(tuple, as_rows(smallest_turn(np.array(self.tool_axis)))))
 
     @property
     def row_count(self) -> int:

@@ -30,8 +30,7 @@ from ..model.model import Model
 from ..run.context import Context, PatchedLink
 from ..run.integrators import Choice
 from ..run.record import Run, Statistics
-from ..scene.analysis import Check, Need, TimedAnalysis, output_times
-from ..scene.robustness import Robustness
+from ..scene.analysis import Check, Need, Robustness, TimedAnalysis, output_times
 from .advice import Bounds, check_ends_for_gears, price_of_tolerance, slowest
 from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears

@@ -14,12 +14,12 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
-from ffrobot.mbs.fields.steps import Steps
-from ffrobot.mbs.model.motors import motor_commands
+from ffrobot.mbs.fields.field_types import Steps
+from ffrobot.mbs.model.motors import motor_commands, motor_forces
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
-from ffrobot.mbs.run.replay import motor_forces_of
+from ffrobot.mbs.run.replay import supplied_in
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
@@ -154,7 +154,7 @@ def test_saturated_actuators_do_what_their_limits_leave(integrator):
     }
     inverse = inverse_of(model, 1e-8)
     back = replay_of(model, inverse, "joints+pzt", 1e-8, patches, limits=True, integrator=integrator)
-    found = motor_forces_of(inverse)
+    found = motor_forces(inverse.model, inverse.q, supplied_in(inverse))
     tau = np.hstack(list(found.moments.values()))
     clipped = np.clip(tau, *(sign * np.array([0.5, 3.0, 0.4]) for sign in (-1, 1)))
     assert np.any(clipped != tau)

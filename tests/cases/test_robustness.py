@@ -151,7 +151,7 @@ def test_every_cause_behind_a_gear_against_a_linear_model():
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_gears_of_slides_vary_like_those_of_hinges(kind):
-    from ffrobot.mbs.scene.robustness import Robustness
+    from ffrobot.mbs.scene.analysis import Robustness
     from ffrobot.run.robustness import varied_robots
     from ffrobot.run.solve import prepare_scene
 

@@ -87,5 +87,5 @@ def evaluated(model, q, v):
     """The motion of one instant at q, v, as the core finds it under friction and loads."""
     system = MultibodySystem(model)
     run = _core.tree_outputs(system.core, system.scene, [NOW], np.concatenate([q, v])[None])
-    multipliers = run.multipliers * system.row_signs
+    multipliers = run.multipliers * system.model.row_signs
     return state_of(model, np.array([NOW]), q[None], v[None], run.accelerations, multipliers)

@@ -31,7 +31,7 @@ def assert_same(system, at):
     plane = _core.tree_outputs(*system.integrated[:2], TIMES, at, system.replay)
     for found, expected in (
         (plane.accelerations, space.accelerations),
-        (system.multipliers(plane.multipliers), space.multipliers * system.row_signs),
+        (system.multipliers(plane.multipliers), space.multipliers * system.model.row_signs),
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE * np.abs(expected).max(initial=0.0))
     assert_same_forces(system, at, plane.multipliers)

@@ -161,7 +161,7 @@ MISTAKES = [
     ('link = "link1.toml"', "", 'body "link1": expected exactly one of the keys "link", "modal", "rigid", found none', ""),
     ("modal =", 'link = "link1.toml"\nmodal =', 'body "link2": expected exactly one of', 'found "link", "modal"'),
     ("mass = 2", "mass = -2", 'body "hand": rigid.mass: expected a number greater than 0, found -2', ""),
-    ("inertia = 0.1", "inertia = -0.1", 'body "hand": rigid.inertia: expected a moment of inertia not below 0', "-0.1"),
+    ("inertia = 0.1", "inertia = -0.1", 'body "hand": rigid.inertia: expected a number of at least 0', "-0.1"),
     ("grip =", "grab =", 'payload no. 1: point: expected one of the points "root", "grab" of "hand"', 'found "hand.grip"'),
     ('name = "hand"', 'name = "ha/nd"', 'body "ha/nd": name: expected a name without', 'found "ha/nd"'),
     ('name = "hand"', 'name = "link2"', 'body "link2": expected one body of this name, found 2', ""),
@@ -173,7 +173,7 @@ MISTAKES = [
         ('"weld"', f'"weld"\n{key} = 1.0', 'joint "W": ', f'"{key}" only in revolute or prismatic joints, found it in a weld')
         for key in ("moment_limit", "gear_ratio", "rotor_inertia", "viscous_friction")
     ),
-    ('"weld"', '"prismatic"', 'joint "W": expected an axis that is not zero', "found none"),
+    ('"weld"', '"prismatic"', 'joint "W": expected an axis with a direction', "found none"),
     ('"weld"', '"weld"\naxis = [1, 0]', 'joint "W": expected the key "axis" only in prismatic', "found it in a weld"),
     ('"weld"', '"weld"\nat = [1, 0]', 'joint "W": expected the key "at" only in joints to "ground"', "found it between"),
     ('"link1.root"', '"link1"', 'joint "O": between[1]: expected a point as "BODY.POINT", found "link1"', ""),

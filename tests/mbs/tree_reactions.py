@@ -17,7 +17,7 @@ def carried(motion):
     along += [
         (one.row, one.row.sign * (along_cut(one, motion.time) - one.resistance(of.rate)), False)
         for one, of in cut_motions(motion)
-        if one.is_loaded
+        if one.friction is not None or one.loads
     ]
     for row, size, is_constraint in along:
         if row.kind == "coordinate":  # within a joint

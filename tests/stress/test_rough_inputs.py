@@ -11,7 +11,7 @@ from rods import rod
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.fields.functions import user_function
-from ffrobot.mbs.run.diagnosis import load_jump
+from ffrobot.mbs.run.drive import load_jump
 
 ELBOW = (-0.2, 1.4)
 

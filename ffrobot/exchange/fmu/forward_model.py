@@ -15,8 +15,7 @@ from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.joints.free import FreeJoint
-from ...mbs.joints.joints import JOINT_TYPES
+from ...mbs.joints.joints import JOINT_TYPES, FreeJoint
 from ...mbs.linear.statics import initial_state
 from ...mbs.model.model import Model
 from ...mbs.model.nodes import Node

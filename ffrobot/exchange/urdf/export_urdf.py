@@ -14,9 +14,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ...common.rotations import rpy_of
 from ...mbs.fields.field_types import GROUND
-from ...mbs.joints.joint import JointRecord
-from ...mbs.joints.moving_joint import MovingJoint
-from ...mbs.joints.screw import ScrewJoint
+from ...mbs.joints.joint import JointRecord, MovingJoint
+from ...mbs.joints.joints import ScrewJoint
 from ...mbs.model.build import build_model
 from ...mbs.model.nodes import Node
 from ...mbs.model.tree import KinematicTree
