@@ -47,7 +47,7 @@ def spinner():
         "analysis": ({"name": "spin", "kind": "forward", "end": 1.0, "output_step": 1.0},),
     }  # fmt: skip
     scene = validated_scene(tables, FOLDER / "scene.toml", "")
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     sample, (node,) = load("top_flexible")["samples"][0], model.tree.nodes
     q, v = np.zeros(model.tree.n_q), np.zeros(model.tree.n_v)
     q[node.q], q[node.p_q] = [*sample["position"], *sample["quaternion"]], sample["modal"]

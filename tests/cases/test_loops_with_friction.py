@@ -51,7 +51,7 @@ def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
     scene = ffrobot.make_scene(**in_3d(own, [INVERSE]))
     results = ffrobot.solve(scene)
     t, moment, rate = (results[f"inverse/{key}"][30] for key in ("time", "joints/A/moment", "joints/A/rate"))
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     assert [joint.name for joint in model.tree.loops] == [cut]
     arm = RigidArm(model, undeformed_posture(model).q)
     found = arm.moments(*(np.array([x]) for x in (1 + 0.3 * (1 - np.cos(3 * t)), rate, 2.7 * np.cos(3 * t))))

@@ -89,7 +89,7 @@ def link(request, arm):
     load = [{"point": request.param, "mass": 0.2, "center": [0.01, 0.02, 0.03]}] if request.param else []
     path = scenes_in_3d.write(tables | {"payload": load}, folder / "loaded.toml")
     scene = load_scene(path)
-    (loaded,) = (body for body in load_bodies(scene, lambda _: None) if body.spatial.name == "fore")
+    (loaded,) = (body for body in load_bodies(scene, lambda _: None).values() if body.spatial.name == "fore")
     return loaded.spatial
 
 

@@ -79,7 +79,7 @@ def shaft_model(shaft, **tables):
         scene([{"name": "shaft", "link": shaft}], [], {"name": "unused", "kind": "static"}, gravity=ORIGIN) | tables
     )
     made = ffrobot.make_scene(**tables)
-    return build_model(made, [body.spatial for body in load_bodies(made, lambda _: None)])
+    return build_model(made, [body.spatial for body in load_bodies(made, lambda _: None).values()])
 
 
 def whirling(model, Omega):

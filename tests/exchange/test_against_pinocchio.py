@@ -44,7 +44,7 @@ def robot(request, tmp_path_factory, ffrobot):
         text + '[[analysis]]\nname = "falls"\nkind = "forward"\nend = 1.0\noutput_step = 1.0\ntolerance = 1e-6\n'
     )
     scene = load_scene(path)
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     motion = Motion(*rng.uniform(-1, 1, (4, STATES, model.tree.n_v)))
     return urdf, MultibodySystem(model), motion
 

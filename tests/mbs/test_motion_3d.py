@@ -16,7 +16,7 @@ CLOSE = 2e-9  # of the peak: the digits in which two step sizes of the numbers a
 def motion_of(name):
     """The samples of a checkpoint as a motion, its motors between frames: multipliers of paths are their forces."""
     scene, data = checkpoint_scene(name).model_copy(update={"motors": "frame"}), load(name)
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     tree, samples = model.tree, data["samples"]
     time = np.array([sample["t"] for sample in samples])
     q, v = np.zeros((len(time), tree.n_q)), np.zeros((len(time), tree.n_v))

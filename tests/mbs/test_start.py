@@ -18,7 +18,7 @@ from ffrobot.run.bodies import load_bodies
 
 def model_of(name):
     scene = checkpoint_scene(name)
-    return build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    return build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
 
 
 @pytest.mark.parametrize("name", CASES)

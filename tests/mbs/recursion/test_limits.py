@@ -28,7 +28,7 @@ def system_of(joints, bodies, joints_at=None, rates=None, turn=None):
         joint=joints, initial={"joints": joints_at or {}, "joint_rates": rates or {}},
         analysis=[{"name": "free", "kind": "forward", "end": 1.0, "output_step": 0.1}],
     )  # fmt: skip
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     return MultibodySystem(model), initial_state(model, undeformed_posture(model))
 
 
