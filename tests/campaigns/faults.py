@@ -86,7 +86,7 @@ FAULTS = [
     Fault(RECURSION + "numbers/multipliers.h", "      x[r] -= factor[k * m + r] * x[k];",
           "      x[r] -= factor[r * m + k] * x[k];", SPACE),
     Fault(RECURSION + "motion/motion_norm.cpp", "frequency > 0 ? 1 / frequency : 0",
-          "frequency > 0 ? 1 / (frequency * frequency) : 0", MBS + "recursion/test_norm.py"),
+          "frequency > 0 ? 1 / (frequency * frequency) : 0", MBS + "recursion/test_motion.py"),
     Fault(RECURSION + "motion/newton_system.cpp", "f -= factors.S.cwiseProduct(stiff);",
           "f += factors.S.cwiseProduct(stiff);", MBS + "recursion/test_newton.py"),
     Fault(RECURSION + "motion/postures.cpp", "unit[r] = -1;", "unit[r] = 1;", TREE),

@@ -7,6 +7,7 @@ degree 2), and so are gradients. Coordinates of a joint, of sections against one
 from dataclasses import dataclass, field
 
 import numpy as np
+from rotations import rotation
 
 from ffrobot.mbs import _core
 
@@ -89,12 +90,6 @@ def about(axis, angle):
     R[:, i, i] = R[:, j, j] = c.c
     R[:, i, j], R[:, j, i] = -s.c, s.c
     return Series(R)
-
-
-def quaternion_matrix(e):
-    w, v = e[0], np.array(e[1:])
-    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-    return (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
 
 
 @dataclass
@@ -221,7 +216,7 @@ class Mechanism:
         turn, way = Series.constant(np.eye(3)), None
         if kind in (J.spherical, J.free):
             linear = 3 if kind == J.free else 0
-            turn = Series.constant(quaternion_matrix(q[linear:])) @ exponential(stacked(z[linear : linear + 3]))
+            turn = Series.constant(rotation(q[linear:])) @ exponential(stacked(z[linear : linear + 3]))
             if linear:
                 way = stacked([z[k] + q[k] for k in range(3)])
         else:

@@ -7,7 +7,6 @@ from mechanisms import checked_scene, make_model, pcid, relative, revolute
 from oracle_runs import joint_forces, run
 from rods import rod
 
-from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.operating_points import Static
 
@@ -61,20 +60,6 @@ def test_equilibrium_knows_neither_rotors_nor_friction():
     without = run(geared_arm(None, {}, {}, **keys), static)
     np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)
     np.testing.assert_allclose(with_them.tau, without.tau, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        ({"rotor_inertia": -1.0}, "a number of at least 0"),
-        ({"gear_ratio": 0.0}, "greater than 0"),
-        ({"friction_speed": 0.1}, "only with coulomb_friction"),
-        ({"type": "weld", "viscous_friction": 1.0}, "in a weld joint"),
-    ],
-)
-def test_bad_keys_are_refused(keys, expected):
-    with pytest.raises(InputError, match=expected):
-        checked_scene([revolute("O", "ground", "a.root") | keys])
 
 
 @pytest.mark.parametrize(("closed", "driven"), [(False, ["O", "A"]), (True, [])])

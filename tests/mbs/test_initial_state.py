@@ -24,10 +24,6 @@ def started(robot):
     return evaluated(robot, 0.0, state.q, state.v)
 
 
-def angle(found, body):
-    return found.q[0, found.coordinates(body)][2]
-
-
 def test_loop_that_cannot_be_closed_is_named():
     joints = [
         revolute("O", "ground", "link1.root"),

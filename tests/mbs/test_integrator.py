@@ -8,7 +8,6 @@ from mechanisms import pcid, relative
 from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs import _core
 from ffrobot.mbs.linear.statics import static_equilibrium
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.start import undeformed_posture
@@ -43,7 +42,7 @@ def test_generalized_alpha_damps_what_steps_do_not_resolve_as_asked(spectral_rad
     start = undeformed_posture(model)
     core, scene, _ = MultibodySystem(model).integrated
     states = states_of_equal_steps(
-        core, scene, _core.MethodKind.generalized_alpha, start.q, start.v, np.linspace(0.0, 0.5, 101), spectral_radius
+        core, scene, "generalized_alpha", start.q, start.v, np.linspace(0.0, 0.5, 101), spectral_radius
     )
     mode = model.tree.nodes[model.tree.index["link1"]].p_q.start
     ringing = np.abs(states[:, mode] - static_equilibrium(model, start).q[mode])

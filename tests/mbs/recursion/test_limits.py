@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from equal_steps import controls
 from scipy.interpolate import CubicHermiteSpline
 from scipy.special import ellipk, ellipkinc
 
@@ -30,13 +31,6 @@ def system_of(joints, bodies, joints_at=None, rates=None, turn=None):
     )  # fmt: skip
     model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     return MultibodySystem(model), initial_state(model, undeformed_posture(model))
-
-
-def controls(name="dop853", tolerance=1e-11, max_steps=0, keep_steps=False):
-    methods = [(getattr(_core.MethodKind, name), 1.0, 0.0)]
-    found = _core.IntegrationControls(tolerance=tolerance, max_steps=max_steps, methods=methods, spectral_radius=0.8)
-    found.keep_steps = keep_steps
-    return found
 
 
 def run(system, start, times, controls, checkpoint=None, is_watched=True):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from equal_steps import controls
 from mechanisms import relative
 from points_3d import J, Mechanism, r
 from random_bodies import ground, random_body, row, state_near_rest, three_links
@@ -12,11 +13,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.fields.orientations import OrientationLaw
 
-DOP853 = [(_core.MethodKind.dop853, 1.0, 0.0)]
-
-
-def controls(tolerance=1e-10, methods=DOP853):
-    return _core.IntegrationControls(tolerance=tolerance, max_steps=0, methods=methods, spectral_radius=0.8)
+OMEGA, FORCE = 30.0, 5.0  # of an oscillator
 
 
 def on(t):
@@ -119,7 +116,7 @@ def test_a_section_follows_an_orientation():
         scene.add_target(parse_expression("0"))
     scene.turn_marker(1, law)
     times = list(np.linspace(0, 0.5, 6))
-    run = _core.tree_motion(model, scene, times, q, v, controls(1e-9), on)
+    run = _core.tree_motion(model, scene, times, q, v, controls(tolerance=1e-9), on)
     assert run.status == _core.IntegrationStatus.completed
     for t, y in zip(times, run.states, strict=True):
         at = y[: model.n_q], y[model.n_q :]
@@ -161,3 +158,28 @@ def test_a_force_that_begins_at_zero_in_a_run_from_before():
     assert np.abs(run.states[:, q] - np.maximum(times, 0) ** 2 * acceleration / 2).max() < 1e-12 * acceleration
     assert np.diff(samples.times).min() > 1e-20
     assert run.evaluations < 2000
+
+
+def body_with_a_mode():
+    """Welded to the ground: p_ddot + ω² p = f."""
+    body, data = _core.SpatialBody(), _core.SpatialData()
+    body.name, body.joint = "oscillator", J.weld
+    data.mass, data.J2 = 2.0, np.diag([0.1, 0.2, 0.3])
+    data.stiffness, data.damping = np.array([OMEGA**2]), np.zeros((1, 1))
+    data.S_bar, data.I_bar = np.zeros((3, 1)), np.zeros((9, 1))
+    marker = _core.SpatialMarker()
+    marker.Phi = np.zeros((6, 1))
+    data.markers = [marker]
+    body.data = data
+    return _core.SpatialModel([body], [_core.SpatialMarker()], [], [], np.zeros(3))
+
+
+def test_sizes_of_a_mode_at_rest_are_those_of_its_force():
+    """With which the norm compares errors, before it has moved much: f/ω², f/ω, f, which f leads to."""
+    scene = _core.TreeScene()
+    scene.add_load(np.array([1.0]), _core.TimeFunction.constant(FORCE))
+    stopped_at, rest, one_step = _core.TreeCheckpoint(), np.zeros(1), controls(tolerance=1e-6, max_steps=1)
+    run = _core.tree_motion(body_with_a_mode(), scene, [0.0, 10.0], rest, rest, one_step, on, stopped_at)
+    assert 0 < run.time_reached < 0.5 / OMEGA  # half a radian: cos 0.5 of the static deflection is left to come
+    of_modes = stopped_at.state_peaks[2::3]  # groups: ways, angles, modes; of states, rates, accelerations
+    np.testing.assert_allclose(of_modes, [FORCE / OMEGA**2, FORCE / OMEGA, FORCE], rtol=1e-12)
