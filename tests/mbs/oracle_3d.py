@@ -6,21 +6,11 @@ sections and joints: docs/theory.md.
 """
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 from rotations import exponential, left_jacobian, left_jacobian_rate, rotation, skew
 from triad_measures import Coordinates, RowState
-
-
-@dataclass
-class Inertia:
-    """s (3,), s_p (3, n), J (3, 3), J_p (3, 3, n) and h (3, n) of a bent body, in body axes."""
-
-    s: np.ndarray
-    s_p: np.ndarray
-    J: np.ndarray
-    J_p: np.ndarray
-    h: np.ndarray
 
 
 def coupling(body):
@@ -30,9 +20,10 @@ def coupling(body):
 
 
 def inertia(body, p):
+    """s (3,), s_p (3, n), J (3, 3), J_p (3, 3, n) and h (3, n) of a bent body, in body axes."""
     S = body.S_bar_kl
     G = np.einsum("ij,kkmn->ijmn", np.eye(3), S) - 0.5 * (S + S.transpose(1, 0, 2, 3))
-    return Inertia(
+    return SimpleNamespace(
         s=body.first_moment + body.S_bar @ p,
         s_p=body.S_bar,
         J=body.inertia + body.inertia_slope @ p + p @ G @ p,

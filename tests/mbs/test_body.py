@@ -1,10 +1,11 @@
-"""What a scene in 3D takes from modal bodies and rigid ones: inertia about the link's axis, files without it."""
+"""Bodies: inertia about the link's axis, files without it, payloads, and what fewer modes keep exactly."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from checkpoint_mechanisms import modal_body
+from links import ritz_link
 from oracle_3d import body_mass_matrix
 from random_mechanisms import random_beam, stiffened
 
@@ -12,6 +13,7 @@ from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential
 from ffrobot.mbs.model.body import bent_section, from_modal_body
 from ffrobot.mbs.model.masses import with_payload
+from ffrobot.mbs.model.truncation import with_fewer_modes
 
 
 def test_straight_line_of_mass_has_inertia_about_its_axis():
@@ -82,3 +84,32 @@ def test_payload_of_a_stiffened_body_moves_to_second_order():
         ):
             more = p_loaded @ found @ p_loaded - p @ given @ p
             np.testing.assert_allclose(more.reshape(-1, 3), weights @ second, atol=1e-5 * np.abs(second).max())
+
+
+POINTS = ["root", "tip"]
+
+
+@pytest.fixture(params=["cantilever", "simply-supported"])
+def whole(request):
+    return ritz_link("link", request.param, modes=8, extra=1, damping_ratio=0.01, stiffening=True)
+
+
+def test_the_coordinates_are_orthonormal_and_uncoupled(whole):
+    body = with_fewer_modes(whole, 3, POINTS)
+    T = body.reduction.T
+    np.testing.assert_allclose(T.T @ T, np.eye(body.n_modes), atol=1e-12)
+    K = T.T @ np.diag(whole.stiffness) @ T
+    np.testing.assert_allclose(K, np.diag(body.stiffness), rtol=0, atol=1e-11 * body.stiffness[-1])
+    assert np.all(T[np.abs(T).argmax(axis=0), np.arange(body.n_modes)] > 0)  # the same sign on every machine
+
+
+def test_equations_are_those_of_the_body_restricted_to_fewer_shapes(whole):
+    body = with_fewer_modes(whole, 3, POINTS)
+    p = 1e-3 * np.random.default_rng(1).normal(size=body.n_modes)
+    T, A = np.zeros((6 + whole.n_modes, 6 + body.n_modes)), exponential(np.array([0.0, 0.0, 0.7]))
+    T[:6, :6], T[6:, 6:] = np.eye(6), body.reduction.T
+    M, M_whole = body_mass_matrix(body, A, p), body_mass_matrix(whole, A, body.reduction.T @ p)
+    np.testing.assert_allclose(M, T.T @ M_whole @ T, atol=1e-12)
+    np.testing.assert_allclose(body.damping, body.reduction.T.T @ whole.damping @ body.reduction.T, atol=1e-12)
+    K_tip, K_of_all = (of.stiffening.K_points["tip"][0] for of in (body, whole))
+    np.testing.assert_allclose(p @ K_tip @ p, (T[6:, 6:] @ p) @ K_of_all @ (T[6:, 6:] @ p), rtol=1e-12)

@@ -60,11 +60,15 @@ def wrench(force=None, moment=None):
 
 
 @dataclass(frozen=True)
-class Along:
-    """The way of b from a along a fixed `direction` in global axes."""
-
+class Row:
     a: object
     b: object
+
+
+@dataclass(frozen=True)
+class Along(Row):
+    """The way of b from a along a fixed `direction` in global axes."""
+
     direction: np.ndarray
 
     def between(self, a, b):
@@ -73,11 +77,9 @@ class Along:
 
 
 @dataclass(frozen=True)
-class Dot:
+class Dot(Row):
     """f·g with f of a, g of b (dot1 of the formulation)."""
 
-    a: object
-    b: object
     f: int
     g: int
 
@@ -89,11 +91,9 @@ class Dot:
 
 
 @dataclass(frozen=True)
-class Way:
+class Way(Row):
     """f·d: how far b is from a along axis f of a (dot2 of the formulation)."""
 
-    a: object
-    b: object
     f: int
 
     def between(self, a, b):
@@ -104,11 +104,9 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Turn:
+class Turn(Row):
     """The angle of b on a about axis f of a, rad, −π … π; the other axes are its neighbours in cyclic order."""
 
-    a: object
-    b: object
     f: int = Z
 
     def between(self, a, b):
@@ -119,12 +117,8 @@ class Turn:
         return Found(value, wrench(None, -f), wrench(None, f), extra)
 
 
-@dataclass(frozen=True)
-class FirstAngle:
+class FirstAngle(Row):
     """α of a universal joint, about x of a: b = a R_x(α) R_y(β)."""
-
-    a: object
-    b: object
 
     def between(self, a, b):
         found = Turn(self.a, self.b, X).between(a, b)
@@ -133,12 +127,8 @@ class FirstAngle:
         return found
 
 
-@dataclass(frozen=True)
-class SecondAngle:
+class SecondAngle(Row):
     """β of a universal joint, about y of b."""
-
-    a: object
-    b: object
 
     def between(self, a, b):
         f, x = b.F[:, Y], a.F[:, X]
@@ -147,11 +137,9 @@ class SecondAngle:
 
 
 @dataclass(frozen=True)
-class Lead:
+class Lead(Row):
     """z·d − hα of a screw, h = lead/2π in m/rad."""
 
-    a: object
-    b: object
     h: float
     turns: float = 0.0  # whole turns that the angle has behind it
 
@@ -166,11 +154,9 @@ class Lead:
 
 
 @dataclass(frozen=True)
-class Spinning:
+class Spinning(Row):
     """N Ω_b − (N − 1) Ω_a along z of a: the spin of a rotor that sits on a behind a gear of ratio N."""
 
-    a: object
-    b: object
     ratio: float
 
     def between(self, a, b):
@@ -181,11 +167,9 @@ class Spinning:
 
 
 @dataclass(frozen=True)
-class Spin:
+class Spin(Row):
     """Along axis f of b, the angular velocity of b less that of a: its rate; there is no such coordinate."""
 
-    a: object
-    b: object
     f: int
 
     def between(self, a, b):
