@@ -9,15 +9,16 @@ import numpy as np
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 NDArray = np.ndarray[Any, np.dtype[Scalar]]  # as numpy.typing has it, which every start would wait for
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]  # float64; NumPy's types leave that open for linspace, inv and quotients
 ComplexArray = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 Indices = NDArray[np.intp]
 Booleans = NDArray[np.bool_]
+PPoly = Any  # scipy.interpolate.PPoly, of which type checkers know nothing, and which a start does not load
 
 
 def as_floats(values: NDArray[np.floating[Any]]) -> Array:
-    """Declare `values` as float64 to the type checker, which NumPy 2 leaves open for linspace, inv and quotients."""
+    """Declare `values` as float64 to the type checker; `Array` takes what NumPy has of floats without it, too."""
     return values.astype(np.float64, copy=False)
 
 
@@ -34,4 +35,4 @@ def as_rows(values: NDArray[Any]) -> list[list[Any]]:
 def null_space(J: Array, tolerance: float) -> Array:
     """Orthonormal columns (k, m) that J (r, k) takes to zero: to `tolerance` of its largest singular value."""
     _, sizes, V = np.linalg.svd(J)
-    return as_floats(V[np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)) :].T)
+    return V[np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)) :].T

@@ -25,7 +25,7 @@ _PIECE = 1 << 20  # read into the same memory again: fresh pages would cost as m
 
 
 def sealed(content: bytes, line: str = _LINE) -> bytes:
-    """Return `content` with its checksum."""
+    """`content` with its checksum."""
     return content + line.format(zlib.crc32(content), len(content)).encode()
 
 

@@ -117,7 +117,7 @@ ELSEWHERE = {
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return ` (did you mean "…"?)`; empty if no known word is close, or begins with this one and an underscore."""
+    """` (did you mean "…"?)`; empty if no known word is close, or begins with this one and an underscore."""
     from difflib import get_close_matches
 
     words = {one.casefold(): one for one in known}
@@ -139,6 +139,6 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def either(words: Iterable[str]) -> str:
-    """Return `"a", "b" or "c"`."""
+    """`"a", "b" or "c"`."""
     *first, last = (f'"{word}"' for word in words)
     return f"{', '.join(first)} or {last}" if first else last

@@ -40,19 +40,16 @@ def open_checked(path: Path) -> h5py.File:
         with blaming(path):
             if state == "none" and checksum.MARK in file.attrs:
                 raise checksum.refuse(path)
-            check_links(file, path)
+            outside = file.id.links.visit(
+                lambda name, info: None if info.type == h5py.h5l.TYPE_HARD else name, info=True
+            )
+            if outside is not None:
+                where = outside.decode(errors="replace")
+                raise InputError(f"{path}: expected members in the file itself", f"a link at {where}")
     except BaseException:
         file.close()
         raise
     return file
-
-
-def check_links(file: h5py.File, path: Path) -> None:
-    """Raise `InputError` where a member of the file is not in the file itself."""
-    outside = file.id.links.visit(lambda name, info: None if info.type == h5py.h5l.TYPE_HARD else name, info=True)
-    if outside is not None:
-        where = outside.decode(errors="replace")
-        raise InputError(f"{path}: expected members in the file itself", f"a link at {where}")
 
 
 @contextmanager
@@ -95,7 +92,7 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
 
 
 def fields_in(values: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
-    """Return the fields of a `record` from a group or attributes. Raises `KeyError` for missing ones.
+    """The fields of a `record` from a group or attributes. Raises `KeyError` for missing ones.
 
     Those with a default may be missing, as they are in files of earlier versions; what is no field is left out.
     """

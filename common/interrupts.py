@@ -26,9 +26,11 @@ class EndOfCommand:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Raise `KeyboardInterrupt`."""
-        self.number = number
-        if _is_importing(frame):
-            os._exit(128 + number)
+        self.number, outer = number, frame
+        while outer is not None:
+            if outer.f_code.co_filename.startswith("<frozen importlib"):
+                os._exit(128 + number)
+            outer = outer.f_back
         signal.default_int_handler(number, frame)
 
 
@@ -73,12 +75,6 @@ def deferred_interrupts() -> Iterator[None]:
             signal.signal(number, handler)
         if arrived:
             signal.raise_signal(arrived[0])
-
-
-def _is_importing(frame: FrameType | None) -> bool:
-    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
-        frame = frame.f_back
-    return frame is not None
 
 
 def _in_main_thread() -> bool:

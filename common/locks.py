@@ -52,7 +52,7 @@ def _locked(descriptor: int, patience: float) -> bool:
 
 
 def this_process() -> str:
-    """Return `HOST-PID-START`, which no other process ever has."""
+    """`HOST-PID-START`, which no other process ever has."""
     return f"{platform.node()}-{os.getpid()}-{_start_of(os.getpid())}"
 
 

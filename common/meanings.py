@@ -347,7 +347,7 @@ remarks | | what the part's file holds and the body does not
 
 
 def meaning(name: str, table: Mapping[str, Meaning] = RESULTS) -> Meaning | None:
-    """Return unit and meaning of a dataset by its name below its analysis, or in its file; None if unknown."""
+    """Unit and meaning of a dataset by its name below its analysis, or in its file; None if unknown."""
     if name in table:
         return table[name]
     return next((one for pattern, one in table.items() if matches(name, pattern)), None)

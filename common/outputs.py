@@ -52,7 +52,7 @@ def check_not_an_input(path: Path) -> None:
 
 
 def check_file_name(text: str) -> Path:
-    """Return `text` as a path. Raises `InputError` unless it can be the name of a regular file."""
+    """`text` as a path. Raises `InputError` unless it can be the name of a regular file."""
     path = Path(text)
     try:
         path.resolve()
@@ -77,7 +77,7 @@ def check_regular(path: Path) -> None:
 
 
 def why_no_file(error: Exception) -> str:
-    """Return why a path cannot be used, from the `error`: too long, circular links, no file name."""
+    """Why a path cannot be used, from the `error`: too long, circular links, no file name."""
     about = getattr(error, "strerror", None) or str(error)
     return "links that lead in a circle" if "loop" in about.lower() or "symbolic" in about else about
 
@@ -92,7 +92,7 @@ def check_same_kind(path: Path, content: bytes) -> None:
 
 
 def kind(content: bytes) -> str:
-    """Return the kind of file from its `content`: for HDF5 with its attribute `format`, for text by its beginning."""
+    """The kind of file from its `content`: for HDF5 with its attribute `format`, for text by its beginning."""
     start = content[:_START]
     if start.startswith(HDF5_SIGNATURE):
         return f"HDF5 {_hdf5_format(BytesIO(content))}"
@@ -109,7 +109,7 @@ def kind(content: bytes) -> str:
 
 
 def kind_of_file(path: Path) -> str:
-    """Return the kind of the file at `path`; see `kind`."""
+    """The kind of the file at `path`; see `kind`."""
     if not path.is_file():
         return "no regular file"  # a device, a socket: a rename would replace it
     try:

@@ -30,7 +30,7 @@ def is_apart() -> bool:
 
 
 def processes() -> int:
-    """Return the number of processes that do the same; 1 without mpirun, and where they work apart."""
+    """The number of processes that do the same; 1 without mpirun, and where they work apart."""
     return 1 if _is_apart else _environment(_SIZES, 1)
 
 
@@ -45,7 +45,7 @@ def is_first() -> bool:
 
 
 def on_first(work: Callable[[], T]) -> T:
-    """Return the result of `work`, done by the first process; its `FfrobotError` is raised on all. Collective."""
+    """The result of `work`, done by the first process; its `FfrobotError` is raised on all. Collective."""
     if processes() == 1:
         return work()
     from mpi4py import MPI

@@ -19,7 +19,7 @@ def largest(time: Array, values: Array) -> tuple[float, float]:
 
 
 def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
-    """Return size and time (s) of the local maximum of |values| (T,) next to values[k]."""
+    """Size and time (s) of the local maximum of |values| (T,) next to values[k]."""
     peak, at = float(abs(values[k])), float(time[k])
     if not 2 <= k < len(values) - 2:
         return peak, at
@@ -39,7 +39,7 @@ def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
 
 
 def shares(time: Array) -> Array:
-    """Return weights of times (T,) in a mean over time, by the trapezoidal rule; 1 for a single one."""
+    """Weights of times (T,) in a mean over time, by the trapezoidal rule; 1 for a single one."""
     if len(time) < 2:
         return np.ones(len(time))
     steps = np.diff(time)
@@ -47,5 +47,5 @@ def shares(time: Array) -> Array:
 
 
 def root_mean_square(time: Array, values: Array) -> float:
-    """Return the root mean square over time of `values` (T,), in their unit."""
+    """The root mean square over time of `values` (T,), in their unit."""
     return float(np.sqrt(shares(time) @ values**2)) if len(values) else 0.0

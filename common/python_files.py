@@ -39,7 +39,7 @@ def allow_python(paths: Iterable[Path]) -> None:
 
 
 def allowed_python() -> tuple[Path, ...]:
-    """Return folders with allowed Python files besides the scene's folder."""
+    """Folders with allowed Python files besides the scene's folder."""
     return _allowed.get()
 
 
@@ -139,7 +139,7 @@ DEPTH = 6  # of functions in functions, lists in lists
 
 
 def digest_of_function(function: object) -> str:
-    """Return a hash of a function: code, constants, defaults, enclosed and global values.
+    """A hash of a function: code, constants, defaults, enclosed and global values.
 
     Of the user's own modules that it names, of their files.
     """

@@ -9,7 +9,7 @@ from math import factorial
 
 import numpy as np
 
-from .arrays import Array, as_floats
+from .arrays import Array
 
 NEAR = 1.0  # rad²: up to here the series below are exact to round-off, from here on closed forms lose no digits
 TERMS = 10  # of the series
@@ -27,12 +27,12 @@ def skew(vectors: Array) -> Array:
 
 
 def exponential(vectors: Array) -> Array:
-    """Return rotation matrices exp φ~ (…, 3, 3) of rotation vectors φ (…, 3), rad."""
+    """Rotation matrices exp φ~ (…, 3, 3) of rotation vectors φ (…, 3), rad."""
     return np.eye(3) + _of_skew(vectors, 1, 2)
 
 
 def left_jacobian(vectors: Array) -> Array:
-    """J_l (…, 3, 3): exp(φ + δφ) = exp(J_l δφ) exp(φ) to first order."""
+    """J_l (…, 3, 3) of rotation vectors φ (…, 3), rad: exp(φ + δφ) = exp(J_l δφ) exp(φ) to first order."""
     return np.eye(3) + _of_skew(vectors, 2, 3)
 
 
@@ -41,7 +41,7 @@ def left_jacobian_slope(vector: Array, of: Array) -> Array:
 
     J_l = I + a φ~ + b φ~², a' and b' by φ².
     """
-    across = as_floats(np.cross(vector, of))
+    across = np.cross(vector, of)
     (a, a_slope), (b, b_slope) = series(2, vector @ vector), series(3, vector @ vector)
     by_size = a_slope * across + b_slope * np.cross(vector, across)
     turning = a * skew(of) + b * (skew(across) + skew(vector) @ skew(of))
@@ -76,7 +76,7 @@ def _closed(m: int, x: Array) -> Array:
         lambda phi: (1 - np.cos(phi)) / x,
         lambda phi: (phi - np.sin(phi)) / (x * phi),
     )
-    return as_floats(of_m[m](phi))
+    return of_m[m](phi)
 
 
 def _of_skew(vectors: Array, first: int, second: int) -> Array:
@@ -129,12 +129,12 @@ def about(axis: int, angles: Array | float) -> Array:
 
 
 def of_rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """R_z(yaw) R_y(pitch) R_x(roll): about fixed axes x, y, z in this order, as in URDF."""
+    """R_z(yaw) R_y(pitch) R_x(roll) (3, 3) of angles, rad, about fixed axes x, y, z in this order, as in URDF."""
     return about(2, yaw) @ about(1, pitch) @ about(0, roll)
 
 
 def rpy_of(C: Array) -> list[float]:
-    """Roll, pitch, yaw about fixed axes of a rotation (3, 3), `of_rpy` back: pitch within ±π/2."""
+    """Roll, pitch, yaw, rad, about fixed axes of a rotation (3, 3), `of_rpy` back: pitch within ±π/2."""
     across = float(np.hypot(C[0, 0], C[1, 0]))
     yaw = float(np.arctan2(C[1, 0], C[0, 0])) if across > 1e-9 else 0.0  # else about the same axis as roll
     B = about(2, yaw).T @ C
@@ -153,7 +153,7 @@ def smallest_turn(axis: Array) -> Array:
     z = unit(np.asarray(axis, dtype=float))
     S, cosine, square = skew(np.cross([0.0, 0.0, 1.0], z)), z[2], z[0] ** 2 + z[1] ** 2  # Rodrigues: S = sin φ n~
     if cosine > 0.0:
-        return as_floats(np.eye(3) + S + S @ S / (1.0 + cosine))
+        return np.eye(3) + S + S @ S / (1.0 + cosine)
     if square == 0.0:
         return np.diag([1.0, -1.0, -1.0])
     return np.eye(3) + S + S @ S * ((1.0 - cosine) / square)
@@ -166,4 +166,4 @@ def in_3d(vectors: Array) -> Array:
 
 def point_inertia(mass: float, place: Array) -> Array:
     """Inertia (3, 3) about the origin, kg·m², of a point mass (kg) at `place` (3,), m."""
-    return as_floats(mass * (place @ place * np.eye(3) - np.outer(place, place)))
+    return mass * (place @ place * np.eye(3) - np.outer(place, place))

@@ -84,7 +84,7 @@ def _is_formula(cell: object) -> bool:
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """Return `body "link1": rigid.mass` for ("body", 0, "rigid", "mass"); alternatives of unions are left out."""
+    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass"); alternatives of unions are left out."""
     path = ""
     here: Any = data
     for k, part in enumerate(loc):
@@ -99,7 +99,7 @@ def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missin
 
 
 def shown(text: str) -> str:
-    """Return `text` in one line of a message, shortened: control characters and line breaks as Python writes them."""
+    """`text` in one line of a message, shortened: control characters and line breaks as Python writes them."""
     text = text if len(text) <= 60 else text[:59] + "…"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 

@@ -35,12 +35,12 @@ class Record(BaseModel):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Return the message for a key that only `others` have; empty to call it an unknown key."""
+        """The message for a key that only `others` have; empty to call it an unknown key."""
         return ""
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """Return the message for a missing `key`; empty if the general one suffices."""
+        """The message for a missing `key`; empty if the general one suffices."""
         return ""
 
 
@@ -130,7 +130,7 @@ def _follows(item: ErrorDetails, within: Collection[tuple[int | str, ...]]) -> b
 
 
 def plain(value: Any, functions: dict[str, object] | None = None) -> Any:
-    """Return `value` in types of TOML: NumPy numbers and arrays, tuples and paths replaced, keys that are None omitted.
+    """`value` in types of TOML: NumPy numbers and arrays, tuples and paths replaced, keys that are None omitted.
 
     Functions go to `functions` under the text that stands for them.
     """
@@ -207,7 +207,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
-        if refusal := _refusal(record, loc, space):
+        if refusal := _own_words(record, loc, space, is_missing=False):
             return _Problem(key_path(loc[:-1], data, kind=""), "", refusal)
         known = _known_keys(_alternatives(record, loc[:-1])[0], space)
         return _Problem(
@@ -218,7 +218,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
     if kind == "missing" and isinstance(loc[-1], int):
         return _Problem(key, f"expected a list of {int(loc[-1]) + 1} entries", f", found {_show(item['input'])}")
     if kind == "missing":
-        if demand := _demand(record, loc):
+        if demand := _own_words(record, loc, space, is_missing=True):
             return _Problem(key_path(loc[:-1], data, kind=""), demand, "")
         return _Problem(key, f"expected {_EXPECTED[kind]}", ", found none")
     value = item["input"]
@@ -284,18 +284,15 @@ def is_key(field: FieldInfo, space: str | None) -> bool:
     return all(space in (None, mark.space) for mark in field.metadata if isinstance(mark, OnlyIn))
 
 
-def _refusal(record: type[BaseModel], loc: Sequence[int | str], space: str | None) -> str:
-    """What a record itself says of the key at `loc`, which it does not have."""
+def _own_words(record: type[BaseModel], loc: Sequence[int | str], space: str | None, *, is_missing: bool) -> str:
+    """What a record itself says of the key at `loc`, which is missing, or which it does not have."""
     (taken, *more), allowed = _alternatives(record, loc[:-1])
+    if more or not issubclass(taken, Record):
+        return ""
+    if is_missing:
+        return taken.demand_key(str(loc[-1]))
     here = [other for other in allowed if issubclass(other, Record) and other.only_in in (None, space)]
-    others = [other for other in here if str(loc[-1]) in _known_keys([other], space)]
-    return taken.refuse_key(str(loc[-1]), others) if not more and issubclass(taken, Record) else ""
-
-
-def _demand(record: type[BaseModel], loc: Sequence[int | str]) -> str:
-    """What a record itself says where its key at `loc` is missing."""
-    (taken, *more), _ = _alternatives(record, loc[:-1])
-    return taken.demand_key(str(loc[-1])) if not more and issubclass(taken, Record) else ""
+    return taken.refuse_key(str(loc[-1]), [other for other in here if str(loc[-1]) in _known_keys([other], space)])
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:

@@ -11,7 +11,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array, Indices, as_floats, as_list
+from ...common.arrays import Array, Indices, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -19,12 +19,11 @@ from ..fields.field_types import Expression, Name
 from ..fields.waypoints import spline
 from ..linear.statics import modal_sizes, static_shapes
 from ..model.body import Body
-from ..model.divided_link import DividedLink
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.system import MultibodySystem
-from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_by, prescribed_motion
+from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_motion
 from ..posture.start import shape_in_redundant_loops
 from ..run.context import Context
 from ..run.record import Prescription, Run, Statistics
@@ -93,7 +92,11 @@ class Fcid(TimedAnalysis):
 
         began = time.perf_counter()
         has_motors = len(model.motor_columns) == freedom
-        motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
+        mechanism = fastest_mechanism(model, has_motors=has_motors)
+        if isinstance(mechanism, _core.PlanarDriven):
+            motion: PrescribedMotion = _core.PlanarPrescribedMotion(mechanism, q)
+        else:
+            motion = _core.SpatialPrescribedMotion(mechanism, q)
 
         def at(times: Array) -> Run:
             states = prescribed_motion(model, motion, sampled(shape, times), times, q[None])._asdict()
@@ -117,8 +120,14 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
     path, whole = context.model.scene.path, context.whole
     bodies = [node.body for node in context.model.tree.nodes]
     if analysis.shape == "given" and whole is not None:
-        links = [node.body for node in whole.model.tree.nodes]
-        return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
+        nodes, links = shape_nodes(analysis), [node.body for node in whole.model.tree.nodes]
+        counts = {body.name: body.n_modes for body in bodies}
+        shape = dict(zip((link.name for link in links), given_shape(path, links, analysis), strict=True))
+        for name, link in whole.divided.items():
+            p = np.column_stack([function.sample(nodes)[0] for function in shape[name]])
+            of_pieces = iter(spline(nodes, p @ link.spread.T))
+            shape |= {piece: [next(of_pieces) for _ in range(counts[piece])] for piece in link.bodies}
+        return [shape[body.name] for body in bodies]
     if analysis.shape == "given":
         return given_shape(path, bodies, analysis)
     if analysis.shape == "static" and any(body.n_modes for body in bodies):
@@ -128,11 +137,11 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
 
 def shape_nodes(analysis: Fcid) -> Array:
     """Times (T,), s, between which shapes are splines."""
-    return as_floats(np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1)))
+    return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
 
 
 def sampled(shape: Shape, times: Array) -> Array:
-    """Return p, ṗ and p̈ (3, T, n), √kg·m and s, of all bodies."""
+    """p, ṗ and p̈ (3, T, n), √kg·m and s, of all bodies."""
     functions = [function for of_body in shape for function in of_body]
     samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
     return np.ascontiguousarray(np.moveaxis(samples, 0, -1))
@@ -160,19 +169,6 @@ def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
             p = np.column_stack([function.sample(nodes)[0] for function in functions])
             shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
     return shape
-
-
-def given_shape_of_pieces(
-    scene_path: Path, bodies: Bodies, analysis: Fcid, links: Bodies, divided: Mapping[str, DividedLink]
-) -> Shape:
-    """Return `given_shape` of the whole `links` in coordinates of `bodies`, the pieces of subdivided links included."""
-    nodes, counts = shape_nodes(analysis), {body.name: body.n_modes for body in bodies}
-    shape = dict(zip((link.name for link in links), given_shape(scene_path, links, analysis), strict=True))
-    for name, link in divided.items():
-        p = np.column_stack([function.sample(nodes)[0] for function in shape[name]])
-        of_pieces = iter(spline(nodes, p @ link.spread.T))
-        shape |= {piece: [next(of_pieces) for _ in range(counts[piece])] for piece in link.bodies}
-    return [shape[body.name] for body in bodies]
 
 
 def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:

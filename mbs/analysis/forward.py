@@ -10,7 +10,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array, as_floats, as_list
+from ...common.arrays import Array, as_list
 from ...common.errors import InputError, either
 from .. import _core
 from ..fields.waypoints import spline
@@ -140,13 +140,13 @@ def _replayed(context: Context, model: Model, source: Run, analysis: Forward) ->
 
 
 def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
-    """Return the effect of a unit command of motors, on sections or frames, and of patches, on link modes."""
+    """The effect of a unit command of motors, on sections or frames, and of patches, on link modes."""
     of_volts = (row for of_link in patches.values() for row in model.modal_directions(of_link.per_volt))
     return (*motor_commands(model), *map(Command, of_volts))
 
 
 def numbers_of_motors(model: Model) -> dict[str, list[int]]:
-    """Return indices of motor coordinates by joint, one joint after the other."""
+    """Indices of motor coordinates by joint, one joint after the other."""
     numbers = count()
     return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
 
@@ -182,13 +182,13 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
 
 
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """Return limits (2, inputs), lowest and highest: motors N·m or N, patches V; infinite if none."""
+    """Limits (2, inputs), lowest and highest: motors N·m or N, patches V; infinite if none."""
     most = largest_moments(model, limits=True)
     return np.hstack([np.stack([-most, most]), joined(patches.values()).range])
 
 
 def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """Return (k, n_v), the current Φ_Vᵀ ṗ of all patches by v, A."""
+    """(k, n_v), the current Φ_Vᵀ ṗ of all patches by v, A."""
     rows = [model.modal_directions(of_link.per_volt) for of_link in patches.values()]
     return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
 
@@ -202,7 +202,7 @@ def _supplied(source: Run, most: Array, patches: Mapping[str, PatchedLink], anal
     times, late = replay_times(source, analysis), np.append(amplifiers.lag, amplifiers.delay)
     step = min(float(late[late > 0.0].min(initial=np.inf)), analysis.output_step) / STEPS
     count = int(np.clip(np.ceil(np.ptp(times) / step), 1, MOST_STEPS))
-    grid, closer = as_floats(np.linspace(times[0], times[-1], count + 1)), source.closer
+    grid, closer = np.linspace(times[0], times[-1], count + 1), source.closer
     current = closer.v @ strain_directions(source.model, patches).T
     strain = np.stack([np.interp(grid, closer.time, of) for of in current.T], axis=1)
     V = amplifiers.output(grid, forces.sample(as_list(grid))[:, len(most) :], strain)
@@ -212,7 +212,7 @@ def _supplied(source: Run, most: Array, patches: Mapping[str, PatchedLink], anal
 
 
 def largest_moments(model: Model, *, limits: bool) -> Array:
-    """Return torque limits (motors,), N·m or N; infinite if `limits` is False."""
+    """Torque limits (motors,), N·m or N; infinite if `limits` is False."""
     joints = {joint.name: joint for joint in model.scene.joint}
     most = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
     return most if limits else np.full_like(most, np.inf)

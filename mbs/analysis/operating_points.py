@@ -17,7 +17,7 @@ from ...common.structs import struct
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative, PointReference
 from ..linear.joint_conditions import JointCondition, joint_conditions, robot_modes
-from ..linear.linearisation import LinearEquations, LinearMechanism
+from ..linear.linearisation import LinearEquations
 from ..linear.statics import Statics
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model
@@ -114,13 +114,20 @@ class OperatingPoints(NamedTuple):
 
 
 def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Run, OperatingPoints]:
-    """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
+    """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states.
+
+    In the equilibrium motors keep the initial posture where nothing is followed.
+    """
     if analysis.source is None:
-        run = _equilibrium(context, analysis)
-        return run, linear_states(context.model, run, [0])
+        model = context.model
+        if not any(row.is_trajectory for row in model.rows):
+            rows = (*model.rows, *locked_motors(model, undeformed_posture(model).q))
+            context = replace(context, model=replace(model, rows=rows))
+        run = run_static(context, analysis)
+        return run, linear_states(model, run, [0])
     source = context.outcomes[analysis.source]
-    rows = [row_at(context.model.scene.path, analysis, source, float(t)) for t in analysis.times]
-    return of_earlier(source, analysis).at(rows), linear_states(context.model, source, rows)
+    at = [row_at(context.model.scene.path, analysis, source, float(t)) for t in analysis.times]
+    return of_earlier(source, analysis).at(at), linear_states(context.model, source, at)
 
 
 def linear_states(model: Model, source: Run, rows: Sequence[int]) -> OperatingPoints:
@@ -141,17 +148,14 @@ def open_loop_growth(run: Run) -> float:
     rows = [int(np.abs(run.time - t).argmin()) for t in np.linspace(first, last, INSTANTS)]
     try:
         model, *states = linear_states(run.model, run, rows)
-        equations = LinearEquations(model, states[1][0])
-        growth = [_growth(equations.at(float(t), q, v, a)) for t, q, v, a in zip(*states, strict=True)]
+        equations, growth = LinearEquations(model, states[1][0]), list[float]()
+        for t, q, v, a in zip(*states, strict=True):
+            at = equations.at(float(t), q, v, a)
+            back = np.linalg.inv(np.linalg.cholesky(at.M)).T
+            growth.append(robot_modes(back.T @ at.K @ back, back.T @ at.D @ back, back, at.transformation).growth)
     except (InputError, SolveError):
         return float("nan")
     return float(np.mean([*growth[:-1], *growth[1:]]))  # the trapezoidal rule
-
-
-def _growth(mechanism: LinearMechanism) -> float:
-    back = np.linalg.inv(np.linalg.cholesky(mechanism.M)).T
-    K, D = (back.T @ matrix @ back for matrix in (mechanism.K, mechanism.D))
-    return robot_modes(K, D, back, mechanism.transformation).growth
 
 
 def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = False) -> dict[str, str]:
@@ -189,16 +193,6 @@ def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
             f"{t:g}",
         )
     return row
-
-
-def _equilibrium(context: Context, analysis: Analysis) -> Run:
-    """Static; where nothing is followed, motors keep the initial posture."""
-    model = context.model
-    if not any(row.is_trajectory for row in model.rows):
-        context = replace(
-            context, model=replace(model, rows=(*model.rows, *locked_motors(model, undeformed_posture(model).q)))
-        )
-    return run_static(context, analysis)
 
 
 def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:

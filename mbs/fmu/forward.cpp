@@ -36,6 +36,15 @@ fmi2Status fail(fmi2Component c, const std::string &message) {
   return fail(instance->callbacks, instance->name, message);
 }
 
+// What `work` returns of an instance; its exceptions are messages that begin with the name of the function.
+template <class Work> fmi2Status guarded(fmi2Component c, const char *function, Work work) {
+  try {
+    return work(*static_cast<Instance *>(c));
+  } catch (const std::exception &error) {
+    return fail(c, std::string(function) + ": " + error.what());
+  }
+}
+
 int digit(char c) { return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c - 'A' + 10; }
 
 // The folder that a URI of the scheme file names (RFC 8089): "file:/x", "file:///x", with %-escapes.
@@ -133,31 +142,25 @@ FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component) { return fmi2OK
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component) { return fmi2OK; }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
-  auto *instance = static_cast<Instance *>(c);
-  try {
-    instance->motion = std::make_unique<ForwardMotion>(instance->model);
+  return guarded(c, "fmi2Reset", [](Instance &instance) {
+    instance.motion = std::make_unique<ForwardMotion>(instance.model);
     return fmi2OK;
-  } catch (const std::exception &error) {
-    return fail(c, std::string("fmi2Reset: ") + error.what());
-  }
+  });
 }
 
 // ---- values ----
 
 FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real value[]) {
-  auto *instance = static_cast<Instance *>(c);
-  ForwardMotion &motion = *instance->motion;
-  const std::size_t n_u = motion.inputs().size();
-  try {
+  return guarded(c, "fmi2GetReal", [&](Instance &instance) {
+    ForwardMotion &motion = *instance.motion;
+    const std::size_t n_u = motion.inputs().size();
     for (size_t i = 0; i < n; ++i) {
       if (r[i] >= n_u + motion.output_count())
-        return fail(c, "fmi2GetReal: expected a value reference of modelDescription.xml, found another");
+        throw std::runtime_error("expected a value reference of modelDescription.xml, found another");
       value[i] = r[i] < n_u ? motion.inputs()[r[i]] : motion.outputs()[r[i] - n_u];
     }
     return fmi2OK;
-  } catch (const std::exception &error) {
-    return fail(c, std::string("fmi2GetReal: ") + error.what());
-  }
+  });
 }
 
 FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real value[]) {
@@ -185,19 +188,14 @@ NONE_OF(String)
 // ---- co-simulation ----
 
 FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean) {
-  auto *instance = static_cast<Instance *>(c);
-  if (!(h >= 0 && std::isfinite(h) && std::isfinite(time)))
-    return fail(c, "fmi2DoStep: expected a step of zero or more seconds");
-  if (h == 0)
+  return guarded(c, "fmi2DoStep", [&](Instance &instance) {
+    if (!(h >= 0 && std::isfinite(h) && std::isfinite(time)))
+      throw std::runtime_error("expected a step of zero or more seconds");
+    const auto status = h == 0 ? IntegrationStatus::completed : instance.motion->step(time, h);
+    if (status != IntegrationStatus::completed)
+      throw std::runtime_error("at t = " + std::to_string(time) + " s: " + in_words(status));
     return fmi2OK;
-  try {
-    const IntegrationStatus status = instance->motion->step(time, h);
-    if (status == IntegrationStatus::completed)
-      return fmi2OK;
-    return fail(c, "fmi2DoStep: at t = " + std::to_string(time) + " s: " + in_words(status));
-  } catch (const std::exception &error) {
-    return fail(c, std::string("fmi2DoStep: ") + error.what());
-  }
+  });
 }
 
 FMI2_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
@@ -225,27 +223,23 @@ NO_STATUS(fmi2GetStringStatus, fmi2String)
 // ---- states that are kept ----
 
 FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
-  try {
-    ForwardState now = static_cast<Instance *>(c)->motion->state();
+  return guarded(c, "fmi2GetFMUstate", [&](Instance &instance) {
+    ForwardState now = instance.motion->state();
     if (*state) // of an earlier call, to be written over
       *static_cast<ForwardState *>(*state) = std::move(now);
     else
       *state = new ForwardState(std::move(now));
     return fmi2OK;
-  } catch (const std::exception &error) {
-    return fail(c, std::string("fmi2GetFMUstate: ") + error.what());
-  }
+  });
 }
 
 FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
-  if (!state)
-    return fail(c, "fmi2SetFMUstate: expected a state of fmi2GetFMUstate, found none");
-  try {
-    static_cast<Instance *>(c)->motion->bring_back(*static_cast<const ForwardState *>(state));
+  return guarded(c, "fmi2SetFMUstate", [&](Instance &instance) {
+    if (!state)
+      throw std::runtime_error("expected a state of fmi2GetFMUstate, found none");
+    instance.motion->bring_back(*static_cast<const ForwardState *>(state));
     return fmi2OK;
-  } catch (const std::exception &error) {
-    return fail(c, std::string("fmi2SetFMUstate: ") + error.what());
-  }
+  });
 }
 
 FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *state) {

@@ -11,17 +11,13 @@ p̈ for a moment, as where a zero passes through infinity.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import comb
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, PPoly
 from ...common.libraries import scipy
 from ...common.structs import struct
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 STAGES = 4
 MOST_ITERATIONS = 25
@@ -59,16 +55,6 @@ def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
     stage_once = c[:, None] ** (m + 1) * once @ to_powers
     stage_twice = c[:, None] ** (m + 2) * twice @ to_powers if of_second_order else stage_once @ stage_once
     return Scheme(c, to_powers, stage_once, stage_twice, once @ to_powers, twice @ to_powers)
-
-
-def bernstein_integral(scheme: Scheme) -> Array:
-    """Return Bernstein coefficients (s + 1, s) on [0, 1] of the integral of a polynomial, by its values at c."""
-    s = len(scheme.c)
-    m = np.arange(s)
-    powers = scheme.to_powers / (m[:, None] + 1)  # of ξ, ξ² …, ξ^s
-    shares: Array = np.array([[comb(i, k + 1) / comb(s, k + 1) for k in m] for i in range(s + 1)])
-    integral: Array = shares @ powers
-    return integral
 
 
 GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)
@@ -143,8 +129,8 @@ def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tupl
     return p_stages, v[:-1, None] + step * once
 
 
-def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> scipy.interpolate.PPoly:
-    """Return p(t) (n,) from p, ṗ (N + 1, n) at the `breaks` (N + 1,), s, and p̈ at the stages, K (N, s, n)."""
+def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
+    """p(t) (n,) from p, ṗ (N + 1, n) at the `breaks` (N + 1,), s, and p̈ at the stages, K (N, s, n)."""
     h = np.diff(breaks)[:, None]
     powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
@@ -178,12 +164,6 @@ class Elimination:
         once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (self.scheme.end_once, self.scheme.end_twice))
         return p + h * v + h**2 * twice, v + h * once
 
-    def continuity(self) -> Array:
-        """Y (N, 2n, 2n): (p, ṗ) at the ends of intervals by those at their starts."""
-        unit = np.eye(self.G.shape[2])
-        p, v = np.split(unit, 2)
-        return np.concatenate(self.at_end(p, v, self.response), axis=1)
-
 
 class _LinearSystem:
     """Newton's equations: stages eliminated interval by interval, then a banded system for the values at breaks."""
@@ -192,26 +172,22 @@ class _LinearSystem:
         self.problem, n = problem, len(problem.scale)
         self.stages = Elimination(problem.scheme, np.diff(breaks), derivatives)
         self.S = np.concatenate([problem.scale, np.ones(n)])
-        Y = self.stages.continuity()
+        p, v = np.split(np.eye(2 * n), 2)
+        Y = np.concatenate(self.stages.at_end(p, v, self.stages.response), axis=1)
         blocks = np.concatenate([Y, -np.broadcast_to(np.eye(2 * n), Y.shape)], axis=2)
         blocks = self.S[:, None] * blocks / np.tile(self.S, 2)
-        self.boundary = [problem.start.rows / self.S, problem.end.rows / self.S]
-        self.n_start = len(problem.start.rows)
-        self.lower, self.upper = self.n_start + 2 * n - 1, 4 * n - 1 - self.n_start
-        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(self._banded(blocks), self.lower, self.upper)
-        self.singular = info != 0
-
-    def _banded(self, blocks: Array) -> Array:
-        """Rows: conditions at the start, continuity at the end of each interval, conditions at the end (LAPACK gb)."""
-        N, size = blocks.shape[:2]
-        band = np.zeros((2 * self.lower + self.upper + 1, (N + 1) * size))
-        for k, rows, first in ((0, self.boundary[0], 0), (N, self.boundary[1], self.n_start)):
+        first = len(problem.start.rows)
+        self.lower, self.upper = first + 2 * n - 1, 4 * n - 1 - first
+        # Conditions at the start, continuity at the end of each interval, conditions at the end, as LAPACK has bands
+        (N, size), diagonal = blocks.shape[:2], self.lower + self.upper
+        band = np.zeros((self.lower + diagonal + 1, (N + 1) * size))
+        for k, rows, row in ((0, problem.start.rows / self.S, 0), (N, problem.end.rows / self.S, first)):
             i, j = np.indices(rows.shape)
-            band[self.lower + self.upper + first + i - j, size * k + j] = rows
+            band[diagonal + row + i - j, size * k + j] = rows
         i, j = np.indices(blocks.shape[1:])
         columns = size * np.arange(N)[:, None, None] + j
-        band[np.broadcast_to(self.lower + self.upper + self.n_start + i - j, columns.shape), columns] = blocks
-        return band
+        band[np.broadcast_to(diagonal + first + i - j, columns.shape), columns] = blocks
+        self.lu, self.pivots, _ = scipy.linalg.lapack.dgbtrf(band, self.lower, self.upper)
 
     def solve(self, r: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array, Array]:
         """Steps of p, ṗ at the breaks and of K at the stages."""

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_floats, as_list
+from ...common.arrays import Array, PPoly, as_list
 from ...common.errors import InputError, SolveError
 from ...common.keys import MOST_OUTPUTS
 from ...common.structs import struct
+from .._core import TimeFunction
 from ..fields.field_types import NotNegative
 from ..fields.functions import check_domain
 from ..fields.waypoints import spline
@@ -31,13 +31,9 @@ from ..run.context import Context
 from ..run.integrators import Choice
 from ..run.record import ADVICE, Details, Prescription, Run, Statistics
 from ..scene.analysis import Analysis, Check, Robustness, TimedAnalysis, output_times
-from ..scene.mechanism import MechanismScene
 from .servo import Servo, Stopped, make_servo
-from .stable_inversion import Inversion, invert, shape_of
+from .stable_inversion import Inversion, invert
 from .zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 INFINITE = (
@@ -80,33 +76,31 @@ def describe_zeros(linear: Linearisation) -> str:
 
 def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
     """Raise `InputError` for a path that moves at one of the `ends` (s), where the robot has to be at rest."""
-    for target in servo.targets():
-        values = target.function.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
-        largest = float(np.abs(values).max())
+    targets = [(path.name, *target) for path in servo.model.scene.trajectory for target in path.targets]
+    for name, component, function in targets:
+        largest = float(np.abs(function.sample(np.linspace(0.0, analysis.end, 101))[0]).max())
         for t in ends:
-            rate = target.function(t)[1]
+            rate = function(t)[1]
             if abs(rate) * analysis.end > REST * largest:
                 raise InputError(
-                    f'{servo.where}: trajectory "{target.owner}": {target.component}: expected a path at rest at t ='
+                    f'{servo.where}: trajectory "{name}": {component}: expected a path at rest at t ='
                     f' {t:g} s, before or after which "{analysis.name}" holds it',
                     f"the rate {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does",
                 )
 
 
-def decay_times(linear: Linearisation, end: float, *, needs_future: bool) -> tuple[float, float]:
-    """Times (s) in which the zero dynamics dies out before and after the path, which ends at `end`."""
-    first, last, light = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0]
+def decay_times(linear: Linearisation, *, needs_future: bool) -> tuple[float, float]:
+    """Times (s) in which the zero dynamics dies out before and after the path."""
+    first, last, light, end = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0], float(linear.times[-1])
     is_ahead = linear.is_future[0] & (first > 0)
     grow, growing_vibrations, decay = first[is_ahead & ~light], first[is_ahead & light], -last[last < 0]
     pre = max(DECAY / grow.min(initial=np.inf), min(DECAY / growing_vibrations.min(initial=np.inf), end))
     return pre, min(DECAY / decay.min(initial=np.inf), end) if needs_future else 0.0
 
 
-def durations(
-    linear: Linearisation, given: tuple[float | None, float | None], step: float, *, needs_future: bool
-) -> tuple[float, float]:
-    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
-    automatic = decay_times(linear, float(linear.times[-1]), needs_future=needs_future)
+def durations(linear: Linearisation, given: tuple[float | None, float | None], step: float) -> tuple[float, float]:
+    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps (s)."""
+    automatic = decay_times(linear, needs_future=bool(linear.is_future[0].any()))
     chosen = (duration if value is None else value for value, duration in zip(given, automatic, strict=True))
     before, after = (math.ceil(time / step - 1e-9) * step for time in chosen)
     return before, after
@@ -191,13 +185,14 @@ class MotorsOnly(TimedAnalysis):
 
         refuse_prescribed_motors(model, self)
         try:
-            servo, linear = choose_output(partial(make_servo, model, self.end, place, progress), self)
-            needs_future = bool(linear.is_future[0].any())
-            check_rest(servo, self, rests(self, needs_future))
-            given = self.pre_actuation, self.post_actuation
-            pre, post = durations(linear, given, self.output_step, needs_future=needs_future)
+            servo, linear = _choose_output(make_servo(model, self.end, place, progress), self)
+            is_at_rest_later = linear.is_future[0].any() or self.post_actuation
+            check_rest(servo, self, [0.0, self.end] if is_at_rest_later else [0.0])
+            pre, post = durations(linear, (self.pre_actuation, self.post_actuation), self.output_step)
             times = output_times(self.end, self.output_step, pre, post)
-            _check_loads(model.scene, times)
+            for k, load in enumerate(model.scene.load, 1):  # a scene does not know its pre-actuation
+                for component, function in load.components.items():
+                    check_domain(function, times, f"{model.scene.path}: load no. {k}: {component}", 0)
             inversion = invert(servo, linear, pre, post, self.tolerance, progress)
         except Stopped:
             raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
@@ -206,18 +201,10 @@ class MotorsOnly(TimedAnalysis):
         if not len(run.time):
             raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
         seconds = time.perf_counter() - began
-
         around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
         statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
         run = replace(run, details=around, statistics=statistics)
         return run.with_look(lambda between: replace(_run(self, model, inversion, between), details=around))
-
-
-def _check_loads(scene: MechanismScene, times: Array) -> None:
-    """Raise `InputError` for a load without a value at `times` (T,), s: a scene does not know its pre-actuation."""
-    for k, load in enumerate(scene.load, 1):
-        for component, function in load.components.items():
-            check_domain(function, times, f"{scene.path}: load no. {k}: {component}", 0)
 
 
 def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Run:
@@ -236,11 +223,16 @@ def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array)
 def outcome_along(
     curve: PPoly, servo: Servo, analysis: Analysis, model: Model, statistics: Statistics, times: Array
 ) -> Run:
-    """The motion whose modes follow the curve, at `times` (T,), up to the first without a posture."""
+    """The motion whose modes follow `curve` (n,), m·√kg, at `times` (T,), s, up to the first without a posture."""
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
     states = servo.motion.motion(as_list(times), *modes, servo.postures(times))
     is_met = np.isfinite(states.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
+    columns = iter(curve.c.transpose(2, 1, 0))
+    shape = [
+        [TimeFunction.polynomial(curve.x, np.ascontiguousarray(next(columns))) for _ in range(node.body.n_modes)]
+        for node in servo.model.tree.nodes
+    ]
     return Run(
         analysis=analysis,
         model=model.without_paths(),
@@ -251,7 +243,7 @@ def outcome_along(
         multipliers=states.loops,
         required=states.required,
         statistics=statistics,
-        prescribed=Prescription(servo.equations, shape_of(curve, servo.mode_counts), servo.near[0], breaks=curve.x),
+        prescribed=Prescription(servo.equations, shape, servo.near[0], breaks=curve.x),
     ).at(kept)
 
 
@@ -273,31 +265,36 @@ def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
     )
 
 
-def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
+def _choose_output(servo: Servo, analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
     """Choose the output to follow the path: the scene's, or the minimum-phase one nearest to the point itself.
 
-    `make` gives the output of a factor.
+    Raises `InputError` where some time of the path the motors cannot accelerate it.
     """
-    end = analysis.end
+    end, where = analysis.end, servo.where
     if analysis.output == "tip" or analysis.factor is not None:
-        servo = make(1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
+        servo = servo if analysis.output == "tip" else replace(servo, factor=float(analysis.factor or 0.0))
         linear = linearise(servo, end)
-        _check_relative_degree(servo, linear)
+        values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
+        worst = int((values[:, -1] / values[:, 0]).argmin())
+        if values[worst, -1] < SINGULAR * values[worst, 0]:
+            raise InputError(
+                f"{where}: expected motors that accelerate every component of the path",
+                f"at t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}",
+            )
         if analysis.output == "redefined" and not is_minimum_phase(linear):
             raise InputError(
-                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward",
+                f"{where}: factor: expected one whose output is minimum phase, since it is integrated forward",
                 f"{analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a smaller"
                 ' factor, leave it out, or use output = "tip"',
             )
         return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
-    joints = make(0.0)
     for k in range(round(1 / FACTOR_STEP) + 1):
-        servo = replace(joints, factor=max(0.0, 1.0 - k * FACTOR_STEP))
+        servo = replace(servo, factor=max(0.0, 1.0 - k * FACTOR_STEP))
         linear = linearise(servo, end, samples=2)
         if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
             return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), end)
     raise InputError(
-        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined"',
+        f'{where}: output: expected a robot whose joint motion is minimum phase for "redefined"',
         f"zeros in the right half plane even then: {describe_zeros(linear)}",
     )
 
@@ -307,24 +304,8 @@ def _with_expected_deflections(servo: Servo, end: float) -> tuple[Servo, Lineari
 
     A function of time alone: it changes the output's target, not its zeros.
     """
-    times = as_floats(np.linspace(0.0, end, SAMPLES))
+    times = np.linspace(0.0, end, SAMPLES)
     sag = shape_along(replace(servo, factor=1.0), times)
     offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
     servo = replace(servo, offset=tuple(offset))
     return servo, linearise(servo, end)
-
-
-def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
-    """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
-    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
-    worst = int((values[:, -1] / values[:, 0]).argmin())
-    if values[worst, -1] < SINGULAR * values[worst, 0]:
-        raise InputError(
-            f"{servo.where}: expected motors that accelerate every component of the path",
-            f"at t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}",
-        )
-
-
-def rests(analysis: MotorsOnly, needs_future: bool) -> list[float]:
-    """Times (s) at which motors alone need the robot at rest."""
-    return [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]

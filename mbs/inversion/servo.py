@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats, as_list
+from ...common.arrays import Array, Indices, as_list
 from ...common.errors import InputError
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -33,14 +32,6 @@ MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
 
 class Stopped(Exception):  # noqa: N818 (nothing is wrong)
     """An observer of the solution asked to stop."""
-
-
-class Target(NamedTuple):
-    """A function of time of a path: the trajectory that it is of, its component, and itself."""
-
-    owner: str
-    component: str
-    function: TimeFunction
 
 
 @struct
@@ -72,11 +63,6 @@ class Servo:
         """Modal coordinates p (n,), m·√kg, that bend a link by about its length."""
         return modal_sizes(node.body for node in self.model.tree.nodes)
 
-    @property
-    def mode_counts(self) -> list[int]:
-        """Number of modes by body of the tree."""
-        return [node.body.n_modes for node in self.model.tree.nodes]
-
     @cached_property
     def doubt(self) -> str:
         """Message on the worst posture along the path; empty if all are regular."""
@@ -84,19 +70,13 @@ class Servo:
         ratio, worst = worst_posture(self.model, times, near)
         return describe_posture(self.model, ratio, float(times[worst]), near[worst], is_end=False)
 
-    def targets(self) -> Iterator[Target]:
-        """Yield the functions that the path follows."""
-        for path in self.model.scene.trajectory:
-            for component, function in path.targets:
-                yield Target(path.name, component, function)
-
     @property
     def functions(self) -> list[TimeFunction]:
-        """Functions of time that the path follows."""
-        return [target.function for target in self.targets()]
+        """Functions of time, s, that the path follows: m, rad."""
+        return [function for path in self.model.scene.trajectory for _, function in path.targets]
 
     def slowed(self, factor: float) -> Servo:
-        """Return the path in `factor` times the time, by quintic Hermite pieces."""
+        """The robot on the path in `factor` times the time, by quintic Hermite pieces."""
         times = self.end * np.linspace(0.0, 1.0, PIECES + 1)
         inside = times.clip(TINY * self.end, (1.0 - TINY) * self.end)  # outside it rests
 
@@ -109,37 +89,36 @@ class Servo:
 
     @cached_property
     def motion(self) -> PrescribedMotion:
-        """Return motor coordinates of the path for given p(t), with deflections `factor` p + `offset`."""
+        """Motor coordinates of the path for given p(t), with deflections `factor` p + `offset`."""
         path = fastest_mechanism(self.model)
         if isinstance(path, _core.SpatialDriven):
             return self.equations()
         motion = _core.PlanarPrescribedMotion(path, self.near[0])
-        if self._is_redefined:
+        if self.factor != 1.0 or self.offset:
             motion = _core.PlanarRedefinedMotion(path, path, self.near[0], self.factor, list(self.offset))
         motion.hold_loads(0.0, self.end)
         return motion
 
     def equations(self) -> _core.SpatialPrescribedMotion:
-        """Return a new copy of the 3D equations."""
+        """A new copy of the 3D equations."""
         path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
-        if self._is_redefined:
+        if self.factor != 1.0 or self.offset:
             has_loops = self.model.loop_rows.any()
             driven = driven_mechanism(following_motors(self.model)) if has_loops else path
             motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
         motion.hold_loads(0.0, self.end)
         return motion
 
-    @property
-    def _is_redefined(self) -> bool:
-        return self.factor != 1.0 or bool(self.offset)
-
     def postures(self, times: Array) -> Array:
-        """Return postures (T, n_q) of the path without deflections, nearest to `times` (T,), s."""
+        """Postures (T, n_q) of the path without deflections, nearest to `times` (T,), s."""
         return self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
-        """Modal forces r (N, n), N/√kg, that motors do not supply; NaN without a posture. Raises `Stopped`."""
+        """Modal forces r (N, n), N/√kg, that motors do not supply at `times` (N,), s; NaN without a posture.
+
+        p, ṗ and p̈ are v and a: (N, n), m·√kg and s. Raises `Stopped`.
+        """
         r, near = np.zeros_like(p), self.postures(times)
         for k in range(0, len(times), MOST_STATES):
             if not self.goes_on():
@@ -149,12 +128,12 @@ class Servo:
         return r
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """Return residuals r (N, n) and motor torques τ (N, motors), N·m or N."""
+        """`residuals` r (N, n), N/√kg, and motor torques τ (N, motors), N·m or N."""
         states = self.motion.motion(as_list(times), p, v, a, self.postures(times))
         return states.left[:, self.of_modes], states.tau
 
     def quasi_static(self, times: Array, p: Array) -> Array:
-        """Return motor torques (N, motors), N·m or N, for shapes p (N, n) at rest relative to the links."""
+        """Motor torques (N, motors), N·m or N, at `times` (N,), s, for shapes p (N, n), m·√kg, that do not change."""
         return self.forces(times, p, 0 * p, 0 * p)[1]
 
     @cached_property
@@ -163,17 +142,15 @@ class Servo:
         return np.flatnonzero(~self.model.tree.joint_columns)
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""
+        """Derivatives (N, n + motors, n), SI units, of (r, τ) as `forces` has them by p̈, ṗ and p."""
         return left_slopes(self.model, self.motion, (p, v, a), times, self.postures(times))
 
 
-def make_servo(
-    model: Model, end: float, where: str, goes_on: Callable[[], bool], factor: float, kind: str = "motors-only"
-) -> Servo:
-    """The equations for a path that is held before 0 and after `end`.
+def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool], kind: str = "motors-only") -> Servo:
+    """The robot under a path that is held before 0 and after `end` (s), whose own points are the output.
 
-    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
-    for a path that jumps, or that the undeformed robot cannot follow; `Stopped`.
+    `where` and `kind` are for messages. Raises `InputError` unless there are as many motors and specified components as
+    degrees of freedom, and modes, and for a path that jumps, or that the undeformed robot cannot follow; `Stopped`.
     """
     rows = tuple(_with_functions(row, lambda function: function.held(0.0, end)) for row in model.rows)
     held = replace(model, rows=rows)
@@ -198,11 +175,11 @@ def make_servo(
         check_smooth(model.scene.path, targets, end)
     if not goes_on():
         raise Stopped
-    times = as_floats(np.linspace(0.0, end, POSTURES))
-    servo = Servo(held, end, factor, times, start[None], where=where, goes_on=goes_on)
+    times = np.linspace(0.0, end, POSTURES)
+    servo = Servo(held, end, 1.0, times, start[None], where=where, goes_on=goes_on)
     modes = np.tile(np.concatenate([start[node.p_q] for node in model.tree.nodes]), (POSTURES, 1))
     rest = np.zeros_like(modes)
-    near: Array = replace(servo, factor=1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q
+    near: Array = servo.motion.motion(as_list(times), modes, rest, rest, start[None]).q
     for k in np.flatnonzero(~np.isfinite(near).all(axis=1)):  # where rates have no limits, as in singular postures
         q = held.constraints.posture(near[k - 1] if k else start, float(times[k]))
         if q is None:

@@ -9,24 +9,20 @@ initial value problem, solved window by window, each with intervals as short as 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING
+from itertools import pairwise
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, ComplexArray, as_floats
+from ...common.arrays import Array, Booleans, ComplexArray, PPoly
 from ...common.errors import SolveError
 from ...common.libraries import scipy
 from ...common.structs import struct
 from .. import _core
 from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
 from .servo import Servo, Stopped
-from .zero_dynamics import LinearDynamics, Linearisation, equilibrium, first_order, linear_dynamics
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
+from .zero_dynamics import Linearisation, equilibrium, first_order, linear_dynamics
 
 FIRST_INTERVALS = 24  # of each of: before, on and after the path
 WINDOW = 32  # intervals integrated forward at once
@@ -64,20 +60,12 @@ class Inversion:
     off_rest: float
 
 
-def shape_of(curve: PPoly, counts: Sequence[int]) -> list[list[_core.TimeFunction]]:
-    """Functions p_k(t) of each body, for the core; `counts` of modes by body."""
-    columns = iter(curve.c.transpose(2, 1, 0))
-    return [
-        [_core.TimeFunction.polynomial(curve.x, np.ascontiguousarray(next(columns))) for _ in range(count)]
-        for count in counts
-    ]
-
-
 def invert(
     servo: Servo, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
 ) -> Inversion:
-    """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] until the error between breaks is below `tolerance`.
+    """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] (s) until the error between breaks is below `tolerance`.
 
+    That is a share of the largest elastic force. `progress` of the time reached (s) says whether to go on.
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
     """
     end = float(linear.times[-1])
@@ -87,17 +75,15 @@ def invert(
     schemes = [OF_SECOND_ORDER] if not linear.is_light.any() else [GAUSS]
     if linear.singular_after:  # either may lose the p̈ that has no factor for a moment
         schemes = [GAUSS, OF_SECOND_ORDER]
-    is_marched = not len(finish.rows)
-    breaks = np.unique([-pre, 0.0, end, end + post]) if is_marched else _breaks(pre, end, post)
-    breaks = with_corners(breaks, (*(target.function for target in servo.targets()), *servo.model.scene.load_functions))
+    is_marched, breaks = not len(finish.rows), np.unique([-pre, 0.0, end, end + post])
+    if not is_marched:
+        breaks = np.unique([np.linspace(a, b, FIRST_INTERVALS + 1) for a, b in pairwise(breaks)])
+    breaks = with_corners(breaks, (*servo.functions, *servo.model.scene.load_functions))
     for scheme in schemes:
         problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, end=finish, scheme=scheme)
-        solver = _Solver(problem, tolerance * force, progress)
+        solver = _Solver(servo, problem, tolerance * force, progress)
         try:
-            if is_marched:
-                solver.march(breaks, partial(_about, servo, linear.dynamics))
-            else:
-                solver.solve(breaks, _constant(start.state[: len(servo.scale)]), partial(_along, servo))
+            (solver.march if is_marched else solver.solve)(breaks)
         except Stopped:
             if solver.curve is None:
                 raise
@@ -105,6 +91,9 @@ def invert(
         if solver.status in ("completed", "interrupted"):
             break
     assert solver.curve is not None
+    p, v, _ = _states(solver.curve)(solver.curve.x)
+    rest = start.state[: len(servo.scale)]
+    away = np.hypot(np.linalg.norm(servo.scale * (p - rest), axis=1), np.linalg.norm(v, axis=1))
     return Inversion(
         servo=servo,
         linearisation=linear,
@@ -113,7 +102,7 @@ def invert(
         iterations=solver.iterations,
         unmet=solver.unmet / force,
         worst=solver.worst,
-        off_rest=_off_rest(servo, solver.curve, start.state),
+        off_rest=float(away[0] / max(float(away.max()), TINY)),
     )
 
 
@@ -122,13 +111,16 @@ class _Solver:
 
     curve: PPoly | None = None
 
-    def __init__(self, problem: Problem, most: float, progress: Callable[[float], bool]) -> None:
-        self.problem, self.most, self.progress = problem, most, progress
+    def __init__(self, servo: Servo, problem: Problem, most: float, progress: Callable[[float], bool]) -> None:
+        self.servo, self.problem, self.most, self.progress = servo, problem, most, progress
         self.status, self.iterations, self.unmet, self.worst = "", 0, 0.0, 0.0
 
-    def solve(self, breaks: Array, guess: States, along: Callable[[States, Array], Derivatives]) -> None:
-        """Solve on all breaks from `guess`; `along`(states, breaks): derivatives if those of the last mesh fail."""
-        is_near = True  # derivatives to the guess
+    def solve(self, breaks: Array) -> None:
+        """Solve on all `breaks` (N + 1,), s, at once, from rest as at the start."""
+        guess, is_near = (
+            _constant(self.problem.start.state[: len(self.problem.scale)]),
+            True,
+        )  # derivatives to the guess
         for refinement in range(MOST_REFINEMENTS):
             collocated = collocate(self.problem, breaks, guess)
             self.iterations += collocated.iterations
@@ -144,27 +136,30 @@ class _Solver:
                 self.status = "interrupted"
                 break
             if collocated.converged:
-                breaks, guess, is_near = cut(breaks, as_floats(unmet / self.most)), _states(collocated.curve), False
+                breaks, guess, is_near = cut(breaks, unmet / self.most), _states(collocated.curve), False
             elif not is_near:
-                self.problem, is_near = replace(self.problem, derivatives=along(guess, breaks)), True
+                times = breaks[:: -(-len(breaks) // MOST_PLACES)]
+                derivatives = linear_dynamics(self.servo, times, *guess(times))
+                self.problem, is_near = replace(self.problem, derivatives=derivatives), True
             else:
                 breaks = halved(breaks)
             if len(breaks) > MOST_INTERVALS + 1:
                 break
         self.unmet, self.curve = float(unmet.max()), self.curve or collocated.curve
 
-    def march(self, corners: Array, about: Callable[[float, Array], Derivatives]) -> None:
-        """One window after the other between `corners`, each from where the last one ended, as long as r lets it be.
+    def march(self, corners: Array) -> None:
+        """One window after the other between `corners` (k,), s, each from where the last one ended, as long as r lets.
 
-        about(t, y) has the derivatives near the state y (2n,) at time t: iterations with others get out of phase with
-        fast vibrations within a window.
+        With derivatives near the state there: iterations with others get out of phase with fast vibrations.
         """
+        along = self.problem.derivatives
         y, n, t, end = self.problem.start.state, len(self.problem.scale), float(corners[0]), float(corners[-1])
         width = (end - t) / FIRST_INTERVALS
         while t < end:
             last = min(float(corners[corners > t][0]), t + WINDOW * width)
-            window = as_floats(np.linspace(t, last, int(np.ceil((last - t) / width - 1e-6)) + 1))
-            self.problem = replace(self.problem, derivatives=about(t, y), start=Boundary(np.eye(2 * n), y))
+            window = np.linspace(t, last, int(np.ceil((last - t) / width - 1e-6)) + 1)
+            derivatives = _about(self.servo, along, t, y)
+            self.problem = replace(self.problem, derivatives=derivatives, start=Boundary(np.eye(2 * n), y))
             collocated = collocate(self.problem, window, _constant(y[:n]))
             self.iterations += collocated.iterations
             unmet = float(self._unmet(collocated.curve).max()) if collocated.converged else np.inf
@@ -172,7 +167,10 @@ class _Solver:
             width = float(window[1] - window[0]) * wider
             if unmet <= self.most:
                 self.unmet, t = max(self.unmet, unmet), last
-                self._append(collocated.curve)
+                if self.curve is None:
+                    self.curve = collocated.curve
+                else:
+                    self.curve.extend(collocated.curve.c, collocated.curve.x[1:])
                 p, v, _ = _states(collocated.curve)(window[-1:])
                 y = np.concatenate([p[0], v[0]])
                 self.status = "completed" if t >= end else "interrupted"
@@ -183,12 +181,6 @@ class _Solver:
                 self.curve, self.worst = self.curve or collocated.curve, collocated.worst
                 break
 
-    def _append(self, curve: PPoly) -> None:
-        if self.curve is None:
-            self.curve = curve
-        else:
-            self.curve.extend(curve.c, curve.x[1:])
-
     def _unmet(self, curve: PPoly) -> Array:
         """Largest |r| between the collocation points of each interval (N,)."""
         times = (curve.x[:-1, None] + np.diff(curve.x)[:, None] * PROBES).ravel()
@@ -196,13 +188,7 @@ class _Solver:
         return np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
 
 
-def _along(servo: Servo, states: States, breaks: Array) -> Derivatives:
-    """Those about the motion `states`, at most `MOST_PLACES` breaks."""
-    times = breaks[:: -(-len(breaks) // MOST_PLACES)]
-    return linear_dynamics(servo, times, *states(times))
-
-
-def _about(servo: Servo, along: LinearDynamics, t: float, y: Array) -> Derivatives:
+def _about(servo: Servo, along: Derivatives, t: float, y: Array) -> Derivatives:
     """Those `along` the path, with what the state y (2n,) at time t changes of them."""
     now, (p, v) = np.array([t]), y.reshape(2, 1, -1)
     here = linear_dynamics(servo, now, p, v, 0 * p)
@@ -236,8 +222,8 @@ def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) 
     speeds = np.where([of if excess > 0 else ~of for of in enforced], np.abs(zeros), 0.0).max(axis=1)
     rows = [int(of.sum()) for of in enforced]
     rows[int(speeds.argmax())] -= excess
-    both = [_boundary(servo, t, zeros[k], enforced[k], rows[k]) for k, t in enumerate((first, last))]
-    return both[0], both[1]
+    start, end = (_boundary(servo, t, zeros[k], enforced[k], rows[k]) for k, t in enumerate((first, last)))
+    return start, end
 
 
 def _boundary(servo: Servo, t: float, s: ComplexArray, is_enforced: Booleans, count: int) -> Boundary:
@@ -249,40 +235,24 @@ def _boundary(servo: Servo, t: float, s: ComplexArray, is_enforced: Booleans, co
     p, rest = equilibrium(servo, t), np.zeros((1, len(servo.scale)))
     A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), 0, servo.scale)
     others = [is_enforced]  # sets of zeros, each within the next one, up to one with at least `count`
+    is_more = bool(is_enforced.sum() < count)
     while not min(x.sum() for x in others) <= count <= max(x.sum() for x in others):
-        others.append(_with_fastest(s, others[-1], enforced=bool(is_enforced.sum() < count)))
+        fastest = s[np.where(others[-1] != is_more, np.abs(s), -1.0).argmax()]
+        pair = np.abs(s.real + 1j * np.abs(s.imag) - fastest.real - 1j * abs(fastest.imag)) <= 1e-9 * abs(fastest)
+        others.append(np.where(pair, is_more, others[-1]))
     basis = np.zeros((2 * len(p), 0))
     for enforced in sorted(others, key=lambda x: int(x.sum())):
-        more = _invariant(A, s, enforced)
-        more -= basis @ (basis.T @ more)
+        _, U, size = scipy.linalg.schur(
+            A.T, sort=lambda re, im, of=enforced: bool(of[np.abs(s - complex(re, abs(im))).argmin()])
+        )
+        more = U[:, :size] - basis @ (basis.T @ U[:, :size])
         basis = np.hstack([basis, np.linalg.svd(more, full_matrices=False)[0][:, : enforced.sum() - basis.shape[1]]])
     rows = basis[:, :count].T * np.concatenate([servo.scale, np.ones_like(servo.scale)])
     return Boundary(rows, np.concatenate([p, rest[0]]))
 
 
-def _with_fastest(s: ComplexArray, is_enforced: Booleans, *, enforced: bool) -> Booleans:
-    """The same but for the fastest zero of those that are not `enforced`, or are: with it and its conjugate."""
-    fastest = s[np.where(is_enforced != enforced, np.abs(s), -1.0).argmax()]
-    chosen = np.abs(s.real + 1j * np.abs(s.imag) - fastest.real - 1j * abs(fastest.imag)) <= 1e-9 * abs(fastest)
-    return np.where(chosen, enforced, is_enforced)
-
-
-def _invariant(A: Array, s: ComplexArray, is_enforced: Booleans) -> Array:
-    _, U, count = scipy.linalg.schur(
-        A.T, sort=lambda re, im: bool(is_enforced[np.abs(s - complex(re, abs(im))).argmin()])
-    )
-    return U[:, :count]
-
-
-def _breaks(pre: float, end: float, post: float) -> Array:
-    """Even breaks before, on and after the path, whose ends are breaks; (N+1,)."""
-    parts = [(-pre, 0.0), (0.0, end), (end, end + post)]
-    pieces = [np.linspace(a, b, FIRST_INTERVALS + 1) for a, b in parts if b > a]
-    return np.unique(np.concatenate(pieces))
-
-
 def with_corners(breaks: Array, functions: Iterable[_core.TimeFunction]) -> Array:
-    """Return `breaks` with the times between, s, at which comparisons of t in `functions` change."""
+    """`breaks` with the times between, s, at which comparisons of t in `functions` change."""
     corners = np.unique([t for function in functions for t in function.switches()])
     near = np.abs(breaks[:, None] - corners).min(axis=0) <= SHORTEST * (breaks[-1] - breaks[0])
     within = (corners > breaks[0]) & (corners < breaks[-1])
@@ -312,9 +282,3 @@ def _constant(p: Array) -> States:
 def _states(curve: PPoly) -> States:
     rate, acceleration = curve.derivative(1), curve.derivative(2)
     return lambda times: (curve(times), rate(times), acceleration(times))
-
-
-def _off_rest(servo: Servo, curve: PPoly, rest: Array) -> float:
-    p, v, _ = _states(curve)(curve.x)
-    size = np.hypot(np.linalg.norm(servo.scale * (p - rest[: p.shape[1]]), axis=1), np.linalg.norm(v, axis=1))
-    return float(size[0] / max(float(size.max()), TINY))

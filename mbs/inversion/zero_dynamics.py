@@ -1,12 +1,10 @@
 """The zero dynamics along a path: its zeros about quasi-static links, and whether past or future tells their motions.
 
+With p(t) given the joints follow from the path, and r(t, p, ṗ, p̈), the modal forces that motors do not supply, is what
+has to vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4).
+
 What decays follows from the past, what grows from the future (Devasia, Chen and Paden 1996). Lightly damped vibrations,
 whose zeros may cross the imaginary axis along the path, follow from the past unless they grow too far.
-
-Internal dynamics of a path under motors alone: r(t, p, ṗ, p̈) = 0, and its zeros.
-
-With p(t) given the joints follow from the path, and r, the modal forces that motors do not supply, is what has to
-vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4).
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
+from ...common.arrays import Array, Booleans, ComplexArray, NDArray
 from ...common.errors import SolveError
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -73,30 +71,20 @@ def _shapes(servo: Servo, times: Array) -> tuple[Array, Booleans]:
 
 
 def cause_in_posture(servo: Servo) -> str:
-    """Return why bent links leave the output without a posture, and a remedy; "" for other causes."""
+    """Why bent links leave the output without a posture, and a remedy; "" for other causes."""
     if servo.doubt:
         return f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
     return shape_in_redundant_loops(servo.model, servo.near[0], MultibodySystem(servo.model).integrated.rows)
 
 
 def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
-    """Matrix (2n, 2n) of ẏ = 𝒜 y for y = (ω p, ṗ), at node k."""
+    """Matrix 𝒜 (2n, 2n), 1/s, of ẏ = 𝒜 y for y = (ω p, ṗ), at node k; `scale` ω (n,), 1/s."""
     n = len(scale)
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:] = np.diag(scale)
     A[n:, :n] = -np.linalg.solve(dynamics.M[k], dynamics.K[k] / scale)
     A[n:, n:] = -np.linalg.solve(dynamics.M[k], dynamics.D[k])
     return A
-
-
-def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
-    """Zeros (N, 2n) from motors to path, 1/s, frozen at each node: those on the left first, the slowest of each side.
-
-    Sizes of pairs ± s differ by round-off alone: sides do not.
-    """
-    s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
-    side: Array = is_unstable(s).astype(int) - is_unstable(-s)
-    return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
 
 
 def is_unstable(s: ComplexArray) -> Booleans:
@@ -124,8 +112,13 @@ class Linearisation:
 
     @cached_property
     def zeros(self) -> ComplexArray:
-        """Zeros (N, 2n) of the equations frozen at each time, 1/s."""
-        return zeros(self.dynamics, self.scale)
+        """Zeros (N, 2n) from motors to path, 1/s, at each time: those on the left first, the slowest of each side.
+
+        Sizes of pairs ± s differ by round-off alone: sides do not.
+        """
+        s = np.linalg.eigvals(np.array([first_order(self.dynamics, k, self.scale) for k in range(len(self.times))]))
+        side: Array = is_unstable(s).astype(int) - is_unstable(-s)
+        return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
 
     @cached_property
     def is_future(self) -> Booleans:
@@ -146,12 +139,9 @@ class Linearisation:
         flags = np.where(jumps, is_unstable(s) & ~light, future)
         later = np.zeros(s.shape, dtype=bool)
         np.put_along_axis(later, places, flags, axis=1)
-        return np.where(self._is_parted(later), is_unstable(self.zeros) & ~self.is_light, later)
-
-    def _is_parted(self, flags: Booleans) -> Booleans:
-        """Which zeros (N, 2n) have another flag than their conjugates: two real ones of both sides that have met."""
         apart = np.abs(self.zeros[:, :, None] - self.zeros[:, None].conj())
-        return flags != np.take_along_axis(flags, apart.argmin(axis=2), axis=1)
+        is_parted = later != np.take_along_axis(later, apart.argmin(axis=2), axis=1)  # two real ones have met
+        return np.where(is_parted, is_unstable(self.zeros) & ~self.is_light, later)
 
     @property
     def _followed(self) -> tuple[NDArray[np.int_], Booleans]:
@@ -198,7 +188,7 @@ def shape_along(servo: Servo, times: Array) -> Array:
 
 def linearise(servo: Servo, end: float, samples: int = SAMPLES) -> Linearisation:
     """About `shape_along`. Raises `SolveError` as it does."""
-    times = as_floats(np.linspace(0.0, end, samples))
+    times = np.linspace(0.0, end, samples)
     p = shape_along(servo, times)
     dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
     matrices = np.concatenate([dynamics.M, dynamics.D, dynamics.K], axis=1)

@@ -115,7 +115,7 @@ class Stiffness(NamedTuple):
 
 
 def translational_stiffness(compliance: Array) -> Stiffness | None:
-    """Return the stiffness of a point from its compliance (3, 3), planar, or (6, 6); None if it can move freely.
+    """The stiffness of a point from its compliance, SI units, (3, 3), planar, or (6, 6); None if it can move freely.
 
     Directions whose compliance is round-off have infinite stiffness.
     """
@@ -131,13 +131,23 @@ def translational_stiffness(compliance: Array) -> Stiffness | None:
 
 
 def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
-    """Return conditions "locked", and with compliant gears "compliant", for the points of `mechanism`."""
+    """Conditions "locked", and with compliant gears "compliant", for the points of `mechanism`."""
     has_gears = any(name.startswith("motor/") for name in mechanism.outputs)
-    return {condition: _in_condition(mechanism, condition) for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]}
+    largest, conditions = np.sqrt(np.diag(np.linalg.inv(mechanism.M))), {}
+    for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]:
+        N, K, D = free = free_coordinates(mechanism, condition)
+        modes = robot_modes(K, D, N, mechanism.transformation)
+        if (shape := modes.shape).size:  # the largest entry of each δs real and positive, whatever columns N has
+            largest_entry = np.take_along_axis(shape, np.abs(shape).argmax(axis=1)[:, None], axis=1)
+            turn = np.abs(largest_entry) / largest_entry
+            modes = replace(modes, shape=shape * turn, motion=modes.motion * turn)
+        compliance = {point: _compliance(K, _moved(mechanism.of_tool(point), N, largest)) for point in mechanism.points}
+        conditions[condition] = JointCondition(modes, compliance, free)
+    return conditions
 
 
 def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
-    """Return the coordinates of joints and modes that are free in the condition."""
+    """The coordinates of joints and modes that are free in the condition."""
     joints = [name for name in mechanism.inputs if name.startswith("joint/")]
     if condition == LOCKED:  # motors behind compliant gears stand still, too
         names = [*joints, *(name for name in mechanism.outputs if name.startswith("motor/"))]
@@ -151,35 +161,19 @@ def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordina
 
 
 def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
-    """Return (F, k) motion along each row of `J` (k, f) per unit load along it, at `omega` (F,), rad/s."""
+    """(F, k) motion along each row of `J` (k, f) per unit load along it, at `omega` (F,), rad/s."""
     J = J @ free.N
     return np.asarray(np.einsum("ki,fik->fk", J, vibration(np.eye(len(J.T)), free.K, free.D, J, omega)))
 
 
 def vibration(M: Array, K: Array, D: Array, J: Array, omega: Array) -> ComplexArray:
-    """Return coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows `J` (k, f), at `omega` (F,)."""
+    """Coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows `J` (k, f), at `omega` (F,)."""
     w = omega[:, None, None]
     return np.asarray(np.linalg.solve(K + 1j * w * D - w**2 * M, np.broadcast_to(J.T, (len(omega), *J.T.shape))))
 
 
-def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
-    N, K, D = free = free_coordinates(mechanism, condition)
-    modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
-    largest = np.sqrt(np.diag(np.linalg.inv(mechanism.M)))
-    compliance = {point: _compliance(K, _moved(mechanism.of_tool(point), N, largest)) for point in mechanism.points}
-    return JointCondition(modes, compliance, free)
-
-
-def _largest_real(modes: RobotModes) -> RobotModes:
-    """With the largest entry of each δs real and positive, whatever the columns of N are."""
-    shape = modes.shape
-    largest = np.take_along_axis(shape, np.abs(shape).argmax(axis=1)[:, None], axis=1) if shape.size else shape[:, :1]
-    turn = np.abs(largest) / largest
-    return replace(modes, shape=shape * turn, motion=modes.motion * turn)
-
-
 def free_directions(R: Array) -> Array:
-    """Return orthonormal directions (f, m) z with R z = 0, of `R` (r, f), whose rows may be dependent."""
+    """Orthonormal directions (f, m) z with R z = 0, of `R` (r, f), whose rows may be dependent."""
     sizes = np.linalg.norm(R, axis=1, keepdims=True)
     return null_space(R / np.where(sizes > 0.0, sizes, 1.0), DEPENDENT)
 

@@ -13,11 +13,10 @@ these do on modes turns with the sections at them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from ...common.rotations import skew
@@ -28,7 +27,6 @@ from ..model.model import Model
 from ..model.motors import FrameShare, frame_share, turning_motors
 from ..model.nodes import Node
 from ..model.system import MultibodySystem
-from ..model.tree import CompliantGear
 from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
@@ -61,12 +59,12 @@ class LinearMechanism:
     names: tuple[str, ...]  # (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1
 
     def of_tool(self, point: str) -> Array:
-        """Return rows (k, f) as `points`, in the axes of a point that has its own."""
+        """Rows (k, f) as `points`, m and rad by s, in the axes of a point that has its own."""
         J = self.points[point]
-        return as_floats(self.tool_axes[point] @ J) if point in self.tool_axes else J
+        return self.tool_axes[point] @ J if point in self.tool_axes else J
 
     def modal(self, body: str) -> list[int]:
-        """Return indices in s of the modal coordinates of a body."""
+        """Indices in s of the modal coordinates of a body."""
         return [i for i, name in enumerate(self.names) if name.startswith(f"modal/{body}/")]
 
 
@@ -80,7 +78,13 @@ class LinearEquations:
     """
 
     def __init__(self, model: Model, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
-        _check(model)
+        for node in model.tree.nodes:
+            if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
+                raise InputError(
+                    f"{model.scene.path}: {node.joint.label}: between: expected the side nearer to the ground first for"
+                    " linear models",
+                    "it second",
+                )
         self.points = dict(points) if isinstance(points, Mapping) else {point: point for point in points}
         self.model, self.system = model, MultibodySystem(model)
         self._on_frames = turning_motors(model)
@@ -90,7 +94,7 @@ class LinearEquations:
         self._signs = signs[self.independent]
 
     def at(self, t: float, q: Array, v: Array, a: Array) -> LinearMechanism:
-        """The linear equations about a motion whose q (n_q,), v and a (n_v,) keep the loops closed.
+        """The linear equations about a motion at time t, s, whose q (n_q,), v and a (n_v,), SI, keep the loops closed.
 
         Raises `SolveError` in a posture in which the independent coordinates do not determine the others.
         """
@@ -126,8 +130,8 @@ class LinearEquations:
             K=H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
             inputs=self._inputs(H, shares, points),
             outputs=self._outputs(state, H, points),
-            points=MappingProxyType(points),
-            tool_axes=MappingProxyType(tool_axes),
+            points=points,
+            tool_axes=tool_axes,
             transformation=H,
             transformation_rate=H_dot,
             force=self._signs * force - on_modes @ H,
@@ -162,7 +166,7 @@ class LinearEquations:
             beside = shares[joint].direction @ H if joint in shares else 0.0
             for name, k in _labelled(joint, columns):
                 inputs[name] = self.model.sign(joint) * (H[k] + beside)
-        return MappingProxyType(inputs | self._along_axes("force", points))
+        return inputs | self._along_axes("force", points)
 
     def _outputs(self, state: KnownStates, H: Array, points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: joint coordinates, those of motors behind compliant gears, and places of points."""
@@ -175,8 +179,8 @@ class LinearEquations:
         for cut in tree.cut_joints:
             own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
             rows |= dict(zip(_names(cut.name, len(own)), own, strict=True))
-        rows |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
-        return MappingProxyType(rows | self._along_axes("point", points))
+        rows |= {f"motor/{gear.joint.joint.name}": H[gear.motor.v.start] for gear in tree.gears}
+        return rows | self._along_axes("point", points)
 
     def _points(self, state: KnownStates, H: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """(k, f) translations along the axes of the space, then rotations, of each point; (k, k) axes of tools."""
@@ -196,16 +200,6 @@ class LinearEquations:
         return {f"{kind}/{point}/{'xyz'[k]}": J[k] for point, J in points.items() for k in axes}
 
 
-def _check(model: Model) -> None:
-    for node in model.tree.nodes:
-        if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
-            raise InputError(
-                f"{model.scene.path}: {node.joint.label}: between: expected the side nearer to the ground first for"
-                " linear models",
-                "it second",
-            )
-
-
 def labelled(model: Model, joint: str) -> Iterator[tuple[str, int]]:
     """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
     return _labelled(joint, model.columns(joint))
@@ -217,11 +211,6 @@ def _labelled(joint: str, columns: Array) -> Iterator[tuple[str, int]]:
 
 def _names(joint: str, count: int) -> list[str]:
     return [f"joint/{joint}" + (f" {number}" if count > 1 else "") for number in range(1, count + 1)]
-
-
-def _of_motor(gear: CompliantGear) -> str:
-    """Of the coordinate of a motor behind a compliant gear."""
-    return f"motor/{gear.joint.joint.name}"
 
 
 def _coordinates(model: Model) -> tuple[list[str], Array]:
@@ -238,7 +227,7 @@ def _coordinates(model: Model) -> tuple[list[str], Array]:
             for name, k in labelled(model, node.joint.name):
                 names[k], signs[k] = name, node.sign
     for gear in model.tree.gears:
-        names[gear.motor.v.start] = _of_motor(gear)
+        names[gear.motor.v.start] = f"motor/{gear.joint.joint.name}"
     return names, signs
 
 

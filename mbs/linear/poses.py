@@ -39,7 +39,8 @@ class PoseEvaluator:
 
     Attributes:
         motors: names of the coordinates of motors, as `torque` has them.
-        segments: pairs of sections, straight lines between which show the robot.
+        segments: pairs of sections, straight lines between which show the robot: from that at which a body is carried
+            to those at which it carries others, and to the point.
     """
 
     def __init__(
@@ -66,14 +67,21 @@ class PoseEvaluator:
         direct = [name for name in self._linear.names if name in driven]
         geared = [name.replace("motor/", "joint/") for name in shafts]
         self.motors = (*(name for name in direct if name not in geared), *shafts)
-        self.segments = tuple(_segments(self.model, point))
+        tree, segments = self.model.tree, list[tuple[Section, Section]]()
+        for number, node in enumerate(tree.nodes):
+            ends = [other.inner for other in tree.nodes if other.inner.body == number]
+            if point.partition(".")[0] == node.body.name:
+                ends.append(tree.section(point))
+            segments += [(node.outer, end) for end in ends]
+        self.segments = tuple(segments)
 
     def at(self, q: Array) -> dict[str, Array]:
         """Findings by name in the undeformed posture q (n_q,). Raises `SolveError` where there is no equilibrium.
 
         joints_locked and joints_compliant: `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and
         `least_stiffness` N/m, its `direction` (d,), `response` (F, d) m/N. Else: `sag` (d,) m of the point, `torque`
-        (motors,), `place` (d,) m, `manipulability`, `robot` (segments, 2, 3) m.
+        (motors,) N·m or N, `place` (d,) m, `manipulability`, √det(J Jᵀ) of the point's velocity by the rates of joints
+        with motors (Yoshikawa, 1985), `robot` (segments, 2, 3) m.
         """
         q, tree = self._all(q), self.model.tree
         before = self._place(q)
@@ -81,18 +89,21 @@ class PoseEvaluator:
         straight, (mechanism, bent) = self._linear.at(0.0, q, rest, rest), self._equilibrium(q)
         torque = np.array([mechanism.force[mechanism.names.index(name)] for name in self.motors])
         values = {"place": before, "sag": self._place(bent) - before, "torque": torque}
-        values["manipulability"] = np.array(self._manipulability(straight))
-        for condition, found_there in joint_conditions(mechanism).items():
-            values |= {f"joints_{condition}/{name}": value for name, value in self._of_condition(found_there).items()}
+        d = len(self.space.translations)
+        columns = [straight.names.index(name.replace("motor/", "joint/")) for name in self.motors]
+        stretches = np.linalg.svd(straight.points[self.point][:d, columns], compute_uv=False)
+        values["manipulability"] = np.array(float(np.prod(stretches)) if len(columns) >= d else 0.0)
+        for condition, at in joint_conditions(mechanism).items():
+            of_condition = self._of_condition(at)
             if len(self._omega):
-                response = frequency_response(found_there.free, mechanism.of_tool(self.point), self._omega)
-                values[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
+                response = frequency_response(at.free, mechanism.of_tool(self.point), self._omega)
+                of_condition["response"] = np.abs(response[:, :d])
             if self._judge is not None:
-                J, axes, d = mechanism.points[self.point], np.eye(3), len(self.space.translations)
+                J, axes = mechanism.points[self.point], np.eye(3)
                 if self.point in mechanism.tool_axes:
                     axes[:d, :d] = mechanism.tool_axes[self.point][:d, :d]
-                more = self._judge(found_there.free, J[:d], axes)
-                values |= {f"joints_{condition}/{name}": value for name, value in more.items()}
+                of_condition |= self._judge(at.free, J[:d], axes)
+            values |= {f"joints_{condition}/{name}": value for name, value in of_condition.items()}
         places = tree.places(q[None])
         values["robot"] = np.array([[places.at(end).r[0] for end in pair] for pair in self.segments])
         return values
@@ -107,7 +118,7 @@ class PoseEvaluator:
         return self.space.along(tree.places(q[None]).at(tree.section(self.point)).r[0])
 
     def linear_equations(self, q: Array, near: Array | None = None) -> tuple[LinearMechanism, Array]:
-        """The linear equations about the equilibrium of the undeformed posture q (n_q,), and its coordinates.
+        """The linear equations about the equilibrium next to the undeformed q (n_q,), rad and m, and its coordinates.
 
         `near`: those of a like robot's equilibrium, from which this one is sought. Raises as `at`.
         """
@@ -125,12 +136,6 @@ class PoseEvaluator:
             raise SolveError("no stable equilibrium near the posture with straight links")
         return mechanism, bent
 
-    def _manipulability(self, mechanism: LinearMechanism) -> float:
-        """√det(J Jᵀ) of the point's velocity by the rates of joints with motors (Yoshikawa, 1985)."""
-        columns = [mechanism.names.index(name.replace("motor/", "joint/")) for name in self.motors]
-        J = mechanism.points[self.point][: len(self.space.translations), columns]
-        return float(np.prod(np.linalg.svd(J, compute_uv=False)[: len(J)])) if len(columns) >= len(J) else 0.0
-
     def _of_condition(self, at: JointCondition) -> dict[str, Array]:
         C, frequency = at.compliance[self.point], at.modes.frequency
         frequency = np.append(frequency[frequency > 0.0], np.full(self._count, np.nan))[: self._count]
@@ -143,14 +148,3 @@ class PoseEvaluator:
             "least_stiffness": np.array(least),
             "direction": direction,
         }
-
-
-def _segments(model: Model, point: str) -> list[tuple[Section, Section]]:
-    """From the section at which a body is carried to those at which it carries others, and to the point."""
-    tree, segments = model.tree, []
-    for number, node in enumerate(tree.nodes):
-        ends = [other.inner for other in tree.nodes if other.inner.body == number]
-        if point.partition(".")[0] == node.body.name:
-            ends.append(tree.section(point))
-        segments += [(node.outer, end) for end in ends]
-    return segments

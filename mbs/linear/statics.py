@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices, as_floats, null_space
+from ...common.arrays import Array, Booleans, Indices, null_space
 from ...common.errors import SolveError, quoted
 from ...common.libraries import scipy
 from .. import _core
@@ -74,22 +74,16 @@ def hanging_joints(model: Model, undeformed: State, start: State) -> Iterator[st
     yield from Statics(model).unstable_ways(start.q)
 
 
-class Correction(NamedTuple):
-    """Newton's steps (T, n) in natural sizes, and which of the states are met once they have made them (T,)."""
-
-    step: Array
-    is_met: Booleans
-
-
 def newton(
-    correct: Callable[[Array, Indices], Correction],
+    correct: Callable[[Array, Indices], tuple[Array, Booleans]],
     move: Callable[[Array, Array], Array],
     states: Array,
     most: int = MOST_ITERATIONS,
 ) -> tuple[Array, Booleans]:
-    """The states (T, …) that `correct` leads to, and which of them are met (T,).
+    """The states (T, …) that `correct` leads to in at most so many steps, and which of them are met (T,).
 
-    `correct`(states, their numbers) is called for those that are not met yet, and `move`(states, steps) takes them on.
+    `correct`(states, their numbers), called for those that are not met yet, has their steps (T, n) in natural sizes,
+    and which are met once they have made them (T,). `move`(states, steps) takes them on.
     """
     states, met, going = states.copy(), np.zeros(len(states), dtype=bool), np.arange(len(states))
     for _ in range(most):
@@ -116,14 +110,8 @@ class Balance(NamedTuple):
     size: float  # N·m, of the largest force that meets others there
 
 
-class Relief(NamedTuple):
-    """Reduction of loads and equations, in natural sizes."""
-
-    load: Array | float = 0.0  # (n_v,)
-    way: Array | float = 0.0  # (rows,)
-
-
-FULL_LOADS = Relief()
+Relief = tuple[Array | float, Array | float]
+"""What is taken off loads (n_v,) and equations (rows,), in natural sizes."""
 
 
 class Statics:
@@ -134,13 +122,13 @@ class Statics:
         self.sizes, self.row_sizes, self.length = model.natural_sizes, model.row_sizes, model.size
 
     def equilibrium(self, q: Array, locked: Indices | None = None) -> Array:
-        """The equilibrium (n_q,) that Newton's method reaches from q (n_q,), with the coordinates v[`locked`] kept.
+        """The equilibrium (n_q,), rad and m, that Newton's method reaches from q (n_q,), with v[`locked`] kept.
 
         Raises `SolveError` that says what is left where it reaches none.
         """
         tree = self.model.tree
         free = np.delete(np.arange(tree.n_v), [] if locked is None else locked)
-        rest, is_met, cause = self._newton(q, free, FULL_LOADS, MOST_ITERATIONS)
+        rest, is_met, cause = self._newton(q, free)
         if not is_met:
             rest, is_met = self._loaded(q, free)
         for node in tree.nodes if is_met else ():
@@ -154,16 +142,17 @@ class Statics:
             )
         return rest
 
-    def _newton(self, q: Array, free: Indices, relief: Relief, most: int) -> tuple[Array, bool, str]:
-        """Where Newton's method gets from q (n_q,) in at most so many steps, whether that is met, what else is left."""
+    def _newton(
+        self, q: Array, free: Indices, relief: Relief = (0.0, 0.0), most: int = MOST_ITERATIONS
+    ) -> tuple[Array, bool, str]:
+        """Where Newton's method gets from q (n_q,), whether that is met, and what else is left there."""
         cause = ""
 
-        def correct(states: Array, _: Indices) -> Correction:
+        def correct(states: Array, _: Indices) -> tuple[Array, Booleans]:
             nonlocal cause
             at, step = self.balance(states[0], free, relief), np.zeros((1, self.model.tree.n_v))
             if not np.isfinite(at.size):
-                step[:] = np.nan
-                return Correction(step, np.zeros(1, dtype=bool))
+                return np.full_like(step, np.nan), np.zeros(1, dtype=bool)
             K = self.stiffness(states[0], at)
             round_off = ROUND_OFF * (np.abs(K) @ self._natural(states[0]))
             excess = (np.abs(at.left) / (TOLERANCE * at.size + round_off + TINY))[free]
@@ -171,10 +160,10 @@ class Statics:
             if not is_met:
                 step[0, free] = _step(at, K, free)
                 cause = self._cause(at, int(free[excess.argmax()]))
-            return Correction(step, np.array([is_met]))
+            return step, np.array([is_met])
 
         rest, is_met = newton(correct, lambda at, step: self.model.tree.integrate(at, step * self.sizes), q[None], most)
-        return as_floats(rest[0]), bool(is_met[0]), cause
+        return rest[0], bool(is_met[0]), cause
 
     def _loaded(self, q: Array, free: Indices) -> tuple[Array, bool]:
         """The equilibrium that q (n_q,) comes to as the loads on it grow from nothing, and whether it does.
@@ -185,7 +174,7 @@ class Statics:
         taken, part = 0.0, 0.5
         while taken < 1.0 and part >= LEAST_PART and np.isfinite(at.size):
             left = 1.0 - min(taken + part, 1.0)
-            rest, is_met, _ = self._newton(q, free, Relief(left * at.load, left * at.missed), FEW_ITERATIONS)
+            rest, is_met, _ = self._newton(q, free, (left * at.load, left * at.missed), FEW_ITERATIONS)
             if is_met:
                 q, taken = rest, 1.0 - left
                 part = min(2.0 * part, left)
@@ -193,41 +182,36 @@ class Statics:
                 part /= 2.0
         return q, taken == 1.0
 
-    def balance(self, q: Array, free: Indices, relief: Relief = FULL_LOADS) -> Balance:
+    def balance(self, q: Array, free: Indices, relief: Relief = (0.0, 0.0)) -> Balance:
         """Forces at q (n_q,), less `relief`, with multipliers that balance them best along v[`free`]; natural sizes."""
         at, J = self._at_rest(q)
         independent = _independent(J[:, free])
         J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
-        Q = at.Q * self.sizes - relief.load
-        missed = self.model.row_signs * at.value / self.row_sizes - relief.way
+        Q = at.Q * self.sizes - relief[0]
+        missed = self.model.row_signs * at.value / self.row_sizes - relief[1]
         multipliers = np.linalg.lstsq(J[:, free].T, Q[free], rcond=DEPENDENT)[0]
         elastic = np.zeros_like(Q)
         for node in self.model.tree.nodes:
             elastic[node.p_v] = node.body.stiffness * q[node.p_q]
-        terms = (
-            Q,
-            Q + elastic * self.sizes,
-            elastic * self.sizes,
-            J * multipliers[:, None],
-            np.array([at.force * self.length, at.moment]),
-        )
+        elastic *= self.sizes
+        outer = np.array([at.force * self.length, at.moment])
+        terms = (Q, Q + elastic, elastic, J * multipliers[:, None], outer)
         size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
         return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent=independent, size=size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
         """∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), exact."""
         multipliers = at.multipliers / self.row_sizes * self.model.row_signs
-        core, scene = self.system.core, self.system.scene
-        K = core.stiffness_at_rest(scene, self.t, q, multipliers, at.independent)
-        return as_floats(K * self.sizes * self.sizes[:, None])
+        K = self.system.core.stiffness_at_rest(self.system.scene, self.t, q, multipliers, at.independent)
+        return K * self.sizes * self.sizes[:, None]
 
     def holding_multipliers(self, q: Array) -> Array:
         """λ (rows,) with C_vᵀ λ = Q at q (n_q,), N or N·m; in natural sizes the least if rows depend on others."""
         at, J = self._at_rest(q)
-        return as_floats(np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes)
+        return np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes
 
     def unstable_ways(self, q: Array) -> Iterator[str]:
-        """Return a warning if the equilibrium q (n_q,) is unstable.
+        """A warning if the equilibrium q (n_q,) is unstable.
 
         There the forces that lead back have a derivative with a negative eigenvalue on what the rows leave free.
         """
@@ -250,7 +234,7 @@ class Statics:
     def _at_rest(self, q: Array) -> tuple[_core.ForcesAtRest, Array]:
         """What the core finds at q (n_q,), and C_v (rows, n_v) in natural sizes."""
         at = self.system.core.forces_at_rest(self.system.scene, self.t, q)
-        return at, as_floats((self.model.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes)
+        return at, (self.model.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes
 
     def _natural(self, q: Array) -> Array:
         """|q| (n_v,) in natural sizes, 1 of orientations; of links without loads, not 0 but round-off."""
@@ -282,9 +266,7 @@ def _independent(J: Array) -> list[int]:
 
 def _scales(K: Array, size: float) -> Array:
     """Increments (n,) that single stiffnesses make of one size."""
-    return as_floats(
-        1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, SLACKEST * np.abs(K).max(initial=0.0), TINY)))
-    )
+    return 1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, SLACKEST * np.abs(K).max(initial=0.0), TINY)))
 
 
 def _step(at: Balance, K: Array, free: Indices) -> Array:
@@ -296,7 +278,7 @@ def _step(at: Balance, K: Array, free: Indices) -> Array:
     J, m = J / of_rows[:, None], len(J)
     matrix = np.block([[K * scale * scale[:, None], J.T], [J, np.zeros((m, m))]])
     right = np.concatenate([at.left[free] * scale, -at.missed[at.independent] / of_rows])
-    return as_floats(np.linalg.lstsq(matrix, right, rcond=SINGULAR)[0][: len(free)] * scale)
+    return np.linalg.lstsq(matrix, right, rcond=SINGULAR)[0][: len(free)] * scale
 
 
 def static_equilibrium(model: Model, start: State) -> State:
@@ -322,7 +304,7 @@ def static_shapes(
     K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, SLOW), np.full(count, np.inf)
     least = STRAIGHT * float((omega * sizes).min(initial=np.inf))
 
-    def correct(p: Array, going: Indices) -> Correction:
+    def correct(p: Array, going: Indices) -> tuple[Array, Booleans]:
         r, slow = forces(p, going), ratio[going] > SLOW
         if not K.any():
             K[:] = stiffness(p[::NEIGHBORS], going[::NEIGHBORS])[going // NEIGHBORS]
@@ -336,12 +318,12 @@ def static_shapes(
         is_seen = (before[going] < np.inf) & (size > 10 * SETTLED)  # steps below that are round-off
         ratio[going] = np.where(is_seen, size / before[going], np.minimum(ratio[going], SLOW))
         before[going] = size
-        return Correction(step / sizes, size * np.minimum(ratio[going], 1.0) <= SETTLED)
+        return step / sizes, size * np.minimum(ratio[going], 1.0) <= SETTLED
 
     p, is_met = newton(correct, lambda p, step: p + step * sizes, np.zeros((count, len(omega))))
     return p, is_met & (np.abs(p) <= sizes).all(axis=1)
 
 
 def modal_sizes(bodies: Iterable[Body]) -> Array:
-    """Return √J (n,) of the modes of all bodies: deflections of about their length."""
+    """√J (n,), m·√kg, of the modes of all bodies: deflections of about their length."""
     return np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])

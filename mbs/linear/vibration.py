@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats, null_space
+from ...common.arrays import Array, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from ..model.body import Body
 from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
 from ..model.model import Model
@@ -43,7 +41,7 @@ def without_rows(model: Model) -> MultibodySystem:
 
 
 def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Array) -> Vibrations:
-    """Return vibrations about q (n_q,) under the constraint equations of `model`.
+    """Vibrations about q (n_q,), rad and m, under the constraint equations of `model` at time t, s.
 
     M⁻¹ is what the core says that forces do to accelerations where `unconstrained`. K are the stiffnesses of links and
     gears, D their damping and viscous friction; neither gravity nor dry friction.
@@ -51,24 +49,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     still, sizes = np.zeros(model.tree.n_v), model.natural_sizes
     both = np.outer(sizes, sizes)
     M = np.linalg.inv(unconstrained.derivatives(t, q, still, still).a_f / both)
-    (C_v,), (K, D) = model.constraints.natural_gradients(q[None], np.array([t]), sizes), _springs(model, q)
-    squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
-    omega, shape = np.sqrt(squares), sizes[:, None] * shape
-    ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
-    return Vibrations(as_floats(omega), as_floats(ratio), shape, K)
-
-
-def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
-    """Return ω² (n,) and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; all in natural sizes."""
-    free = null_space(C_v, DEPENDENT)
-    L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
-    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
-    stiff = slice(len(squares) - _strained(K, free), None)
-    return squares[stiff], free @ L_inverse.T @ vectors[:, stiff]
-
-
-def _springs(model: Model, q: Array) -> tuple[Array, Array]:
-    """K and D (n_v, n_v) of modes, gears and viscous friction at q (n_q,)."""
+    (C_v,) = model.constraints.natural_gradients(q[None], np.array([t]), sizes)
     K, D = gear_matrices(model.tree, q)
     D += model.along_cut.damping(q)
     for node in model.tree.nodes:
@@ -76,18 +57,24 @@ def _springs(model: Model, q: Array) -> tuple[Array, Array]:
         D[node.p_v, node.p_v] = node.body.damping
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
             D[column, column] += friction.viscous
-    return K, D
+    squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
+    omega, shape = np.sqrt(squares), sizes[:, None] * shape
+    ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
+    return Vibrations(omega, ratio, shape, K)
 
 
-def _strained(K: Array, free: Array) -> int:
-    """Return the number of motions in the columns of `free` (n, m), in natural sizes, that strain springs K (n, n).
-
-    Each spring counts by its own size: a soft link beside a stiff one vibrates, however slowly.
-    """
+def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
+    """ω² (n,) and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; all in natural sizes."""
+    free = null_space(C_v, DEPENDENT)
+    L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
+    squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
+    # Motions that strain springs, each of which counts by its own size: a soft link beside a stiff one vibrates, too
     own = np.sqrt(K.diagonal())
     unit = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
-    sizes = np.linalg.svd((unit[:, None] * K * unit) @ free, compute_uv=False)
-    return int(np.count_nonzero(sizes > RIGID * sizes.max(initial=0.0)))
+    strains = np.linalg.svd((unit[:, None] * K * unit) @ free, compute_uv=False)
+    strained = np.count_nonzero(strains > RIGID * strains.max(initial=0.0))
+    stiff = slice(len(squares) - int(strained), None)
+    return squares[stiff], free @ L_inverse.T @ vectors[:, stiff]
 
 
 INSTANTS = 9
@@ -102,7 +89,7 @@ class PathFrequencies:
 
 
 def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
-    """Return the `modes` lowest vibrations of the undeformed robot on its trajectories, from `begin` to `end`, s.
+    """The `modes` lowest vibrations of the undeformed robot on its trajectories, from `begin` to `end`, s.
 
     Where motors follow them, compliant gears are among its springs. Joints that the paths leave free are free.
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
@@ -120,20 +107,15 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
         spectra.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
-    return common_modes(model.scene.path, spectra, modes)
-
-
-def common_modes(path: Path, spectra: Sequence[tuple[Array, Array]], modes: int) -> PathFrequencies:
-    """The `modes` lowest of ω (rad/s) and damping ratios by instant. Raises `InputError` where one has fewer."""
     most = min(len(omega) for omega, _ in spectra)
     if most < modes:
         raise InputError(
-            f"{path}: trajectory: shaper.modes: expected at most {most}, the number of vibrations on the constrained"
-            " path",
+            f"{model.scene.path}: trajectory: shaper.modes: expected at most {most}, the number of vibrations on the"
+            " constrained path",
             modes,
         )
     frequency = np.array([omega[:modes] for omega, _ in spectra]) / (2 * np.pi)
-    return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in spectra]))
+    return PathFrequencies(frequency, np.array([ratio[:modes] for _, ratio in spectra]))
 
 
 def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
@@ -146,25 +128,13 @@ def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
         return model
     start, tree = undeformed_posture(model), model.tree
     modes = vibrations_of(model.without_paths(), without_rows(model), 0.0, start.q)
-    wanted = unit_damping(modes.frequency, modes.shape[~tree.joint_columns])
-    bodies = _damped([node.body for node in tree.nodes], wanted, ratios)
-    return replace(model, tree=tree.with_bodies(bodies))
-
-
-def unit_damping(frequency: Array, shape: Array) -> Array:
-    """D (modes of all bodies)², 1/s, under which all vibrations have the damping ratio 1: ΦᵀDΦ = diag(2ω).
-
-    Rigid motion is free of it; motion of p that the joints do not allow, too. `frequency` ω (n,) rad/s; `shape` Φ
-    (modes of all bodies, n), the rows p of M-orthonormal shapes, body by body.
-    """
-    inverse = np.linalg.pinv(shape)
-    return as_floats(inverse.T @ (2 * frequency[:, None] * inverse))
-
-
-def _damped(bodies: Sequence[Body], wanted: Array, ratios: Mapping[str, float]) -> tuple[Body, ...]:
-    """With their blocks on the diagonal of `wanted` (modes of all bodies)², ζ times; bodies not named as they are."""
+    # D (modes of all bodies)² with ΦᵀDΦ = diag(2ω), ζ = 1, of which each body has its block on the diagonal; rigid
+    # motion is free of it, and so is motion of p that the joints do not allow
+    inverse, bodies = np.linalg.pinv(modes.shape[~tree.joint_columns]), [node.body for node in tree.nodes]
+    unit = inverse.T @ (2 * modes.frequency[:, None] * inverse)
     ends = np.cumsum([0, *(body.n_modes for body in bodies)])
-    return tuple(
-        replace(body, damping=ratios[body.name] * wanted[first:last, first:last]) if body.name in ratios else body
+    damped = (
+        replace(body, damping=ratios[body.name] * unit[first:last, first:last]) if body.name in ratios else body
         for body, (first, last) in zip(bodies, pairwise(ends), strict=True)
     )
+    return replace(model, tree=tree.with_bodies(tuple(damped)))

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.toml_files import toml_line
 from ..model.model import Model
@@ -80,7 +80,7 @@ def _posture(model: Model, q: Array, start: Array) -> StartPosture:
 
 
 def chosen_start(model: Model) -> StartPosture | None:
-    """Return the start on `initial.branch` nearest to the guess; None if the scene names no branch.
+    """The start on `initial.branch` nearest to the guess; None if the scene names no branch.
 
     Raises `InputError` if no start is on it.
     """
@@ -111,7 +111,7 @@ MEETING = 1e-6  # of the size of the robot: axes that miss each other by less me
 
 
 def branch_names(model: Model, q: Array) -> dict[str, Word]:
-    """Return the branch at q (n_q,) by joint: configuration of shoulder, elbow and wrist of the tool's arm.
+    """The branch at q (n_q,), rad and m, by joint: configuration of shoulder, elbow and wrist of the tool's arm.
 
     The wrist is the fifth of six turning joints. An arm whose first axis is not parallel to the next two has a shoulder
     and an elbow, one whose first two are parallel an elbow.
@@ -131,12 +131,12 @@ def branch_names(model: Model, q: Array) -> dict[str, Word]:
 
 
 def in_words(branch: Mapping[str, Word]) -> str:
-    """Return the line of [initial] for a branch: `branch = { elbow = "up" }`."""
+    """The line of [initial] for a branch: `branch = { elbow = "up" }`."""
     return toml_line("branch", branch)
 
 
 def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:
-    """Whether the word is right of a joint of the tree in the posture q (n_q,)."""
+    """Whether the word is right of a joint of the tree in the posture q (n_q,), rad and m."""
     if word in ("up", "down"):
         return _above(model, q, node) == (word == "up")
     if word in ("left", "right"):
@@ -152,19 +152,17 @@ def _angle(q: Array, node: Node) -> float:
 
 
 def _turning(model: Model) -> list[Node]:
-    """The joints of the chain with one angle that no path of their own prescribes, as one does of a gripper."""
+    """Joints with one angle from the ground to the body of the tool: that of the last path of a point, or the last.
+
+    Without those that a path of their own prescribes, as one does of a gripper.
+    """
+    tree, chain, point = model.tree, list[Node](), model.scene.tool_point
     prescribed = {path.coordinate_of for path in model.scene.trajectory}
-    return [node for node in _chain(model) if node.joint.units == ("rad",) and node.joint.name not in prescribed]
-
-
-def _chain(model: Model) -> list[Node]:
-    """The joints of the tree from the ground to the body of the tool: that of the last path of a point, or the last."""
-    tree, chain = model.tree, list[Node]()
-    point = model.scene.tool_point
     number = len(tree.nodes) - 1 if point is None else tree.index[point.partition(".")[0]]
     while number >= 0:
-        chain.append(tree.nodes[number])
-        number = chain[-1].inner.body
+        node = tree.nodes[number]
+        chain += [node] if node.joint.units == ("rad",) and node.joint.name not in prescribed else []
+        number = node.inner.body
     return chain[::-1]
 
 
@@ -179,12 +177,21 @@ def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:
 def _raises(model: Model, q: Array, node: Node) -> bool:
     """Whether a positive turn of a joint moves the end of the arm along the axis of the turning joint before it."""
     joints = _turning(model)
-    if node not in joints or joints.index(node) == 0:
+    k = joints.index(node) if node in joints else 0
+    if k == 0:
         return False
-    k = joints.index(node)
     places, axes = _lines(model, q, joints)
-    arm = _end_of_arm(model, q, places, axes, k) - places[k]
-    return bool(axes[k - 1] @ np.cross(axes[k], arm) > 0.0)
+    end, point = places[-1], model.scene.tool_point
+    if len(places) > k + 2:
+        end = places[k + 2]
+    elif point is not None:
+        end = model.tree.places(q[None]).at(model.tree.section(point)).r[0]
+    if len(places) == 6:  # of a spherical wrist where its axes meet
+        P = np.eye(3) - np.einsum("ki,kj->kij", axes[3:], axes[3:])
+        meeting = np.linalg.lstsq(P.reshape(9, 3), np.einsum("kij,kj->ki", P, places[3:]).ravel(), rcond=None)[0]
+        if np.abs(np.einsum("kij,kj->ki", P, meeting - places[3:])).max() < MEETING * model.size:
+            end = meeting
+    return bool(axes[k - 1] @ np.cross(axes[k], end - places[k]) > 0.0)
 
 
 def _flips(model: Model, q: Array, node: Node) -> bool:
@@ -195,28 +202,6 @@ def _flips(model: Model, q: Array, node: Node) -> bool:
         return _angle(q, node) < 0.0
     axes = _lines(model, q, joints)[1]
     return bool(axes[k] @ np.cross(axes[k - 1], axes[k + 1]) < 0.0)
-
-
-def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> Array:
-    """Where the axes of a spherical wrist meet; else the second joint after number `k`, or the tool."""
-    if len(places) == 6:
-        P = np.eye(3) - np.einsum("ki,kj->kij", axes[3:], axes[3:])
-        meeting = np.linalg.lstsq(P.reshape(9, 3), np.einsum("kij,kj->ki", P, places[3:]).ravel(), rcond=None)[0]
-        missed = np.einsum("kij,kj->ki", P, meeting - places[3:])
-        if np.abs(missed).max() < MEETING * model.size:
-            return as_floats(meeting)
-    if len(places) > k + 2:
-        return as_floats(places[k + 2])
-    point = model.scene.tool_point
-    if point is None:
-        return as_floats(places[-1])
-    return as_floats(model.tree.places(q[None]).at(model.tree.section(point)).r[0])
-
-
-def _cut_point(model: Model, body: str) -> str | None:
-    """Point of the body in a joint at which a loop is cut; None where it has none."""
-    sides = (side for joint in model.tree.loops for side in joint.between)
-    return next((side for side in sides if side.partition(".")[0] == body), None)
 
 
 def _above(model: Model, q: Array, node: Node) -> bool:
@@ -234,7 +219,8 @@ def _above(model: Model, q: Array, node: Node) -> bool:
         number = tree.index[after.body.name]
         outer = next((other for other in tree.nodes if other.inner.body == number), None)
         if outer is None:
-            point = _cut_point(model, after.body.name) or model.scene.tool_point
+            cut = (side for joint in tree.loops for side in joint.between if side.partition(".")[0] == after.body.name)
+            point = next(cut, model.scene.tool_point)
             end = end if point is None else place(tree.section(point))
             break
         after, end = outer, place(outer.inner)

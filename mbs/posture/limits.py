@@ -40,7 +40,7 @@ class Watched(NamedTuple):
         return lowest, highest
 
     def seen(self, other: Seen) -> Seen:
-        """Return the core's findings in terms of the joint's coordinate."""
+        """The core's findings in terms of the joint's coordinate."""
         least, largest = sorted(self.sign * value + 0.0 for value in other[:2])
         return least, largest, other[2]
 
@@ -59,7 +59,7 @@ def watched(tree: KinematicTree) -> list[Watched]:
 
 
 def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
-    """Have the core watch them."""
+    """Have the core watch those coordinates while it integrates `scene`."""
     for one in watched(tree):
         scene.add_limit(one.v, *one.limits)
 
@@ -68,7 +68,7 @@ def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Ar
     """Yield a warning for each coordinate outside its position_limit: the first time, and the largest excess.
 
     `ranges` is what the core has seen of `watched`, None of a motion without the core; the others are looked at in
-    outputs at `times` (T,): `q` (T, n_q), `v` (T, n_v).
+    outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
     """
     of_core = zip(watched(model.tree), ranges, strict=True) if ranges is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]

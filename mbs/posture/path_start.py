@@ -23,7 +23,7 @@ class PathStart:
 
 
 def path_start(model: Model, end: float) -> PathStart:
-    """Return the start of the path that ends at `end` (s).
+    """The start of the path that ends at `end` (s).
 
     Raises `InputError` for a path that the undeformed robot cannot follow, `SolveError` where redundant freedoms cannot
     be resolved.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, as_floats
+from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from .._core import TimeFunction
@@ -35,7 +35,7 @@ class Mobility:
 
 
 def mobility(model: Model, q: Array) -> Mobility:
-    """Return the mobility with rigid links and gears at q (n_q,)."""
+    """The mobility with rigid links and gears at q (n_q,), rad and m."""
     at = model.constraints.mobilities(q[None], np.zeros(1))[0]
     freedom, left = at.free.shape[1] - len(model.tree.gears), _joints(model, _largest(at.left) > MOVES)
     return Mobility(freedom, at.followed, at.ratio, left, at.loop_rank)
@@ -43,7 +43,7 @@ def mobility(model: Model, q: Array) -> Mobility:
 
 def _largest(motions: Array) -> Array:
     """Of motions (joint coordinates, m), the largest by joint coordinate."""
-    return as_floats(np.abs(motions).max(axis=1, initial=0.0))
+    return np.abs(motions).max(axis=1, initial=0.0)
 
 
 def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
@@ -53,9 +53,9 @@ def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
 
 
 def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
-    """Return how many path rows move coordinates locked by loops at q (n_q,), links rigid, and these joints.
+    """How many path rows move coordinates that loops lock at q (n_q,), rad and m, with rigid links, and these joints.
 
-    0 with rigid links: there nothing lets such rows move.
+    0 of robots without flexible links: there nothing lets such rows move.
     """
     is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
@@ -74,7 +74,7 @@ def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> 
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
-    """Return a message on the worst posture q (n_q,) of a path, at time t (s) with that ratio; "" if regular.
+    """A message on the worst posture q (n_q,) of a path, at time t (s) with that ratio; "" if regular.
 
     Of one in which the run ends it is said to be singular. `loop_rank` as in `mobilities`.
     """
@@ -87,7 +87,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
 
 
 def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
-    """Return a message if loops pass a singular posture at `times` (T,) and q (T, n_q); "" if far from one.
+    """A message if loops pass a singular posture at `times` (T,) and q (T, n_q); "" if far from one.
 
     `loop_rank` as in `mobilities`.
     """
@@ -103,7 +103,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
 
 def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
-    """Return a message if loop rows are nearly dependent at q (n_q,), v (n_v,) and time t (s); else "".
+    """A message if loop rows are nearly dependent at q (n_q,), v (n_v,) and time t (s); else "".
 
     "" where they do, or did not before.
     """
@@ -112,27 +112,32 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
     if not loops.rows or before is None:
         return ""
     freedom = mobility(model, before)
-    ratio = loops.constraints.ratios(q[None], np.array([t]), freedom.loop_rank)[0]
-    if ratio < NEARLY_SINGULAR:
-        return (
-            f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
-            f" {quoted(dict.fromkeys(row.owner for row in loops.rows))} close): a mechanism at a dead center, or cranks"
-            " and coupler in a line. No finite force determines the further motion. Avoid this posture or drive a joint"
-            " instead"
-        )
-    ratio = model.constraints.ratios(q[None], np.array([t]), freedom.loop_rank + freedom.followed)[0]
-    if ratio < NEARLY_SINGULAR:
-        paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
-        return (
-            f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; trajectory {paths}): a"
-            " mechanism at a dead center, where forces on the driven point do not determine the direction of motion."
-            " Keep clear of it, or drive a joint instead"
-        )
+    paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
+    for of, rank, what, why in (
+        (
+            loops,
+            freedom.loop_rank,
+            f"loops that {quoted(dict.fromkeys(row.owner for row in loops.rows))} close",
+            ", or cranks and coupler in a line. No finite force determines the further motion. Avoid this posture",
+        ),
+        (
+            model,
+            freedom.loop_rank + freedom.followed,
+            f"trajectory {paths}",
+            ", where forces on the driven point do not determine the direction of motion. Keep clear of it,",
+        ),
+    ):
+        ratio = of.constraints.ratios(q[None], np.array([t]), rank)[0]
+        if ratio < NEARLY_SINGULAR:
+            return (
+                f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {what}): a"
+                f" mechanism at a dead center{why} or drive a joint instead"
+            )
     return ""
 
 
 def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
-    """Yield warnings on freedoms that neither paths nor motors determine at q.
+    """Yield warnings on freedoms that neither paths nor motors determine at q (n_q,), rad and m.
 
     Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, a singular posture, and a
     path that jumps before `end` (s).
@@ -217,7 +222,7 @@ def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: f
 
 def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float, float] | None:
     """Time, value before and after of the first jump that is found in a derivative of that order; None without one."""
-    times = as_floats(np.linspace(0.0, end, SAMPLES))
+    times = np.linspace(0.0, end, SAMPLES)
     derivatives = function.sample(times)
     samples, still = derivatives[order], RESTING * float(np.abs(derivatives[0]).max())
     size = max(float(np.ptp(samples)), still) if order == 0 else max(float(np.abs(samples).max()), still / end)
@@ -242,7 +247,7 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
 
 
 def misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """Return (T − 1, …) deviations of the trapezoidal rule on the next derivative from changes between `times`."""
+    """Deviations (T − 1, …) of the trapezoidal rule on the next derivative from changes between `times` (T, …), s."""
     value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
     missed: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
     return np.nan_to_num(missed, nan=0.0, posinf=0.0)

@@ -37,15 +37,8 @@ def following_motors(model: Model) -> Model:
 PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
 
 
-def prescribed_by(mechanism: _core.PlanarDriven | _core.SpatialDriven, q: Array) -> PrescribedMotion:
-    """Return the prescribed motion of a mechanism's modes; postures are searched from q (n_q,) on."""
-    if isinstance(mechanism, _core.PlanarDriven):
-        return _core.PlanarPrescribedMotion(mechanism, q)
-    return _core.SpatialPrescribedMotion(mechanism, q)
-
-
 def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, times: Array, near: Array) -> Prescribed:
-    """Return the motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, from postures near (T, n_q).
+    """The motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, from postures near (T, n_q).
 
     From a single one, near the first, postures are found one after the other. The multipliers are those that go with
     joints that move freely: what is left of the forces on the modes holds the shape.
@@ -65,9 +58,9 @@ def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, time
 def left_slopes(
     model: Model, motion: PrescribedMotion, modes: tuple[Array, Array, Array], times: Array, near: Array
 ) -> tuple[Array, Array, Array]:
-    """Return M, D, K (T, n + motors, n): derivatives of residual modal forces and motor torques by p̈, ṗ and p.
+    """Derivatives M, D, K (T, n + motors, n), SI units, of residual modal forces and motor torques by p̈, ṗ and p.
 
-    `modes` p, ṗ and p̈ (T, n). Without motors there are n rows.
+    At `times` (T,), s, with `modes` p, ṗ, p̈ (T, n), m·√kg and s, and postures near (T, n_q). Without motors: n rows.
     """
     at, n = as_list(times), modes[0].shape[1]
     M, D, K = (x.reshape(len(times), -1, n) for x in motion.derivatives(at, *modes, near))
@@ -87,5 +80,5 @@ def left_slopes(
 
 
 def joint_places(model: Model) -> Array:
-    """Return indices in q of the joints of all bodies."""
+    """Indices (k,) in q of the coordinates of all joints."""
     return np.concatenate([np.arange(node.q.start, node.q.stop) for node in model.tree.nodes])

@@ -13,7 +13,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, as_floats, null_space
+from ...common.arrays import Array, Booleans, null_space
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from .. import _core
@@ -40,7 +40,7 @@ TELLS = 0.02  # share of a motion left free that joints must have at all times t
 
 
 def resolved(model: Model, end: float) -> Model:
-    """Return the robot with a row for each redundant freedom from 0 to `end` (s), by the scene's `redundancy`.
+    """The robot with a row for each redundant freedom from 0 to `end` (s), by the scene's `redundancy`.
 
     Raises `InputError` where the criterion has nothing to resolve, `SolveError` where it leads nowhere.
     """
@@ -50,7 +50,7 @@ def resolved(model: Model, end: float) -> Model:
     start = undeformed_posture(model)
     free = mobility(model, start.q)
     _check(model, criterion, free)
-    times = as_floats(np.linspace(0.0, end, NODES)) if end > 0 else np.zeros(1)
+    times = np.linspace(0.0, end, NODES) if end > 0 else np.zeros(1)
     q = _least_motion(model, start.q, times)
     if criterion == "least-torque" and end > 0:
         q = _least_torque(model, times, q)

@@ -110,9 +110,9 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
 
 
 def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None:
-    """Return the rank of loop constraints among `rows` if straight links, at q (n_q,), make some redundant; else None.
+    """The rank of the loops' constraints in `rows` if straight links, at q (n_q,), rad and m, make some redundant.
 
-    Bent links raise it: joints seem to be locked that the links let move. So does a path by which links bend.
+    Else None. Bent links raise it: joints seem to be locked that the links let move. So does a path by which they bend.
     """
     count = int(np.count_nonzero(model.loop_rows[rows]))
     if not count:
@@ -122,7 +122,7 @@ def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None
 
 
 def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
-    """Why links in such loops cannot be given a shape; "" where there are none."""
+    """Why links in such loops, straight at q (n_q,), rad and m, cannot be given a shape; "" where there are none."""
     if rank_of_redundant_loops(model, q, rows) is None:
         return ""
     owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))

@@ -64,9 +64,8 @@ def grid_postures(
     start, shape = undeformed_posture(model).q, tuple(len(axis.values) for axis in axes)
     values = np.stack(np.meshgrid(*(axis.values for axis in axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
     turn = next((values[:, k] for k, axis in enumerate(axes) if axis.name == TURN), np.zeros(1))
-    rows = [_row(model, axis, point, values[:, k]) for k, axis in enumerate(axes) if axis.name != TURN]
-    measured = np.zeros(len(axes))
-    is_row = np.array([axis.name != TURN for axis in axes])
+    is_row, measured = np.array([axis.name != TURN for axis in axes]), np.zeros(len(axes))
+    rows = [_row(model, axes[k], point, values[:, k]) for k in np.flatnonzero(is_row)]
     along = replace(model, rows=tuple(rows))
     measured[is_row] = along.constraints.values(start[None], np.zeros(1))[0][0] + values[0, is_row]
     if turned_about is not None:
@@ -74,9 +73,16 @@ def grid_postures(
         place = model.tree.places(start[None]).at(model.tree.section(point)).r[0]
         rows += [_row(model, GridAxis(name, place, True), point, place[["xyz".index(name)]]) for name in sorted(kept)]
     if keeps_orientation or turned_about is not None:
-        rows += _orientation(
-            model, point, start, turn[:, None] * (np.zeros(3) if turned_about is None else turned_about)
-        )
+        turns = turn[:, None] * (np.zeros(3) if turned_about is None else turned_about)
+        ground, section = map(model.tree.section, (GROUND, point))
+        triad = model.tree.places(start[None]).at(section).F[0]
+        x, y, z = logarithm(triad)
+        if point in model.tree.tools:
+            turns = turns @ triad.T
+        of_time = tuple(spline(np.arange(float(len(turns))), turns, 1))  # the number of the posture
+        law = OrientationLaw("rotation_vector", of_time, (x, y, z))
+        axes_kept = np.eye(3)[2:] if model.scene.is_planar else np.eye(3)
+        rows += [ConstraintRow("orientation", "rotation", ground, section, e, e, law=law) for e in axes_kept]
     robot = model.without_paths()
     robot = replace(robot, rows=(*robot.rows, *rows))
     seed = tuple(int(np.abs(axis.values - now).argmin()) for axis, now in zip(axes, measured, strict=True))
@@ -166,8 +172,7 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
     if axis.is_place:
         e, (ground, section) = np.eye(3)["xyz".index(axis.name)], map(model.tree.section, (GROUND, point))
         return ConstraintRow(axis.name, "point", ground, section, e, e, target=target)
-    joints = {joint.name: joint for joint in model.scene.joint}
-    joint = joints[axis.name]
+    joint = next(joint for joint in model.scene.joint if joint.name == axis.name)
     if len(joint.units) != 1:
         raise InputError(
             f"{model.scene.path}: grid: expected a joint with one coordinate",
@@ -176,25 +181,8 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
     return row_of_joint(model.tree, joint, axis.name, target)
 
 
-def _orientation(model: Model, point: str, start: Array, turns: Array) -> list[ConstraintRow]:
-    """Rows by which the body of `point` is turned as at the start: about z in the plane, about all axes else.
-
-    And from there by `turns` (P, 3), rad, in the axes of a tool, or else global ones, by the number of the posture.
-    """
-    tree = model.tree
-    ground, section = map(tree.section, (GROUND, point))
-    triad = tree.places(start[None]).at(section).F[0]
-    reference = logarithm(triad)
-    if point in tree.tools:
-        turns = turns @ triad.T
-    functions = spline(np.arange(float(len(turns))), turns, 1)
-    law = OrientationLaw("rotation_vector", tuple(functions), (reference[0], reference[1], reference[2]))
-    axes = np.eye(3)[2:] if model.scene.is_planar else np.eye(3)
-    return [ConstraintRow("orientation", "rotation", ground, section, e, e, law=law) for e in axes]
-
-
 def within_limits(model: Model, q: Array) -> Booleans:
-    """Return (P,) whether postures q (P, n_q) are within the limits of all joints."""
+    """Whether (P,) postures q (P, n_q), rad and m, are within the limits of all joints."""
     cut = any(np.isfinite(joint.position_limits).any() for joint in model.tree.cut_joints)
     if cut and len(q) > 1:  # angles there are by the motion up to them
         return np.array([within_limits(model, one[None])[0] for one in q])

@@ -1,13 +1,14 @@
-"""What a tracking problem requires at least, and what would do where limits are too small."""
+"""A tracking problem as posed for a scene: whether patches can do it, why not, what would do instead, and warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.arrays import Array, ComplexArray
 from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from .._core import TimeFunction
@@ -17,10 +18,9 @@ from ..inversion.stable_inversion import invert
 from ..inversion.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from ..model.nodes import rotor
 from ..run.context import Context
-from .geared import without_rotor
-from .intervals import OUT_OF_REACH, settled, start_breaks
-from .path_error import Tolerance, forces_off_path, rows_of_points
-from .transition import Tracked, Transition
+from .geared import motor_names, without_rotor
+from .problem import OUT_OF_REACH, SETTLED, settled, start_breaks, track
+from .transition import Limits, Tolerance, Tracked, Transition, forces_off_path, rows_of_points
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6
@@ -29,6 +29,10 @@ NEAR_END = 1e-3  # of the path's time, of its start and of its end, for derivati
 FAR = 0.1  # of the time constant of the slowest zero: t_ℓ of patches whose voltages need not converge with modes
 INVERTED = 1e-6  # tolerance of stable inversion
 SEEN = 1e-3  # of the limits: by less than that a tolerance saves, and gaps of quadratic programs hide its price
+ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
+WEAK = 1.05  # times the limits of motors: least torques on few intervals that finer ones do not bring within them
+AMPLE = 1e3  # times the largest torque along the path: as good as no limit
+NONE = 1e-4  # of the limits: voltages that motors alone do without
 
 
 @struct
@@ -44,38 +48,53 @@ class Bounds:
     relief: Array
 
 
-def bounds_of_zeros(
-    servo: Servo, asked: Transition, linear: Linearisation, around: tuple[float, float], unit: Array
-) -> Bounds:
-    """Least voltages that each zero needs, V, by the motion of motors alone; patches take shares of `unit` (m,), V.
+@struct
+class Posed:
+    """What is asked for, on which breaks (s), `coarse` ones for a least voltage; time before and after the path (s)."""
+
+    asked: Transition
+    linear: Linearisation
+    around: tuple[float, float]
+    breaks: Array
+    coarse: Array
+
+    @cached_property
+    def bounds(self) -> Bounds | None:
+        """What each zero requires, V; None where motors alone have no bounded motion."""
+        try:
+            return bounds_of_zeros(self.asked, self.linear, self.around)
+        except SolveError:
+            return None
+
+
+def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[float, float]) -> Bounds:
+    """Least voltages that each zero needs, V, with patches in proportion to `asked.units`; `around` the path, s.
 
     Rest at the start requires ∫ e^{−st} ℓᵀB V dt = −ζ of each zero in the right half plane, with its left eigenvector ℓ
     and ζ = ℓᵀ(y − y_rest) of stable inversion there: |V| ≥ |ζ| Re s / Σ|ℓᵀB|; likewise the others at the end.
     A path error e takes off up to |ℓᵀM⁻¹(∂r/∂e + s ∂r/∂ė + s² ∂r/∂ë)| e_max. Vibrations (`LIGHT`) are left out.
     Raises `SolveError` where motors alone have no bounded motion.
     """
-    end = float(linear.times[-1])
-    pre, post = decay_times(linear, end, needs_future=True)
-    pre, post = max(pre, around[0]), max(post, around[1])
+    servo, end, unit = asked.driven, float(linear.times[-1]), asked.units
+    pre, post = map(max, decay_times(linear, needs_future=True), around)
     inverted = invert(servo, linear, pre, post, INVERTED, lambda _: True)
     if inverted.status != "completed":
         raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {inverted.status}")
     zeros, times, shares, reliefs = [], [], [], []
     for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
-        still = np.zeros((1, len(rest)))
+        n, still = len(rest), np.zeros((1, len(rest)))
         dynamics = linear_dynamics(servo, np.array([t]), rest[None], still, still)
         s, left = np.linalg.eig(first_order(dynamics, 0, servo.scale).T)
         y = np.concatenate([servo.scale * (inverted.curve(t) - rest), inverted.curve(t, 1)])
         B = np.linalg.solve(dynamics.M[0], asked.Phi_V) * unit
         off = np.zeros((3, 1, len(rows_of_points(servo))))
         slopes = forces_off_path(servo, np.array([t]), (rest[None], still, still), off)[1]
-        by_error = np.linalg.solve(dynamics.M[0], slopes[:, 0, : len(rest)])
-        counts = (sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)
-        for k in np.flatnonzero(counts):
-            reach = float(np.abs(left[len(rest) :, k] @ B).sum())
+        by_error = np.linalg.solve(dynamics.M[0], slopes[:, 0, :n])
+        for k in np.flatnonzero((sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)):
+            reach = float(np.abs(left[n:, k] @ B).sum())
             zeros.append(s[k])
             times.append(t)
-            relieved = np.abs(left[len(rest) :, k] @ np.tensordot(s[k] ** np.arange(3), by_error, 1)).sum()
+            relieved = np.abs(left[n:, k] @ np.tensordot(s[k] ** np.arange(3), by_error, 1)).sum()
             required = max(0.0, float(abs(left[:, k] @ y) * abs(s[k].real) - asked.allowed * relieved))
             shares.append(required / reach if reach else np.inf)
             reliefs.append(relieved / reach if reach else 0.0)
@@ -84,103 +103,40 @@ def bounds_of_zeros(
     return Bounds(np.array(zeros, dtype=complex)[order], np.array(times)[order], voltages[order], relief[order])
 
 
-def enough_time(servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float) -> float:
-    """Return the pre- and post-actuation (s) that voltages within limits need; NaN if not found.
+def _remedies(posed: Posed, intervals: int, share: float) -> Iterator[str]:
+    """What would bring a least voltage of `share` times the limits within them, each by a few solutions.
 
-    The least voltage falls about as e^{−s t}, s the slowest zero to the right (Zou and Devasia, 1999).
+    It falls about as e^{−s t} with the time t around the path, s the slowest zero to the right (Zou and Devasia, 1999),
+    as T^−m with the path's time, m the order with which it starts, and linearly with a path tolerance.
     """
-    end, zeros = servo.end, linearise(servo, servo.end).zeros.real
-    rate = float(zeros[zeros > 1.0 / end].min(initial=np.inf))
+    asked, (pre, post), zeros = posed.asked, posed.around, posed.linear.zeros.real
+    servo, end, given = asked.driven, asked.driven.end, asked.tolerance or Tolerance(0.0)
 
-    def share_with(more: float) -> float:
-        start, last = -around[0] - more, end + around[1] + more
-        return _share(servo, asked, start_breaks(start, end, last, intervals // 2))
+    def share_of(asked: Transition, more: float = 0.0) -> float:
+        path_end = asked.driven.end
+        breaks = start_breaks(-pre - more, path_end, path_end + post + more, intervals // 2)
+        least = settled(asked, breaks, ROUGHLY)
+        return least.share if least.converged and servo.goes_on() else np.nan
 
-    return _enough(share_with, share, rate)
-
-
-def enough_path_time(
-    servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float
-) -> float:
-    """The path's time (s) for voltages within their limits, of the same path slowed down; NaN where not found.
-
-    The least voltage falls about as T^−m, m the order with which the path starts.
-    """
-
-    def share_with(more: float) -> float:
+    def slowed(more: float) -> float:
         slower = servo.slowed(float(np.exp(more)))
-        end = slower.end + around[1]
-        rest = equilibrium(slower, -around[0] - NEAR_END), equilibrium(slower, end + NEAR_END)
-        breaks = start_breaks(-around[0], slower.end, end, intervals // 2)
-        return _share(servo, replace(asked, driven=slower, rest=rest), breaks)
+        rest = equilibrium(slower, -pre - NEAR_END), equilibrium(slower, slower.end + post + NEAR_END)
+        return share_of(replace(asked, driven=slower, rest=rest))
 
-    return float(servo.end * np.exp(_enough(share_with, share, _lower_order(servo))))
-
-
-def enough_tolerance(
-    servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float, relief: float
-) -> float:
-    """The path tolerance (m) that voltages within limits need; NaN if not found.
-
-    The least voltage falls about linearly with it, by less than `relief` (shares per m).
-    """
-    if asked.gears is not None or not relief:
-        return np.nan
-    breaks = start_breaks(-around[0], servo.end, servo.end + around[1], intervals // 2)
-    given = asked.tolerance or Tolerance(0.0)
-
-    def share_with(more: float) -> float:
+    def widened(more: float) -> float:
         wider = replace(given, error=given.error + more)
-        return float(np.exp(_share(servo, replace(asked, tolerance=wider), breaks) - 1.0))  # its logarithm is linear
+        return float(np.exp(share_of(replace(asked, tolerance=wider)) - 1.0))  # its logarithm is linear
 
-    return given.error + _enough(share_with, float(np.exp(share - 1.0)), relief)
-
-
-def check_within_reach(asked: Transition, linear: Linearisation, bounds: Bounds | None, share: float) -> None:
-    """Raise `SolveError` where a lower bound of the least voltage exceeds the limits by the factor `share`.
-
-    What would do follows from how the bound of the zero falls: as e^{−s t}, as T^−m, linearly with a path tolerance.
-    """
-    if share <= OUT_OF_REACH:
-        return
-    servo = asked.driven
-    zeros, limit = linear.zeros[[0, -1]], asked.units.max()
-    rate, found = slowest(zeros), f"at least {share:.3g} times the limits"
-    if bounds is not None and len(bounds.voltages):
-        rate = abs(float(bounds.zeros[0].real))
-        found += f"; the zero at {bounds.zeros[0].real:.4g} 1/s alone requires {bounds.voltages[0]:.4g} V"
-    would = [f"{1e3 * np.log(share) / rate:.3g} ms more of pre_actuation and post_actuation"] if rate else []
-    if bounds is not None and bounds.relief.any() and asked.gears is None:
-        of_zeros = bounds.relief > 0.0
-        error = float(((bounds.voltages - limit) / bounds.relief)[of_zeros].max()) + asked.allowed
-        would.append(f"a path_tolerance of more than {1e3 * error:.3g} mm")
-    would += [
-        f"the same path in {servo.end * share ** (1 / _lower_order(servo)):.3g} s instead of {servo.end:g} s",
-        f"patches that bend the links {share:.3g} times as much per volt",
-    ]
-    raise SolveError(
-        f"{servo.where}: patches cannot carry the robot: they would need {found}. Any of these comes near:"
-        f" {'; '.join(would)}"
-    )
-
-
-def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
-    """V/m, by how much less the least voltage is for a larger path tolerance; None without one, or one too small."""
-    if asked.tolerance is None:
-        return None
-    prices = float(least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2)
-    return None if least.share and prices * asked.allowed < SEEN else prices * float(asked.units.max())
-
-
-def slowest(zeros: ComplexArray) -> float:
-    """1/s, of the slowest of the zeros; 0 without any but vibrations."""
-    sizes = np.abs(zeros.real)[np.abs(zeros.real) > LIGHT * np.abs(zeros)]
-    return float(sizes.min()) if sizes.size else 0.0
-
-
-def _share(servo: Servo, asked: Transition, breaks: Array) -> float:
-    least = settled(asked, breaks, servo.goes_on, ROUGHLY)
-    return least.share if least.converged and servo.goes_on() else np.nan
+    rate = float(zeros[zeros > 1.0 / end].min(initial=np.inf))
+    if np.isfinite(more := _enough(lambda more: share_of(asked, more), share, rate)):
+        yield f"{1e3 * more:.3g} ms more of pre_actuation and post_actuation"
+    if np.isfinite(longer := float(end * np.exp(_enough(slowed, share, _lower_order(servo))))):
+        yield f"the same path in {longer:.3g} s"
+    relief = 0.0 if posed.bounds is None else float(posed.bounds.relief.max(initial=0.0)) / asked.units.max()
+    if asked.gears is None and relief:
+        wider = given.error + _enough(widened, float(np.exp(share - 1.0)), relief)
+        if np.isfinite(wider):
+            yield f"{1e3 * wider:.3g} mm of path_tolerance"
 
 
 def _enough(share_with: Callable[[float], float], share: float, rate: float) -> float:
@@ -202,11 +158,151 @@ def _enough(share_with: Callable[[float], float], share: float, rate: float) -> 
     return np.nan
 
 
-def path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, float]:
+def check_reach(posed: Posed, least: Tracked | None) -> None:
+    """Raise `SolveError` where a zero, or the least voltage, surely needs `OUT_OF_REACH` times the limits.
+
+    What would do follows from how the bound of the zero falls: as e^{−s t}, as T^−m, linearly with a path tolerance.
+    """
+    asked, bounds, limit = posed.asked, posed.bounds, posed.asked.units.max()
+    shares = [] if bounds is None else (bounds.voltages / limit).tolist()
+    share = max([*shares, *([] if least is None else [least.surely])], default=0.0)
+    if not asked.is_limited or share <= OUT_OF_REACH:
+        return
+    servo, rate = asked.driven, slowest(posed.linear.zeros[[0, -1]])
+    needed = f"at least {share:.3g} times the limits"
+    if bounds is not None and len(bounds.voltages):
+        rate = abs(float(bounds.zeros[0].real))
+        needed += f"; the zero at {bounds.zeros[0].real:.4g} 1/s alone requires {bounds.voltages[0]:.4g} V"
+    would = [f"{1e3 * np.log(share) / rate:.3g} ms more of pre_actuation and post_actuation"] if rate else []
+    if bounds is not None and bounds.relief.any() and asked.gears is None:
+        of_zeros = bounds.relief > 0.0
+        error = float(((bounds.voltages - limit) / bounds.relief)[of_zeros].max()) + asked.allowed
+        would.append(f"a path_tolerance of more than {1e3 * error:.3g} mm")
+    would += [
+        f"the same path in {servo.end * share ** (1 / _lower_order(servo)):.3g} s instead of {servo.end:g} s",
+        f"patches that bend the links {share:.3g} times as much per volt",
+    ]
+    raise SolveError(
+        f"{servo.where}: patches cannot carry the robot: they would need {needed}. Any of these comes near:"
+        f" {'; '.join(would)}"
+    )
+
+
+def check_motors(posed: Posed) -> None:
+    """Raise `SolveError` where motors need more than their limits, with patches of `OUT_OF_REACH` times theirs.
+
+    Their least torque is looked for where torques along the path exceed the limits without patches.
+    """
+    limits, linear, servo = posed.asked.limits, posed.linear, posed.asked.driven
+    peaks = np.abs(servo.quasi_static(linear.times, linear.shape)).max(axis=0)
+    if (peaks <= limits.torque).all():
+        return
+    far = OUT_OF_REACH * limits.patches.range
+    torque = np.where(np.isfinite(limits.torque), limits.torque, AMPLE * peaks.max())
+    asked = replace(posed.asked, objective="least-torque", limits=Limits(replace(limits.patches, range=far), torque))
+    least = track(asked, posed.coarse)
+    if least.converged and least.share > WEAK:
+        needed = [
+            f"of {name} from {torque[k]:g} to more than {least.share * torque[k]:.3g}"
+            for k, name in enumerate(motor_names(servo.model))
+            if least.prices["torque"][k] > 0.0
+        ]
+        raise SolveError(
+            f"{servo.where}: no motion follows the path within the motors' limits, not even with"
+            f" {OUT_OF_REACH:g} times the voltages: raise moment_limit {' and '.join(needed)}, or slow the path down if"
+            " torques at rest are within limits"
+        )
+
+
+def check_found(context: Context, posed: Posed, least: Tracked) -> None:
+    """Raise `SolveError` where there is no least voltage: amplifiers are too slow, or the path is too fast."""
+    if least.converged:
+        return
+    asked, limits, place = posed.asked, posed.asked.limits, posed.asked.driven.where
+    if limits.patches.has_rates:
+        none = np.full_like(limits.patches.slew, np.inf)
+        free = replace(asked, limits=replace(limits, patches=replace(limits.patches, slew=none, current=none)))
+        if track(free, posed.breaks).converged:
+            raise SolveError(
+                f"{place}: no motion follows the path within the largest current and slew rate of the"
+                " amplifiers, whatever the voltages: slow the path down, or raise current or slew"
+            )
+    raise SolveError(
+        f"{place}: no motion of motors and patches was found: "
+        + (causes(context, posed) or f"slow the path down, allow pre_actuation and post_actuation, or {raised(posed)}")
+    )
+
+
+def raised(posed: Posed) -> str:
+    """Advice to raise the limits that there are: of motors, by their joints, and of patches."""
+    limits, joints = posed.asked.limits, motor_names(posed.asked.driven.model)
+    names = [name for name, most in zip(joints, limits.torque, strict=True) if most < np.inf]
+    keys = [f"moment_limit of {' and '.join(names)}"] if names else []
+    keys += ["limit of patches"] if posed.asked.is_limited else []
+    keys += ["current or slew of amplifiers"] if limits.patches.has_rates else []
+    return f"raise {', '.join(keys)}" if keys else "take another path"
+
+
+def causes(context: Context, posed: Posed) -> str:
+    """Why there may be no motion: zeros at infinity, ends of the path, patches far from its point; may be empty."""
+    servo, linear = posed.asked.driven, posed.linear
+    texts = [*singular_times(servo, linear), *rough_ends(servo.functions, servo.end), *_far_patches(context, linear)]
+    return "; ".join(texts)
+
+
+def is_beyond(posed: Posed, least: Tracked) -> bool:
+    """Whether the least voltage is beyond the limits of patches."""
+    return least.share > 1.0 + ENOUGH and posed.asked.is_limited
+
+
+def needs_none(posed: Posed, least: Tracked) -> bool:
+    """Whether motors alone stay within the path tolerance, so that no voltage is needed."""
+    return posed.asked.tolerance is not None and least.share < NONE
+
+
+def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) -> Iterator[str]:
+    """Warnings: what would do where limits are too small, ends of the path and places of patches that cost voltage.
+
+    `intervals` are those that the analysis begins with.
+    """
+    servo, limits = posed.asked.driven, np.unique(posed.asked.units)
+    if is_beyond(posed, least):
+        would = f"{least.share:.3g} times their limits"
+        if len(limits) == 1:
+            would = f"{least.share * limits[0]:.3g} V instead of {limits[0]:g} V"
+        would = "; ".join([would, *_remedies(posed, intervals, least.share)])
+        yield f"patches cannot do it within their limits. Any of these would do: {would}"
+    if least.doubt > 3 * SETTLED:
+        yield (
+            f"the least voltage, {least.share * limits[-1]:.3g} V, did not settle on finer meshes: it may"
+            f" be {100 * least.doubt:.2g} % less. Fewer modes, or more intervals"
+            if np.isfinite(least.doubt)
+            else "the least voltage is that of the first intervals: finer ones had no solution. Fewer modes, or more"
+            " intervals"
+        )
+    yield from rough_ends(servo.functions, servo.end)
+    yield from _far_patches(context, posed.linear)
+
+
+def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
+    """V/m, by how much less the least voltage is for a larger path tolerance; None without one, or one too small."""
+    if asked.tolerance is None:
+        return None
+    prices = float(least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2)
+    return None if least.share and prices * asked.allowed < SEEN else prices * float(asked.units.max())
+
+
+def slowest(zeros: ComplexArray) -> float:
+    """Size of the real part, 1/s, of the slowest of the `zeros` (…), 1/s; 0 without any but vibrations."""
+    sizes = np.abs(zeros.real)[np.abs(zeros.real) > LIGHT * np.abs(zeros)]
+    return float(sizes.min()) if sizes.size else 0.0
+
+
+def _path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, float]:
     """Power of time with which a path leaves its start and reaches its `end` (s): 2 where its acceleration jumps."""
     orders = []
     for t, ahead in ((0.0, 1.0), (end, -1.0)):
-        near = as_floats(t + ahead * NEAR_END * end * np.array([1.0, 2.0]))
+        near = t + ahead * NEAR_END * end * np.array([1.0, 2.0])
         size = np.sqrt(sum(target.sample(near)[2] ** 2 for target in targets))
         orders.append(2.0 + np.log2(size[1] / size[0]) if size[0] > 0 else np.inf)
     return float(orders[0]), float(orders[1])
@@ -214,13 +310,13 @@ def path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, flo
 
 def _lower_order(servo: Servo) -> float:
     """The power of time with which a path leaves its start or reaches its end, the lower one that is known; else 4."""
-    return min((order for order in path_orders(servo.functions, servo.end) if order > 1), default=4.0)
+    return min((order for order in _path_orders(servo.functions, servo.end) if order > 1), default=4.0)
 
 
 def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
-    """A warning for a path whose acceleration or jerk jumps where it begins or ends."""
+    """A warning for a path to its `end` (s) whose acceleration or jerk jumps where it begins or ends."""
     names = {2: "acceleration", 3: "jerk"}
-    rough = [(where, round(order)) for where, order in zip(("begins", "ends"), path_orders(targets, end), strict=True)
+    rough = [(where, round(order)) for where, order in zip(("begins", "ends"), _path_orders(targets, end), strict=True)
              if np.isfinite(order) and round(order) in names]  # fmt: skip
     for order in sorted({order for _, order in rough}):
         where = " and ".join(f"where it {name}" for name, of in rough if of == order)
@@ -240,11 +336,11 @@ def check_ends_for_gears(servo: Servo) -> float:
             " motors would need impulses",
             f"that {text}",
         )
-    return min(path_orders(servo.functions, servo.end))
+    return min(_path_orders(servo.functions, servo.end))
 
 
 def singular_times(servo: Servo, linear: Linearisation) -> Iterator[str]:
-    """Yield where the modal inertia with free motors changes its sign, and the remedy.
+    """Where the modal inertia with free motors changes its sign, and the remedy.
 
     That is a rotor without which its sign stays, or else less mass; other modes may help.
     """
@@ -259,11 +355,12 @@ def singular_times(servo: Servo, linear: Linearisation) -> Iterator[str]:
         )
 
 
-def far_patches(context: Context, zeros: ComplexArray) -> Iterator[str]:
+def _far_patches(context: Context, linear: Linearisation) -> Iterator[str]:
     """A warning for each point of a path that is far from the last patch: voltages need not converge with modes.
 
     In the continuum the path must start flatter than exp(−t_ℓ/t), t_ℓ = ℓ² √(ρA/EI)/8 (`docs/theory.md`).
     """
+    zeros = linear.zeros[[0, -1]]
     rate = float(zeros.real[zeros.real > LIGHT * np.abs(zeros)].min(initial=np.inf))
     model = context.model if context.whole is None else context.whole.model
     for name in dict.fromkeys(path.point for path in model.scene.trajectory if path.point is not None):

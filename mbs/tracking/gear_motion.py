@@ -10,24 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import ceil, factorial
-from typing import TYPE_CHECKING, NamedTuple
+from math import ceil, comb, factorial
+from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, PPoly
 from ...common.libraries import scipy
 from ..inversion.collocation import gauss
 from ..inversion.stable_inversion import halved
 from ..model.model import Model
 from ..run.record import GearCurve
-from .geared import GearedServo, Gears
-from .intervals import MOST_INTERVALS
-from .problem import track
+from .geared import GearedServo, motor_names
+from .problem import MOST_INTERVALS, track
 from .transition import Limits, Tracked, Transition
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 TEN = gauss(10)
 REACHES = 1e-6  # of the largest singular value of Φ_V: smaller ones are none
@@ -39,27 +35,15 @@ LASTS = 20.0  # D/K after which a gear has come to rest
 GONE = 1e-12  # of the largest twist: decaying parts below it are none
 MANY = np.arange(40) / 40  # of an interval, where a polynomial is looked at for its largest value
 DEGREES = np.arange(len(TEN.c))
-ON_UNIT = [  # Legendre's polynomials of ξ
-    np.polynomial.Legendre.basis(k, [0, 1])  # type: ignore[no-untyped-call, unused-ignore]
-    for k in DEGREES.tolist()
-]
-TO_SERIES = np.linalg.inv(np.column_stack([of(TEN.c) for of in ON_UNIT]))  # their coefficients by values at the points
-# powers of ξ, lowest first, by these coefficients
-POWERS: Array = np.column_stack(
-    [np.pad(of.convert(kind=np.polynomial.Polynomial).coef, (0, len(DEGREES) - 1 - k)) for k, of in enumerate(ON_UNIT)]
+# Coefficients of Legendre's polynomials of 2ξ − 1 by values at the points, and powers of ξ, lowest first, by these
+TO_SERIES: Array = np.linalg.inv(
+    np.polynomial.legendre.legvander(2 * TEN.c - 1, 9)  # type: ignore[no-untyped-call, unused-ignore]
 )
+POWERS = np.array([[(-1.0) ** (k + i) * comb(k, i) * comb(k + i, i) for k in range(10)] for i in range(10)])
 # of e^{−x} on [0, 1], lowest power first
 EXPONENTIAL: Array = np.polynomial.Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
     np.linspace(0, 1, 101), np.exp(-np.linspace(0, 1, 101)), 10, domain=[0, 1], window=[0, 1]
 ).coef
-
-
-class Motion(NamedTuple):
-    """Curves, and the largest force left on modes, relative to the largest elastic one."""
-
-    curve: PPoly
-    voltage: PPoly
-    unmet: float
 
 
 def within_limits(
@@ -67,8 +51,8 @@ def within_limits(
 ) -> Tracked:
     """The motion `asked` for behind its gears; its limits shrink by what exceeds `limits` between Gauss points.
 
-    Where that does not do, the motion that exceeds them least. The breaks of the second, coarser one of the `meshes`
-    serve where those of the first have no solution.
+    Where that does not do, the motion that exceeds them least. The second one of the `meshes` (breaks, s) is coarser,
+    for where the first has no solution; `tolerance` is of forces left on modes, `step` (s) that of outputs.
     """
     near, wanted = _without_jumps(asked, meshes, near, tolerance), replace(asked, limits=limits)
     found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
@@ -124,11 +108,18 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
     breaks, end = curve.x, motion.curve.x[-1]
 
     def curves(breaks: Array, torques: Array) -> dict[str, GearCurve]:
+        """Twists of gears, and torques of their motors: what a rigid gear takes, and I δ̈."""
         of_all, motors = _through(breaks, torques), torques.shape[1] - len(gears.joints)
-        return {
-            joint: _gear(gears, k, _column(of_all, motors + k), _column(of_all, gears.columns[k]))
-            for k, joint in enumerate(gears.joints)
-        }
+        by_joint = dict[str, GearCurve]()
+        for k, joint in enumerate(gears.joints):
+            transmitted, rigid = (
+                scipy.interpolate.PPoly(of_all.c[:, :, i].copy(), breaks) for i in (motors + k, gears.columns[k])
+            )
+            twist = _twist(transmitted, gears.stiffness[k], gears.damping[k])
+            torque, second = _on(rigid, twist.x), twist.derivative(2).c
+            torque.c[-len(second) :] += gears.inertia[k] * second
+            by_joint[joint] = GearCurve(twist, torque)
+        return by_joint
 
     def along(breaks: Array) -> tuple[Array, list[Array]]:
         times = _nodes(breaks)
@@ -142,18 +133,13 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
     ahead = np.column_stack([of.twist(times, 2) for of in alone.values()]) * gears.inertia
     pushed = np.einsum("Tk,Tkf->Tf", ahead, driven.reactions(times, *states))
     torques = driven.forces(times, *states)[1] + np.hstack([pushed[:, n:], pushed[:, n + gears.columns]])
-    more = pushed[:, :n] @ _inverse(asked.Phi_V).T
+    more = pushed[:, :n] @ np.linalg.pinv(asked.Phi_V, rcond=REACHES).T
     voltage = _through(breaks, voltage(times) + more)
-    return replace(tracked, curve=curve, voltage=voltage, gears=curves(breaks, torques), unmet=motion.unmet)
+    return replace(motion, curve=curve, voltage=voltage, gears=curves(breaks, torques))
 
 
-def _inverse(Phi_V: Array) -> Array:
-    """Least voltages (m, n) by forces on modes, as far as patches reach these."""
-    return np.linalg.pinv(Phi_V, rcond=REACHES)
-
-
-def smooth(asked: Transition, tracked: Tracked) -> Motion:
-    """P as a quintic spline at rest at both ends, and voltages that leave as little on modes as patches can.
+def smooth(asked: Transition, tracked: Tracked) -> Tracked:
+    """The motion with p as a quintic spline at rest at both ends, and voltages that leave least on modes.
 
     Its third derivative is zero there, in place of a condition at the breaks next to the ends: else δ̈ would jump, and
     its reaction on a link with a gear of its own, whose motor would need an impulse.
@@ -168,9 +154,9 @@ def smooth(asked: Transition, tracked: Tracked) -> Motion:
     p = curve(times)
     wanted = tracked.voltage(times)
     left = asked.driven.residuals(times, p, curve(times, 1), curve(times, 2)) - wanted @ asked.Phi_V.T
-    more = left @ _inverse(asked.Phi_V).T
+    more = left @ np.linalg.pinv(asked.Phi_V, rcond=REACHES).T  # least voltages, as far as patches reach modes
     unmet = float(np.abs(left - more @ asked.Phi_V.T).max() / np.abs(elastic * p).max())
-    return Motion(curve, _through(breaks, wanted + more), unmet)
+    return replace(tracked, curve=curve, voltage=_through(breaks, wanted + more), unmet=unmet)
 
 
 class Shares(NamedTuple):
@@ -182,18 +168,23 @@ class Shares(NamedTuple):
 
 
 def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
-    """What voltages and torques of motors reach at many points of each interval."""
+    """What voltages and torques of motors reach at many points of each interval.
+
+    Torques of motors behind gears contain what accelerates their rotors ahead of the joint.
+    """
+    gears, count = asked.gears, len(asked.limits.torque)
+    assert gears is not None
     breaks = np.unique(np.concatenate([of.twist.x for of in tracked.gears.values()]))
     times = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * MANY).ravel(), breaks[-1])
-    least, most = asked.ranges["voltage"]
-    V, torques = tracked.voltage(times), np.abs(_motor_torques(asked, tracked, times))
-    of_voltages = float(np.maximum(V / most, V / least).max())
+    (least, most), V, torques = asked.ranges["voltage"], tracked.voltage(times), np.zeros((len(times), count))
+    if len(gears.joints) < count:
+        torques[:] = asked.driven.forces(times, *(tracked.curve(times, k) for k in range(3)))[1][:, :count]
+    for column, joint in zip(gears.columns, gears.joints, strict=True):
+        torque = tracked.gears[joint].torque
+        assert torque is not None
+        torques[:, column] = torque(times)
+    of_voltages, torques = float(np.maximum(V / most, V / least).max()), np.abs(torques)
     return Shares(of_voltages, torques.max(axis=0) / asked.limits.torque, times[torques.argmax(axis=0)])
-
-
-def motor_names(model: Model) -> list[str]:
-    """Joints of motors, one for each torque."""
-    return [joint for joint, columns in model.motors.items() for _ in columns]
 
 
 def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
@@ -207,43 +198,21 @@ def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
         )
 
 
-def _motor_torques(asked: Transition, tracked: Tracked, times: Array) -> Array:
-    """Torques (T, motors) of all motors, those behind gears with what accelerates their rotors ahead of the joint."""
-    gears, count = asked.gears, len(asked.limits.torque)
-    assert gears is not None
-    torques = np.zeros((len(times), count))
-    if len(gears.joints) < count:
-        torques[:] = asked.driven.forces(times, *(tracked.curve(times, k) for k in range(3)))[1][:, :count]
-    for column, joint in zip(gears.columns, gears.joints, strict=True):
-        torque = tracked.gears[joint].torque
-        assert torque is not None
-        torques[:, column] = torque(times)
-    return torques
-
-
-def _gear(gears: Gears, k: int, transmitted: PPoly, rigid: PPoly) -> GearCurve:
-    """δ of a gear, and the torque of its motor: what a rigid gear takes, and I δ̈."""
-    twist = _twist(transmitted, gears.stiffness[k], gears.damping[k])
-    torque, second = _on(rigid, twist.x), twist.derivative(2).c
-    torque.c[-len(second) :] += gears.inertia[k] * second
-    return GearCurve(twist, torque)
-
-
 def _nodes(breaks: Array) -> Array:
     """Ten Gauss points of each interval, one after the other."""
-    return as_floats((breaks[:-1, None] + np.diff(breaks)[:, None] * TEN.c).ravel())
+    return (breaks[:-1, None] + np.diff(breaks)[:, None] * TEN.c).ravel()
 
 
-def _through(breaks: Array, values: Array) -> scipy.interpolate.PPoly:
+def _through(breaks: Array, values: Array) -> PPoly:
     """Polynomials through values (N · 10, k) at `_nodes`, without what is rounding: their derivatives are used."""
     h, at_nodes = np.diff(breaks), values.reshape(len(breaks) - 1, len(TEN.c), -1)
     series: Array = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
-    series = as_floats(np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0))
+    series = np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0)
     powers = np.einsum("ij,Njk->iNk", POWERS, series) / h[None, :, None] ** DEGREES[:, None, None]
     return scipy.interpolate.PPoly(powers[::-1], breaks)
 
 
-def _on(curve: scipy.interpolate.PPoly | scipy.interpolate.BSpline, breaks: Array) -> scipy.interpolate.PPoly:
+def _on(curve: PPoly | scipy.interpolate.BSpline, breaks: Array) -> PPoly:
     """The same with pieces between other breaks, which contain its own."""
     degree = curve.k if isinstance(curve, scipy.interpolate.BSpline) else len(curve.c) - 1
     return scipy.interpolate.PPoly(
@@ -251,11 +220,7 @@ def _on(curve: scipy.interpolate.PPoly | scipy.interpolate.BSpline, breaks: Arra
     )
 
 
-def _column(curve: scipy.interpolate.PPoly, k: int) -> scipy.interpolate.PPoly:
-    return scipy.interpolate.PPoly(np.ascontiguousarray(curve.c[:, :, k]), curve.x)
-
-
-def _held(curve: scipy.interpolate.PPoly, values: Array, lasts: float) -> scipy.interpolate.PPoly:
+def _held(curve: PPoly, values: Array, lasts: float) -> PPoly:
     """The same, and then `values` (k,) for so long (s)."""
     if not lasts:
         return curve
@@ -264,7 +229,7 @@ def _held(curve: scipy.interpolate.PPoly, values: Array, lasts: float) -> scipy.
     return scipy.interpolate.PPoly(np.concatenate([curve.c, still], axis=1), np.append(curve.x, curve.x[-1] + lasts))
 
 
-def _twist(transmitted: scipy.interpolate.PPoly, stiffness: float, damping: float) -> scipy.interpolate.PPoly:
+def _twist(transmitted: PPoly, stiffness: float, damping: float) -> PPoly:
     """δ with K δ + D δ̇ = τ_s from rest on: Σ (−D/K)^j τ_s^{(j)}/K, and what decays as e^{−K t/D} from each break."""
     breaks, lag = transmitted.x, damping / stiffness
     series, derivative = transmitted.c / stiffness, transmitted

@@ -9,7 +9,6 @@ the rotor is 1/N of that: with twists that are found without it, voltages and to
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
 from dataclasses import KW_ONLY, fields, replace
 
 import numpy as np
@@ -55,11 +54,11 @@ class GearedServo(Servo):
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
         """R (N, n), and torques (N, motors + k)."""
         r, tau = super().forces(times, p, v, a)
-        return r, np.hstack([tau, *(column[:, None] for column in self._transmitted(times, p, v, a))])
-
-    def _transmitted(self, times: Array, p: Array, v: Array, a: Array) -> Iterator[Array]:
-        for servo, column in zip(self.without, self.gears.columns, strict=True):
-            yield servo.motion.motion(as_list(times), p, v, a, self.postures(times)).tau[:, column]
+        of_gears = [
+            servo.motion.motion(as_list(times), p, v, a, self.postures(times)).tau[:, [column]]
+            for servo, column in zip(self.without, self.gears.columns, strict=True)
+        ]
+        return r, np.hstack([tau, *of_gears])
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Derivatives (N, n + motors + k, n) by p̈, ṗ and p."""
@@ -122,13 +121,10 @@ def with_gears(servo: Servo) -> Servo:
         )
     if loaded := sorted({load.joint for load in model.scene.load if load.joint in springs}):
         raise InputError(f"{model.scene.path}: expected no [[load]] on joints with stiffness", f'one on "{loaded[0]}"')
-    places, count = {}, 0
-    for joint, columns in model.motors.items():
-        places[joint], count = count, count + len(columns)
-    rotors = [rotor(node) for node in elastic]
+    rotors, motors = [rotor(node) for node in elastic], motor_names(model)
     gears = Gears(
         joints=tuple(springs),
-        columns=np.array([places[joint] for joint in springs]),
+        columns=np.array([motors.index(joint) for joint in springs]),
         stiffness=np.array([spring.slopes[0] for spring, _ in springs.values()]),
         damping=np.array([damping for _, damping in springs.values()]),
         inertia=np.array([inertia * ratio**2 for inertia, ratio in rotors]),
@@ -163,6 +159,11 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
                 " compliant gears",
                 f'that of joint "{joint}" on its first body, which turns with it. {remedy}',
             )
+
+
+def motor_names(model: Model) -> list[str]:
+    """Joints of motors, one for each torque."""
+    return [joint for joint, columns in model.motors.items() for _ in columns]
 
 
 def without_rotor(model: Model, joint: str) -> Model:

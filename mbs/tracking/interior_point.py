@@ -53,7 +53,7 @@ class Program:
         return np.hstack([x[:-1], x[1:, : self.g.shape[1] - x.shape[1]]])
 
     def objective(self, x: Array) -> float:
-        """Return the objective at x (N+1, s)."""
+        """The objective at x (N+1, s)."""
         z = self.z(x)
         return float((z * (0.5 * _times(self.H, z) + self.g)).sum())
 
@@ -70,48 +70,39 @@ class Minimum(NamedTuple):
     halfway: tuple[Array, Array, Array]
 
 
-class _Layout:
-    """Where unknowns stand: R_0's multipliers, then x_k and λ_k by turns, R_N's multipliers."""
+class _Equations:
+    """Newton's equations [H + CᵀWC, Aᵀ; A, 0] as LAPACK stores bands, with room for pivots.
+
+    Unknowns (size,): R_0's multipliers, then x_k and λ_k by turns, R_N's multipliers.
+    """
 
     def __init__(self, program: Program) -> None:
-        self.N, self.e, self.s = program.F.shape
-        self.r = program.g.shape[1] - self.s
-        self.first, self.last = len(program.start[0]), len(program.end[0])
-        self.period = self.s + self.e
-        self.size = self.first + self.N * self.period + self.s + self.last
-        self.x = self.first + self.period * np.arange(self.N + 1)[:, None] + np.arange(self.s)
-        self.equations = self.first + self.s + self.period * np.arange(self.N)[:, None] + np.arange(self.e)
-        self.of_start, self.of_end = np.arange(self.first), self.size - self.last + np.arange(self.last)
-        self.band = max(self.s + self.e + self.r, self.first + self.s, self.s + self.last) - 1
-
-    def add(self, to: Array, of_z: Array) -> None:
-        """What belongs to each z_k (N, s + r), to unknowns."""
-        to[self.x[:-1]] += of_z[:, : self.s]
-        to[self.x[1:, : self.r]] += of_z[:, self.s :]
-
-
-class _Band:
-    """[H, Aᵀ; A, 0] as LAPACK stores bands, with room for pivots."""
-
-    def __init__(self, program: Program, layout: _Layout) -> None:
+        self.program, (N, e, s) = program, program.F.shape
+        first, last = len(program.start[0]), len(program.end[0])
+        self.s, self.r, self.period = s, program.g.shape[1] - s, s + e
+        self.size = first + N * self.period + s + last
+        self.x = first + self.period * np.arange(N + 1)[:, None] + np.arange(s)
+        self.equations = first + s + self.period * np.arange(N)[:, None] + np.arange(e)
+        self.of_start, self.of_end = np.arange(first), self.size - last + np.arange(last)
+        self.band = max(s + e + self.r, first + s, s + last) - 1
         used = np.flatnonzero(program.C.any(axis=(0, 1)))
-        self.layout, self.C = layout, program.C[:, :, : used.max(initial=-1) + 1]
-        self.ab = np.zeros((layout.size, 3 * layout.band + 1)).T  # columns contiguous, as LAPACK takes them
+        self.C = program.C[:, :, : used.max(initial=-1) + 1]
+        self.ab = np.zeros((self.size, 3 * self.band + 1)).T  # columns contiguous, as LAPACK takes them
         self.factors = np.empty_like(self.ab)
         self._add_costs(self.ab, program.H)
-        x, equations = layout.x[:, 0], layout.equations[0, 0]
+        x, equations = self.x[:, 0], self.equations[0, 0]
         for row, column, of in (
             (equations, x[0], program.F),
             (equations, x[1], program.G),
             (0, x[0], program.start[0][None]),
-            (layout.size - layout.last, x[-1], program.end[0][None]),
+            (self.size - last, x[-1], program.end[0][None]),
         ):
             self._add(self.ab, row, column, of)
             self._add(self.ab, column, row, of.transpose(0, 2, 1))
 
     def factorize(self, W: Array) -> bool:
-        """Factors of [H + CᵀWC, Aᵀ; A, 0] in the place of those before; False where it is singular."""
-        b = self.layout.band
+        """Factors in the place of those before; False where it is singular."""
+        b = self.band
         self.factors[b:] = self.ab[b:]  # but for the room
         self._add_costs(self.factors, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
         self.factors, self.pivots, info = scipy.linalg.lapack.dgbtrf(self.factors, b, b, overwrite_ab=True)
@@ -119,22 +110,47 @@ class _Band:
 
     def solve(self, right: Array) -> Array:
         """The unknowns."""
-        b = self.layout.band
-        solution: Array = scipy.linalg.lapack.dgbtrs(self.factors, b, b, right, self.pivots)[0]
+        solution: Array = scipy.linalg.lapack.dgbtrs(self.factors, self.band, self.band, right, self.pivots)[0]
         return solution
 
     def _add_costs(self, ab: Array, blocks: Array) -> None:
-        (first, second), s = self.layout.x[:2, 0], self.layout.s
-        parts = (first, slice(None, s)), (second, slice(s, None))
+        parts = (self.x[0, 0], slice(None, self.s)), (self.x[1, 0], slice(self.s, None))
         for (row, of_rows), (column, of_columns) in product(parts, parts):
             self._add(ab, row, column, blocks[:, of_rows, of_columns])
 
     def _add(self, ab: Array, row: int, column: int, blocks: Array) -> None:
         """Blocks (k, i, j), the first at (row, column), the others by one period each further down the diagonal."""
         length = len(ab)
-        first = ab.T.ravel()[column * length + 2 * self.layout.band + row - column :]
-        strides = self.layout.period * length, 1, length - 1
+        first = ab.T.ravel()[column * length + 2 * self.band + row - column :]
+        strides = self.period * length, 1, length - 1
         as_strided(first, blocks.shape, [first.itemsize * stride for stride in strides])[...] += blocks
+
+    def add(self, to: Array, of_z: Array) -> None:
+        """What belongs to each z_k (N, s + r), to unknowns."""
+        to[self.x[:-1]] += of_z[:, : self.s]
+        to[self.x[1:, : self.r]] += of_z[:, self.s :]
+
+    def left(self, unknown: Array, z: Array) -> Array:
+        """Minus the gradient of the Lagrangian by all unknowns, with multipliers z (N, i)."""
+        left, program = -self.linear(unknown, z), self.program
+        self.add(left, -program.g)
+        left[self.equations] += program.c
+        left[self.of_start] += program.start[1]
+        left[self.of_end] += program.end[1]
+        return left
+
+    def linear(self, unknown: Array, z: Array) -> Array:
+        """The part of this gradient that is linear in `unknown` and in z."""
+        program, left = self.program, np.zeros(self.size)
+        x, multiplier = unknown[self.x], unknown[self.equations]
+        self.add(left, _times(program.H, program.z(x)) + _transposed_times(program.C, z))
+        left[self.x[:-1]] += _transposed_times(program.F, multiplier)
+        left[self.x[1:]] += _transposed_times(program.G, multiplier)
+        for (rows, _), at, k in ((program.start, self.of_start, 0), (program.end, self.of_end, -1)):
+            left[self.x[k]] += rows.T @ unknown[at]
+            left[at] = rows @ x[k]
+        left[self.equations] = _times(program.F, x[:-1]) + _times(program.G, x[1:])
+        return left
 
 
 def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:
@@ -148,63 +164,58 @@ def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) ->
             halfway = way.slack, way.z, way.unknown
     multipliers = np.where(way.slack < way.z, way.z, 0.0)  # of bounds that are reached
     change = halfway[2].copy()
-    change[way.layout.x] -= way.unknown[way.layout.x]
-    return Minimum(way.unknown[way.layout.x], multipliers, way.is_at_end(), (*halfway[:2], change))
+    x = way.unknown[way.equations.x]
+    change[way.equations.x] -= x
+    return Minimum(x, multipliers, way.is_at_end(), (*halfway[:2], change))
 
 
 class _CentralPath:
     """Unknowns, slack and multipliers z (N, i) of the inequalities on their way to the minimum."""
 
     def __init__(self, program: Program, relative_gap: float, near: Minimum | None) -> None:
-        self.program, self.layout, self.relative_gap = program, _Layout(program), relative_gap
-        self.band = _Band(program, self.layout)
+        self.program, self.equations, self.relative_gap = program, _Equations(program), relative_gap
         self.reach = np.abs(program.d).max(initial=1.0)
         self.force = 1 + float(np.abs(program.g).sum())
         self.count = max(1, program.d.size)
         if near is not None:
             self.slack, self.z, self.unknown = near.halfway
-        else:
-            self._begin()
+        else:  # at the minimum of ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive
+            self.equations.factorize(np.ones_like(program.d))
+            self.unknown = self.equations.solve(self.equations.left(np.zeros(self.equations.size), -program.d))
+            slack = self._slack()
+            least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
+            self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
+            self.z = self.force * float(self.slack.sum()) / (self.count**2 * self.slack)  # on the central path
         self._look()
 
-    def _begin(self) -> None:
-        """At the minimum of ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive."""
-        self.unknown = np.zeros(self.layout.size)
-        self.band.factorize(np.ones_like(self.program.d))
-        self.unknown = self.band.solve(_residuals(self.program, self.layout, self.unknown, -self.program.d))
-        slack = self._slack()
-        least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
-        self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
-        self.z = self.force * float(self.slack.sum()) / (self.count**2 * self.slack)  # on the central path
-
     def _slack(self) -> Array:
-        return self.program.d - _times(self.program.C, self.program.z(self.unknown[self.layout.x]))
+        return self.program.d - _times(self.program.C, self.program.z(self.unknown[self.equations.x]))
 
     def _look(self) -> None:
         """Take what equations and inequalities leave here, and the mean of slack × z."""
-        self.right = _residuals(self.program, self.layout, self.unknown, self.z)
+        self.right = self.equations.left(self.unknown, self.z)
         self.of_slack = self._slack() - self.slack
         self.gap = float((self.slack * self.z).sum()) / self.count
 
     def is_at_end(self) -> bool:
-        program, layout, right = self.program, self.layout, self.right
-        off = np.abs(right[layout.equations]).max(initial=0.0) / (1 + np.abs(program.c).max(initial=0.0))
+        program, places, right = self.program, self.equations, self.right
+        off = np.abs(right[places.equations]).max(initial=0.0) / (1 + np.abs(program.c).max(initial=0.0))
         if max(off, np.abs(self.of_slack).max(initial=0.0) / self.reach) > FEASIBLE:
             return False
         if self.gap * self.count > self.relative_gap * self.size():
             return False
-        multipliers = np.abs(self.unknown[layout.equations])
+        multipliers = np.abs(self.unknown[places.equations])
         terms = _transposed_times(np.abs(program.F), multipliers).max(initial=self.force)
-        return bool(np.abs(right[layout.x]).max() <= STATIONARY * terms)
+        return bool(np.abs(right[places.x]).max() <= STATIONARY * terms)
 
     def size(self) -> float:
         """What gaps are small against."""
-        return 1 + abs(self.program.objective(self.unknown[self.layout.x]))
+        return 1 + abs(self.program.objective(self.unknown[self.equations.x]))
 
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""
         slack, z = self.slack, self.z
-        if not self.band.factorize(z / slack) or not np.isfinite(self.gap):
+        if not self.equations.factorize(z / slack) or not np.isfinite(self.gap):
             return False
         _, d_slack, dz = self._toward(slack * z, is_refined=False)
         ways = min(1.0, _way(slack, d_slack)), min(1.0, _way(z, dz))
@@ -231,42 +242,18 @@ class _CentralPath:
 
         With a step of refinement where it is needed: close to the end weights span many powers of ten.
         """
-        program, layout = self.program, self.layout
+        program, equations = self.program, self.equations
         pull = (products + self.z * self.of_slack) / self.slack
         to = self.right.copy()
-        layout.add(to, _transposed_times(program.C, pull))
-        dx = self.band.solve(to)
+        equations.add(to, _transposed_times(program.C, pull))
+        dx = equations.solve(to)
         if is_refined:
-            weighted = self.z / self.slack * _times(program.C, program.z(dx[layout.x]))
-            left = to - _linear(program, layout, dx, weighted)
+            weighted = self.z / self.slack * _times(program.C, program.z(dx[equations.x]))
+            left = to - equations.linear(dx, weighted)
             if np.abs(left).max() > EXACT * np.abs(to).max():
-                dx += self.band.solve(left)
-        d_slack = self.of_slack - _times(program.C, program.z(dx[layout.x]))
+                dx += equations.solve(left)
+        d_slack = self.of_slack - _times(program.C, program.z(dx[equations.x]))
         return dx, d_slack, -(products + self.z * d_slack) / self.slack
-
-
-def _residuals(program: Program, layout: _Layout, unknown: Array, z: Array) -> Array:
-    """Minus the gradient of the Lagrangian by all unknowns."""
-    left = -_linear(program, layout, unknown, z)
-    layout.add(left, -program.g)
-    left[layout.equations] += program.c
-    left[layout.of_start] += program.start[1]
-    left[layout.of_end] += program.end[1]
-    return left
-
-
-def _linear(program: Program, layout: _Layout, unknown: Array, z: Array) -> Array:
-    """The part of this gradient that is linear in `unknown` and in multipliers z (N, i)."""
-    left = np.zeros(layout.size)
-    x, multiplier = unknown[layout.x], unknown[layout.equations]
-    layout.add(left, _times(program.H, program.z(x)) + _transposed_times(program.C, z))
-    left[layout.x[:-1]] += _transposed_times(program.F, multiplier)
-    left[layout.x[1:]] += _transposed_times(program.G, multiplier)
-    for (rows, _), at, k in ((program.start, layout.of_start, 0), (program.end, layout.of_end, -1)):
-        left[layout.x[k]] += rows.T @ unknown[at]
-        left[at] = rows @ x[k]
-    left[layout.equations] = _times(program.F, x[:-1]) + _times(program.G, x[1:])
-    return left
 
 
 def _times(A: Array, x: Array) -> Array:

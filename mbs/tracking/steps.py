@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import comb
+from itertools import product
+from math import comb, factorial
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, PPoly
+from ...common.libraries import scipy
 from ...common.structs import struct
-from ..inversion.collocation import GAUSS, Elimination, bernstein_integral, piecewise, stage_states
-from .curves import Curves, Unknowns
+from ..inversion.collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import GAP, Minimum, Program, minimize
-from .path_error import displaced_at, forces_off_path
-from .transition import RATE, Tracked, Transition
+from .transition import RATE, Tracked, Transition, displaced_at, forces_off_path
 
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
 # second derivative by ξ of the cubic through values at the Gauss points, four by four
 POWERS = np.arange(2, len(GAUSS.c))
 CURVATURE = (GAUSS.c[:, None] ** (POWERS - 2) * POWERS * (POWERS - 1)) @ GAUSS.to_powers[2:]
-# of a polynomial's integral by its values at the Gauss points, five coefficients by four
-BERNSTEIN = bernstein_integral(GAUSS)
+# Bernstein's coefficients (5, 4) on [0, 1] of a polynomial's integral, by its values at the Gauss points
+BERNSTEIN: Array = np.einsum(
+    "ik,kj->ij", [[comb(i, k) / (k * comb(4, k)) for k in range(1, 5)] for i in range(5)], GAUSS.to_powers
+)
 FIFTHS, THIRDS = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4)
 # Bernstein's coefficients of polynomials by their values there
 OF_FIFTHS, OF_THIRDS = (
@@ -31,6 +33,60 @@ OF_FIFTHS, OF_THIRDS = (
 HALVES, OF_HALVES = np.concatenate([THIRDS, 1.0 + THIRDS]) / 2, np.kron(np.eye(2), OF_THIRDS[:3])
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
 BEND = 1e-5  # of the square of ë, relative to its limit, in the objective: it makes e unique, and smooth
+
+
+@struct
+class Curves:
+    """Curves of `count` patches, V(t), or coordinates, e(t), whose derivative of `order` is linear between `breaks`.
+
+    On an interval between breaks (N + 1,), s, they follow from that derivative at both ends, and from V and the lower
+    derivatives where it begins: `places` (order + 2,) are those of these among the `width` unknowns z of an interval.
+    """
+
+    breaks: Array
+    order: int
+    count: int
+    places: Indices
+    width: int
+
+    def curve(self, u: Array) -> PPoly:
+        """V(t) by `u` (N + 1, count (order + 1)) at breaks: the linear derivative, then V and the lower ones."""
+        linear, *lower = np.split(u, self.order + 1, axis=1)
+        slope = np.diff(linear, axis=0) / (factorial(self.order + 1) * np.diff(self.breaks)[:, None])
+        derivatives = [*lower, linear]
+        powers = [derivatives[k][:-1] / factorial(k) for k in range(self.order, -1, -1)]
+        return scipy.interpolate.PPoly(np.array([slope, *powers]), self.breaks)
+
+    def _parts(self, xi: Array, derivative: int) -> Array:
+        """A derivative of V at shares ξ (S,) of intervals, (N, S, order + 2), by what it follows from."""
+        h, x, times = np.diff(self.breaks)[:, None], xi[None], self.order - derivative  # times it is integrated
+        if times < 0:
+            last = np.ones_like(x) / h
+            first = -last
+        else:
+            last = h**times * x ** (times + 1) / factorial(times + 1)
+            first = h**times * (x**times / factorial(times) - x ** (times + 1) / factorial(times + 1))
+        one, by = np.ones_like(h * x), [first, last]
+        for k in range(-derivative, self.order - derivative):
+            by.append((h * x) ** k / factorial(k) if k >= 0 else 0.0 * one)
+        return np.stack([one * of for of in by], axis=2)
+
+    def by_z(self, xi: Array, derivative: int = 0) -> Array:
+        """A derivative at shares ξ (S,) of intervals by z: (N, S, count, width)."""
+        parts, each = self._parts(xi, derivative), np.arange(self.count)
+        by_z = np.zeros((*parts.shape[:2], self.count, self.width))
+        for k, place in enumerate(self.places):
+            by_z[:, :, each, place + each] = parts[:, :, k, None]
+        return by_z
+
+    def squares(self, weights: Array, derivative: int) -> Array:
+        """Quadratic forms (N, width, width) of Σ weights |derivative|², with weights (N, 4) at the Gauss points."""
+        parts, each = self._parts(GAUSS.c, derivative), np.arange(self.count)
+        squares = np.einsum("Ns,Nsa,Nsb->abN", weights, parts, parts)
+        found = np.zeros((len(parts), self.width, self.width))
+        for (i, first), (j, second) in product(enumerate(self.places), repeat=2):
+            found[:, first + each, second + each] += squares[i, j][:, None]
+        return found
 
 
 @struct
@@ -58,7 +114,7 @@ class Iterate:
         cost = steps.cost(self.found)
         return Tracked(
             piecewise(GAUSS, breaks, self.p, self.v, self.K),
-            steps.voltages.curves.curve(self.V),
+            steps.voltages.curve(self.V),
             self.converged,
             self.iterations,
             self.share,
@@ -68,7 +124,7 @@ class Iterate:
             step=self.moved,
             found=self.found,
             added=steps.unique * cost if steps.has_share else 0.0,
-            error=steps.errors.curves.curve(self.e) if self.e.shape[1] else None,
+            error=steps.errors.curve(self.e) if self.e.shape[1] else None,
         )
 
 
@@ -98,19 +154,13 @@ class Steps:
         self.controls, self.y = slice(0, self.m + k), slice(self.m + k, self.m + k + 2 * self.n)
         self.states = slice(self.y.start, self.y.stop + lower + 2 * k)
         self.width = self.states.stop + self.has_share
-        of_patches, of_points = Curves(breaks, asked.order), Curves(breaks, 2)
         places = np.append([0, self.width], self.y.stop + self.m * np.arange(asked.order))
-        self.voltages = Unknowns(of_patches, self.m, places, self.width + self.m + k)
+        self.voltages = Curves(breaks, asked.order, self.m, places, self.width + self.m + k)
         places = np.array([self.m, self.width + self.m, self.y.stop + lower, self.y.stop + lower + k])
-        self.errors = Unknowns(of_points, k, places, self.width + self.m + k)
-        self._scale()
-        self.sigma = 1.0
-
-    def _scale(self) -> None:
-        """Sizes of unknowns, by which they are divided."""
-        asked, pace, each = self.asked, self.asked.weights.rate or RATE, np.ones(self.asked.errors)
+        self.errors = Curves(breaks, 2, k, places, self.width + self.m + k)
+        self.sigma, pace, each = 1.0, asked.weights.rate or RATE, np.ones(k)  # below: sizes that divide unknowns
         volts, error = np.full(self.m, asked.weights.voltage), asked.allowed * each
-        sizes = [self.size / asked.driven.scale, np.full(self.n, self.size)]
+        sizes = [size / asked.driven.scale, np.full(self.n, size)]
         sizes += [volts / pace**order for order in range(asked.order)]
         controls = [volts / pace**asked.order]
         if asked.tolerance is not None:
@@ -136,7 +186,7 @@ class Steps:
         ends = [*stages.at_end(starts[0], starts[1], K_z)]
         reached = [*stages.at_end(now.p[:-1], now.v[:-1], now.K + moved)]
         for unknowns in (self.voltages, self.errors):
-            for order in range(unknowns.curves.order if unknowns.count else 0):
+            for order in range(unknowns.order if unknowns.count else 0):
                 ends.append(unknowns.by_z(np.ones(1), order)[:, 0])
                 reached.append(np.einsum("Nmz,Nz->Nm", ends[-1], z))
         offset = np.concatenate(reached, axis=1) - x[1:, self.states]
@@ -258,7 +308,7 @@ class Steps:
         H = np.einsum("Ns,Nsta,Nstb->Nab", b, tau_z, tau_z, optimize=True)
         g = np.einsum("Ns,Nsta,Nst->Na", b, tau_z, off, optimize=True)
         share, others = (self.of_voltages * self.h)[:, None] * GAUSS.end_once / whole, np.zeros_like(H)
-        for order in (0, max(1, self.voltages.curves.order)):
+        for order in (0, max(1, self.voltages.order)):
             others += self.voltages.squares(share * (weights.rate**order / weights.voltage) ** 2, order)
         if (allowed := self.asked.tolerance) is not None:
             share = BEND / (self.unique if self.has_share else 1.0) * self.h[:, None] * GAUSS.end_once / whole
@@ -282,7 +332,7 @@ class Steps:
         def values(by_z: Array, of: Array | float = 0.0, slopes: Array | float = 0.0) -> tuple[Array, Array]:
             return of + np.einsum("Nsmz,Nz->Nsm", by_z, z, optimize=True), (slopes + by_z) * self.unit_z
 
-        within = self.voltages.curves.within
+        within = np.zeros(1) if self.voltages.order == 0 else np.append(0.0, GAUSS.c)  # linear ones at breaks alone
         limited = {"voltage": values(self.voltages.by_z(within))}
         if self.asked.errors:
             by_end = self.errors.by_z(np.ones(1), 2)
@@ -292,7 +342,7 @@ class Steps:
                 "curving": values(self.errors.by_z(np.zeros(1), 2)),
                 "curving end": values(by_end),
             }
-        if self.asked.is_free and self.voltages.curves.order == 0:  # else V ends at zero
+        if self.asked.is_free and self.voltages.order == 0:  # else V ends at zero
             by_end = self.voltages.by_z(np.ones(1))
             by_end[:-1] = 0.0
             limited["end"] = values(by_end)

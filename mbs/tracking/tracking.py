@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from ...common.validation import Record
@@ -31,13 +31,36 @@ from ..run.context import Context, PatchedLink
 from ..run.integrators import Choice
 from ..run.record import Run, Statistics
 from ..scene.analysis import Check, Need, Robustness, TimedAnalysis, output_times
-from .advice import Bounds, check_ends_for_gears, price_of_tolerance, slowest
+from .advice import (
+    Bounds,
+    Posed,
+    causes,
+    check_ends_for_gears,
+    check_found,
+    check_motors,
+    check_reach,
+    is_beyond,
+    needs_none,
+    price_of_tolerance,
+    raised,
+    slowest,
+    warnings_of,
+)
 from .gear_motion import largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
-from .intervals import refined, settled, start_breaks
-from .path_error import Tolerance, displaced_along, rows_of_points
-from .posed import Posed, causes, check_found, check_motors, check_reach, is_beyond, needs_none, raised, warnings_of
-from .transition import RATE, RATE_BEHIND_GEARS, Limits, Objective, Tracked, Transition, Weights
+from .problem import refined, settled, start_breaks
+from .transition import (
+    RATE,
+    RATE_BEHIND_GEARS,
+    Limits,
+    Objective,
+    Tolerance,
+    Tracked,
+    Transition,
+    Weights,
+    displaced_along,
+    rows_of_points,
+)
 
 VOLT = 200.0  # V_ref where patches have no limits
 SNAP = 4.5  # power of time with which a path begins whose fourth derivative is zero there, at least
@@ -119,15 +142,11 @@ class Tracking(TimedAnalysis):
         out of reach; `SolveError` where no motion is found.
         """
         began, model = time.perf_counter(), context.model
-
-        def progress() -> bool:
-            return context.progress(0.0)
-
         try:
-            posed = _pose(model, context.patches, self, progress)
+            posed = _pose(model, context.patches, self, lambda: context.progress(0.0))
             check_reach(posed, None)
             check_motors(posed)
-            least = settled(posed.asked, posed.coarse, progress)
+            least = settled(posed.asked, posed.coarse)
             check_found(context, posed, least)
             check_reach(posed, least)
             tracked, objective = _solve(context, posed, self, least)
@@ -149,7 +168,7 @@ class Tracking(TimedAnalysis):
         times = output_times(self.end, self.output_step, around.pre_actuation, around.post_actuation)
 
         def at(times: Array) -> Run:
-            run = _outcome(self, model, posed.servo, tracked, context, times)
+            run = _outcome(self, posed.asked.driven, tracked, context, times)
             return replace(run, details=around, twists=tracked.gears)
 
         run = at(times)
@@ -182,7 +201,7 @@ class TrackedPath(AroundPath):
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
     """Least voltage, V, and its uncertainty (see `TrackedPath`) for another model of the robot; NaN if not found."""
     posed = _pose(model, patches, analysis, lambda: True)
-    least = settled(posed.asked, posed.coarse, lambda: True)
+    least = settled(posed.asked, posed.coarse)
     voltage = least.share * float(posed.asked.units.max()) if least.converged else float("nan")
     return voltage, least.doubt * voltage
 
@@ -190,7 +209,7 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> Posed:
     """The problem of a path: its robot, limits, ends, and the first breaks. Raises as `Tracking.run`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
-    servo = with_gears(make_servo(model, end, place, progress, 1.0, analysis.kind))
+    servo = with_gears(make_servo(model, end, place, progress, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
     gears = servo.gears if isinstance(servo, GearedServo) else None
     per_volt = [servo.model.modal_directions(of_link.per_volt) for of_link in patches.values()]
@@ -201,29 +220,26 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     linear = linearise(servo, end)
     is_free = gears is not None and check_ends_for_gears(servo) < SNAP
     pre, post = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
-    needs_future = bool(linear.is_future[0].any())
-    around = durations(linear, (pre, post), analysis.output_step, needs_future=needs_future)
+    around = durations(linear, (pre, post), analysis.output_step)
     first, last = -around[0], end + around[1]
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
-    rate, weights = slowest(linear.zeros[[0, -1]]), _weights(servo, analysis, limits)
-    allowed = _tolerance(servo, analysis)
     asked = Transition(
         servo,
         Phi_V,
         limits,
-        weights,
+        _weights(servo, analysis, limits),
         rest,
         objective="least-voltage",
         is_free=is_free,
-        rate=rate,
+        rate=slowest(linear.zeros[[0, -1]]),
         gears=gears,
-        tolerance=allowed,
+        tolerance=_tolerance(servo, analysis),
     )
     meshes = (
         with_corners(start_breaks(first, end, last, analysis.intervals // k), servo.model.scene.load_functions)
         for k in (1, 2)
     )
-    return Posed(servo, linear, around, asked, *meshes)
+    return Posed(asked, linear, around, *meshes)
 
 
 def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
@@ -236,7 +252,7 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
             "compliant gears with one: their motors would need torques that jump with its acceleration. Remove it, or"
             " stiffness and damping of joints",
         )
-    times = as_floats(np.linspace(0.0, servo.end, len(servo.near_times)))
+    times = np.linspace(0.0, servo.end, len(servo.near_times))
     rows = [servo.model.rows[k] for k in rows_of_points(servo)]
     way = max((float(np.ptp(row.target.sample(times)[0])) for row in rows if row.target), default=0.0)
     if error >= way:
@@ -250,20 +266,20 @@ def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
     if is_beyond(posed, least) or needs_none(posed, least):
         objective = "least-voltage"
-    limits = posed.asked.limits  # torques reach beyond them between Gauss points, voltages by rounding
+    limits, servo = posed.asked.limits, posed.asked.driven  # torques are beyond between Gauss points, V by rounding
     within = replace(limits.patches, range=limits.patches.range * (1.0 - RESERVE))
     kept = Limits(within, limits.torque * (1.0 - analysis.tolerance))
     asked = replace(posed.asked, objective=objective, limits=kept)
     breaks = posed.breaks if objective == "effort" and least.share < AMPLE else least.voltage.x
     if asked.gears is None:
-        tracked = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
+        tracked = refined(asked, breaks, analysis.tolerance, least)
     else:
         meshes = breaks, posed.coarse
         tracked = within_limits(asked, limits, meshes, least, tolerance=analysis.tolerance, step=analysis.output_step)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = causes(context, posed) or f"{raised(posed)}, or the tolerance"
-        raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
+        raise SolveError(f"{servo.where}: the motion of least {what} was not found: {cure}")
     return tracked, objective
 
 
@@ -294,7 +310,7 @@ def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> Trac
 def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     given, torque = analysis.weights, analysis.weights.moment
     if torque is None:
-        times = as_floats(np.linspace(0.0, analysis.end, len(servo.near_times)))
+        times = np.linspace(0.0, analysis.end, len(servo.near_times))
         rest = np.zeros((len(times), len(servo.scale)))
         tau = servo.quasi_static(times, rest)
         torque = 0.5 * float(np.ptp(tau, axis=0).max()) or 1.0
@@ -311,13 +327,13 @@ def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, ob
     most = float(posed.asked.units.max())
     return TrackedPath(
         pre_actuation=posed.around[0],
-        post_actuation=float(tracked.curve.x[-1]) - posed.servo.end,
+        post_actuation=float(tracked.curve.x[-1]) - posed.asked.driven.end,
         least_voltage=least.share * most,
         least_voltage_doubt=least.doubt * least.share * most,
         least_share=least.share if posed.asked.is_limited else float("nan"),
         objective=objective,
         cost=tracked.cost,
-        held=posed.servo.model,
+        held=posed.asked.driven.model,
         unmet=tracked.unmet,
         bounds=posed.bounds,
         path_tolerance=posed.asked.allowed or None,
@@ -331,13 +347,13 @@ def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, ob
     )
 
 
-def _outcome(analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array) -> Run:
+def _outcome(analysis: Tracking, servo: Servo, tracked: Tracked, context: Context, times: Array) -> Run:
     curve, voltage = tracked.curve, tracked.voltage
     how, steps = Choice("collocation", "interior-point method"), len(curve.x) - 1
     statistics = Statistics("completed", how, steps=steps, evaluations=tracked.iterations)
     times = times.clip(voltage.x[0], voltage.x[-1])
     servo = servo if tracked.error is None else displaced_along(servo, tracked.error)
-    run = outcome_along(curve, servo, analysis, model, statistics, times)
+    run = outcome_along(curve, servo, analysis, context.model, statistics, times)
     assert run.prescribed is not None
     between = {body: type(voltage)(c, voltage.x) for body, c in _by_body(context, voltage.c).items()}
     voltages = _by_body(context, voltage(times))

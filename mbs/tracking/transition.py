@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field, replace
+from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices, PPoly
 from ...common.structs import struct
-from ..inversion.servo import Servo
+from .._core import TimeFunction
+from ..inversion.servo import PIECES, Servo, through
 from ..model.amplifiers import Amplifiers
 from ..run.record import GearCurve
 from .geared import Gears
 from .interior_point import Minimum
-from .path_error import Tolerance, displaced_at, rows_of_points
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 Objective = Literal["effort", "least-voltage", "least-current", "least-torque"]
 
+TIME = 0.005  # s, T_e where nothing is said
+NEAR = 1e-5  # of the robot's size: the displacement by which forces are differentiated
 RATE = 0.005  # s, T_r where nothing is said
 RATE_BEHIND_GEARS = 0.002  # s, the same where gears give
 
@@ -41,6 +40,25 @@ class Weights:
     torque: float
     voltage: float
     rate: float
+
+
+@struct
+class Tolerance:
+    """Largest error (m) of each coordinate of points, and T_e (s): |e| ≤ error, |ë| ≤ error/T_e²."""
+
+    error: float
+    time: float = TIME
+
+    @property
+    def acceleration(self) -> float:
+        """Largest |ë|, m/s²."""
+        return self.error / self.time**2
+
+
+def rows_of_points(servo: Servo) -> Indices:
+    """Which constraint equations prescribe coordinates of points, m."""
+    rows = servo.model.rows
+    return np.flatnonzero([row.is_trajectory and row.kind == "point" and row.target is not None for row in rows])
 
 
 @struct
@@ -66,12 +84,6 @@ class Transition:
         """Order of the derivative of the voltages V(t) that is linear between breaks."""
         return 0 if self.gears is None else 2
 
-    def driven_at(self, times: Array, error: PPoly | None) -> Servo:
-        """The robot at ascending `times` (T,), s, on its path with this error, m."""
-        if error is None:
-            return self.driven
-        return displaced_at(self.driven, times, np.array([error(times, order) for order in range(3)]))
-
     @property
     def allowed(self) -> float:
         """Largest path error, m."""
@@ -94,7 +106,7 @@ class Transition:
 
     @property
     def ranges(self) -> dict[str, Array]:
-        """Smallest and largest values (2, …) by which shares count: limits, or sizes where there are none."""
+        """Least and largest values (2, …), SI units, by which shares count: limits, or sizes where there are none."""
         of, weights = self.limits.patches, self.weights
         rate = np.full_like(of.slew, weights.voltage / (weights.rate or RATE))
         both = np.array([[-1.0], [1.0]])
@@ -140,3 +152,48 @@ class Tracked:
     def surely(self) -> float:
         """Lower bound of the share, within its uncertainty; 0 if that is unknown."""
         return max(0.0, self.share * (1.0 - self.doubt)) if np.isfinite(self.doubt) else 0.0
+
+
+def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
+    """The robot with points off their paths by e, ė, ë (3, T, k), SI units, at just these ascending `times` (T,), s."""
+    times, first = np.unique(times, return_index=True)
+    breaks, off = np.append(times, times[-1] + 1.0), off[:, first]
+
+    def moved(target: TimeFunction, k: int) -> TimeFunction:
+        y, rate, acceleration = target.sample(times) + off[:, :, k]
+        return TimeFunction.polynomial(breaks, np.column_stack([0.5 * acceleration, rate, y]))
+
+    return _with_targets(servo, moved)
+
+
+def displaced_along(servo: Servo, error: PPoly) -> Servo:
+    """The robot with points off their paths by `error` (k,), m, up to round-off: quintic Hermite pieces."""
+    start, end = error.x[[0, -1]]
+    times = np.union1d(error.x, np.linspace(start, end, PIECES + 1))
+    off = np.array([error(times, order) for order in range(3)])
+    return _with_targets(servo, lambda target, k: through(times, target.sample(times) + off[:, :, k]))
+
+
+def forces_off_path(servo: Servo, times: Array, motion: Sequence[Array], off: Array) -> tuple[Array, Array]:
+    """(r, τ) (T, n + torques) with e, ė, ë `off` (3, T, k) at `times` (T,), s, and their slopes (3, T, n + torques, k).
+
+    By differences, which are exact for ë and off by about `NEAR` for e and ė.
+    """
+    now = np.hstack(displaced_at(servo, times, off).forces(times, *motion))
+    slopes, size = np.zeros((3, *now.shape, off.shape[2])), NEAR * servo.model.size
+    for order, step in enumerate((size, size / servo.end, size / servo.end**2)):
+        for k in range(off.shape[2]):
+            moved = off.copy()
+            moved[order, :, k] += step
+            there = displaced_at(servo, times, moved).forces(times, *motion)
+            slopes[order, :, :, k] = (np.hstack(there) - now) / step
+    return now, slopes
+
+
+def _with_targets(servo: Servo, moved: Callable[[TimeFunction, int], TimeFunction]) -> Servo:
+    """The robot with the path `moved`(path, k) of the kth coordinate of points."""
+    rows = list(servo.model.rows)
+    for k, number in enumerate(rows_of_points(servo)):
+        if (target := rows[number].target) is not None:
+            rows[number] = replace(rows[number], target=moved(target, k))
+    return replace(servo, model=replace(servo.model, rows=tuple(rows)))
