@@ -9,48 +9,26 @@ from scipy.linalg import expm
 import ffrobot
 from ffrobot.common.errors import InputError
 
-BLOW = [{"point": "link2.tip", "y": "where(t < 0.02, 0, where(t < 0.03, 30*sin(pi*(t - 0.02)/0.01), 0))"}]
-
-
-def loop(name, *controllers, actuation="split", **keys):
-    return {
-        "name": name, "kind": "closed-loop", "actuation": actuation, "sample_time": 0.001, "delay": 0.0005,
-        "tolerance": 1e-9, "disturbance": BLOW, "controller": list(controllers),
-    } | keys  # fmt: skip
-
-
 HOLD = {"name": "hold", "kind": "pcid", "end": 0.1, "output_step": 0.0005, "tolerance": 1e-10}
 GAINS = {"waist": 300.0, "shoulder": 300.0, "elbow": 80.0}
 RATES = {"waist": 12.0, "shoulder": 12.0, "elbow": 3.0}
 HOLDS = {"kind": "joint-pid", "proportional": GAINS, "derivative": RATES}
 
 
-def arm(*analyses, still=False, rotors=True, **keys):
-    """The case `arm_3r`, with rotors as motors have them; `still`: its tip stays where the line begins."""
+def arm(*analyses):
+    """The case `arm_3r`, with rotors as motors have them."""
     tables = scenes_in_3d.read(CASES / "arm_3r" / "scene.toml")
-    for joint in tables["joint"] if rotors else ():
+    for joint in tables["joint"]:
         joint |= {"gear_ratio": 80.0, "rotor_inertia": 3e-5}
-    if still:
-        tables["trajectory"][0] |= {"x": "0.95", "y": "0.15", "z": "0.55"}
-    return tables | {"analysis": list(analyses)} | keys
+    return tables | {"analysis": list(analyses)}
 
 
 def held(name, *controllers, **keys):
-    return loop(name, *controllers, actuation="hold", disturbance=[], delay=0.0) | keys
-
-
-def solve(tables, folder, name="scene"):
-    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
+    of_loop = {"name": name, "kind": "closed-loop", "actuation": "hold", "sample_time": 0.001, "delay": 0.0}
+    return of_loop | {"tolerance": 1e-9, "controller": list(controllers)} | keys
 
 
 PUSH = (1.0, -2.0, 1.5)  # N on the tip for each N of size
-
-
-def push(size, begins=0.02):
-    return [
-        {"point": "fore.tip"}
-        | {axis: f"{size * part}*where(t < {begins}, 0, 1)" for axis, part in zip("xyz", PUSH, strict=True)}
-    ]
 
 
 def predicted(model, times, begins):
@@ -71,15 +49,17 @@ def predicted(model, times, begins):
     return found
 
 
-def test_arm_keeps_to_its_line(tmp_path):
+def test_arm_keeps_to_its_line():
     """Moments of the sagging arm are fed forward. While it moves a push displaces the tip as a model frozen there says:
     for 30 ms, in which the joints turn by 0.1 rad.
     """
     line = {"name": "hold", "kind": "fcid", "shape": "static", "end": 0.3, "output_step": 0.001, "tolerance": 1e-8}
     linear = {"name": "linear", "kind": "linear", "about": "hold", "times": [0.25]}
     keys = {"tolerance": 1e-8, "end": 0.28}
-    loops = [held("follows", HOLDS, **keys), held("pushed", HOLDS, disturbance=push(0.5, 0.25), **keys)]
-    with solve(arm(line, linear, *loops), tmp_path) as found:
+    push = {axis: f"{0.5 * part}*where(t < 0.25, 0, 1)" for axis, part in zip("xyz", PUSH, strict=True)}
+    loops = [held("follows", HOLDS, **keys)]
+    loops.append(held("pushed", HOLDS, disturbance=[{"point": "fore.tip"} | push], **keys))
+    with ffrobot.solve(ffrobot.make_scene(**arm(line, linear, *loops))) as found:
         path, moved = (found[f"{name}/points/fore.tip/position"] for name in ("follows", "pushed"))
         assert np.linalg.norm(path[-1] - path[0]) > 0.3
         assert found["follows/tip_error"].max() < 2e-4
@@ -103,7 +83,6 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("keys", "expected"), MISTAKES)
-def test_bad_keys_are_refused(tmp_path, keys, expected):
-    path = scenes_in_3d.write(arm(HOLD, held("loop", HOLDS) | keys), tmp_path / "scene.toml")
+def test_bad_keys_are_refused(keys, expected):
     with pytest.raises(InputError, match=expected):
-        ffrobot.solve(path)
+        ffrobot.solve(ffrobot.make_scene(**arm(HOLD, held("loop", HOLDS) | keys)))

@@ -1,7 +1,6 @@
 """Free bodies in 3D: an independent code's motion, and what cannot change: momentum and energy."""
 
 import numpy as np
-import pytest
 import tree_oracle
 from checkpoint_mechanisms import load
 from checkpoint_scene_files import FOLDER, close
@@ -38,9 +37,13 @@ def test_rigid_top():
         np.testing.assert_allclose(results["spin/energy/kinetic"], samples[0]["energy"], rtol=1e-8)
 
 
-@pytest.fixture(scope="module")
-def spinner():
-    """The model of a free link in all families, and its state at the first sample, centre of mass at rest."""
+def motion_of(model, times, q, v):
+    state = {"time": np.array(times), "q": q, "v": v, "a": 0 * v, "multipliers": np.zeros((len(q), 0))}
+    return Run(analysis=Forward(name="state", kind="forward", end=1.0, output_step=1.0), model=model, **state)
+
+
+def test_flexible_top():
+    """A free link in all families, from the state of the first sample on, its centre of mass at rest."""
     tables = {
         "name": "spinner", "space": "spatial", "gravity": (0.0, 0.0, 0.0),
         "body": ({"name": "spinner", "link": "links/spinner.toml"},),
@@ -48,30 +51,16 @@ def spinner():
     }  # fmt: skip
     scene = validated_scene(tables, FOLDER / "scene.toml", "")
     model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
-    sample, (node,) = load("top_flexible")["samples"][0], model.tree.nodes
+    samples, (node,) = load("top_flexible")["samples"], model.tree.nodes
+    sample = samples[0]
     q, v = np.zeros(model.tree.n_q), np.zeros(model.tree.n_v)
     q[node.q], q[node.p_q] = [*sample["position"], *sample["quaternion"]], sample["modal"]
     v[3:6] = sample["angular_velocity_body"]
     v[:3] = -totals(motion_of(model, [0.0], q[None], v[None]))[1].linear[0] / node.body.mass
-    return model, State(q, v)
-
-
-def motion_of(model, times, q, v):
-    state = {"time": np.array(times), "q": q, "v": v, "a": 0 * v, "multipliers": np.zeros((len(q), 0))}
-    return Run(analysis=Forward(name="state", kind="forward", end=1.0, output_step=1.0), model=model, **state)
-
-
-def spun(spinner, end, step, tolerance):
-    model, start = spinner
-    analysis = Forward(name="spin", kind="forward", end=end, output_step=step, tolerance=tolerance)
-    run = drive_robot(model, analysis, start, lambda _: True)
+    times = {"end": samples[-1]["t"], "output_step": samples[1]["t"]}
+    run = drive_robot(model, Forward(name="spin", kind="forward", tolerance=1e-8, **times), State(q, v), lambda _: True)
     assert run.status == "completed"
-    return motion_of(model, run.time, run.q, run.v)
-
-
-def test_flexible_top(spinner):
-    samples = load("top_flexible")["samples"]
-    motion = spun(spinner, samples[-1]["t"], samples[1]["t"], 1e-8)
+    motion = motion_of(model, run.time, run.q, run.v)
     body = body_motion(motion, "spinner")
     modal = np.array([sample["modal"] for sample in samples])
     for found, expected in zip(body.modal.T, modal.T, strict=True):

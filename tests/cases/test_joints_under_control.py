@@ -73,39 +73,20 @@ def test_sensors_and_motors_have_the_signs_of_the_joint(tmp_path, kind, turned):
         assert found["torque/tip_error"].max() < 2e-3 * moved
 
 
-SLIDES = {"x": X, "y": Y, "turn": Z}
-
-
-def on_a_plane(of_slides, body, *analyses, gains=False, **tables):
-    """A body on a planar joint with motors, or on two slides and a turning joint between bodies next to massless."""
-    friction = {"viscous_friction": 0.3}
-    if not of_slides:
-        bodies = [body]
-        joints = [tables_3d.joint("plane", "planar", "ground", "b.root", axis=Z, motor=True, **friction)]
-    else:
-        between = ["ground", "u.root", "w.root", "b.root"]
-        bodies = [tables_3d.rigid("u", 1e-9, [1e-12] * 3), tables_3d.rigid("w", 1e-9, [1e-12] * 3), body]
-        joints = [
-            tables_3d.joint(
-                name, "revolute" if name == "turn" else "prismatic", *between[k : k + 2], axis=axis, **friction
-            )
-            for k, (name, axis) in enumerate(SLIDES.items())
-        ]
-    if gains:
-        P, D = ({joint["name"]: gain for joint in joints} for gain in (60.0, 2.0))
-        analyses[-1]["controller"] = [{"kind": "joint-pid", "proportional": P, "derivative": D}]
-    return ffrobot.solve(
-        ffrobot.make_scene(**tables_3d.scene(bodies, joints, *analyses, gravity=[1.0, 2.0, -9.0], **tables))
-    )
-
-
 def test_motors_of_planar_joints_hold_a_link_that_vibrates():
-    """Frequencies of the robot with its motors locked are those of two slides and a turn, locked."""
-    link = beam_link(0.5, rectangle(0.01, 0.015), 6, modes={"count": 4})
-    linear = {"name": "linear", "kind": "linear"}
+    """Frequencies with its motors locked are those of two slides and a turn, between bodies next to massless."""
+    body = {"name": "b", "link": beam_link(0.5, rectangle(0.01, 0.015), 6, modes={"count": 4})}
+    friction, between = {"viscous_friction": 0.3}, ["ground", "u.root", "w.root", "b.root"]
+    plane = [tables_3d.joint("plane", "planar", "ground", "b.root", axis=Z, motor=True, **friction)]
+    slides = [
+        tables_3d.joint(name, "revolute" if name == "turn" else "prismatic", *between[k : k + 2], axis=axis, **friction)
+        for k, (name, axis) in enumerate({"x": X, "y": Y, "turn": Z}.items())
+    ]
+    massless = [tables_3d.rigid(name, 1e-9, [1e-12] * 3) for name in "uw"]
     found = []
-    for of_slides in (False, True):
-        with on_a_plane(of_slides, {"name": "b", "link": link}, linear, initial={}) as run:
+    for bodies, joints in (([body], plane), ([*massless, body], slides)):
+        tables = tables_3d.scene(bodies, joints, {"name": "linear", "kind": "linear"}, gravity=[1.0, 2.0, -9.0])
+        with ffrobot.solve(ffrobot.make_scene(**tables)) as run:
             found.append(run["linear/joints_locked/frequency"])
     assert found[0].size >= 4
     np.testing.assert_allclose(*found, rtol=1e-6)

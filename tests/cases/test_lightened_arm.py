@@ -17,11 +17,6 @@ DENSITY, WIDTHS = 2700.0, {"upper_arm": 0.012, "forearm": 0.008}
 MEASURES = {"upper_arm": (0.5, 0.060, 0.044, 7), "forearm": (0.4, 0.044, 0.030, 6)}
 
 
-@pytest.fixture(scope="module")
-def arm(solved):
-    return solved("lightened_arm")
-
-
 def plate(name):
     """Area in m² and first moment about the root in m³ of a link's plate, holes taken out."""
     length, root, tip, count = MEASURES[name]
@@ -65,13 +60,13 @@ def test_the_script_draws_the_parts(tmp_path):
             )
 
 
-def test_stress_is_that_of_bending_beside_a_hole(arm):
+def test_stress_is_that_of_bending_beside_a_hole(solved):
     """Motors alone, at rest: the forearm bends under the load; beside a hole the net section carries more.
 
     Nominal stress M (h/2) / I of the net section at the hole where it is largest, times 1 to 1.5: the edge of a hole in
     bending is no sharp notch (Peterson's Stress Concentration Factors, section 4.6: K_tn about 1 for d/h = 0.6).
     """
-    group = arm.file["motors_alone"]
+    group = solved("lightened_arm").file["motors_alone"]
     angle = group["bodies/forearm/angle"][-1]
     length, root, tip, count = MEASURES["forearm"]
     x = length / (count + 1) * np.arange(1, count + 1)

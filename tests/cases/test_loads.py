@@ -1,4 +1,4 @@
-"""Loads on points, friction and rotors in 3D through `ffrobot solve`, against forces written by hand."""
+"""Loads on points, payloads, friction and rotors in 3D, against forces written by hand and bodies welded to links."""
 
 import re
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from checkpoint_scene_files import solved, write_scene
+from moved_scenes import tables_of
 from scipy.interpolate import CubicSpline
 from tables_3d import ORIGIN, X, Y, Z, joint, revolute, rigid, scene
 
@@ -139,3 +140,41 @@ def test_no_step_skips_a_pulse(duration, integrator):
     rate = ffrobot.solve(ffrobot.make_scene(**tables, load=[{"joint": "j", "moment": moment}]))["run/joints/j/rate"]
     rounded = np.spacing(start) / duration  # of its ends
     np.testing.assert_allclose(rate, [0.0, 0.0, 0.0, impulse / 0.1625, impulse / 0.1625], rtol=1e-9 + 2 * rounded)
+
+
+MASS, CENTER = 0.3, [0.03, -0.02, 0.05]
+SLIGHT = 1e-12  # kg·m²: rigid bodies have to have some; it is 1e-9 of that of the payload about the point
+MOMENTS = {"upper": [0.0, 0.0, 0.0], "fore": [0.0, 2e-4, 2e-4]}  # a point mass next to the section, and a rod
+DROP = {"name": "fall", "kind": "forward", "end": 0.04, "output_step": 0.02, "tolerance": 1e-9}
+KEYS = (
+    *(f"joints/{name}/{of}" for name in ("q1", "q2", "q3") for of in ("coordinate", "rate", "reaction",
+                                                                      "reaction_moment")),
+    "bodies/fore/modal", "bodies/upper/modal", "energy/kinetic", "energy/strain", "points/fore.tip/position",
+    "points/fore.tip/quaternion",
+)  # fmt: skip
+MOMENTS_OF_MOTORS = tuple(f"joints/{name}/moment" for name in ("q1", "q2", "q3"))
+
+
+def carried(is_welded):
+    """The arm that carries both, as payloads or as bodies."""
+    tables = tables_of("arm3_line_undeformed", 1e-9)
+    inverse = tables["analysis"][0] | {"end": 0.1, "output_step": 0.02}
+    tables["analysis"] = [inverse, DROP, DROP | {"name": "implicit", "integrator": "radau"}]
+    if is_welded:
+        for link, inertia in MOMENTS.items():
+            tables["body"].append(rigid(f"of_{link}", MASS, [x + SLIGHT for x in inertia], CENTER))
+            tables["joint"].append(joint(f"grip_of_{link}", "weld", f"{link}.tip", f"of_{link}.root"))
+    else:
+        mass = {"mass": MASS, "center": CENTER}
+        tables["payload"] = [{"point": f"{link}.tip", "inertia": of} | mass for link, of in MOMENTS.items()]
+    return ffrobot.solve(ffrobot.make_scene(**tables))
+
+
+def test_payloads_are_bodies_welded_to_their_links():
+    """Without inertia about some axis they turn with their section, too."""
+    with carried(False) as found, carried(True) as expected:
+        for analysis in ("inverse", "fall", "implicit"):
+            for key in KEYS + (MOMENTS_OF_MOTORS if analysis == "inverse" else ()):
+                name = f"{analysis}/{key}"
+                size = np.abs(expected[name]).max()
+                np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=1e-7 * size, err_msg=name)

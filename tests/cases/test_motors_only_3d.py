@@ -51,11 +51,6 @@ def test_mistakes(path, message):
         ffrobot.solve(scene(EXACT, path=path))
 
 
-@pytest.fixture(scope="module")
-def leaning_arm(solved):
-    return solved("arm_3r_motors_only")
-
-
 def off_its_line(case, run):
     """Largest distance of the tip from the straight line, m."""
     start, end = np.array([[0.65, 0.10, 0.50], [0.40, 0.45, 0.65]])
@@ -64,8 +59,9 @@ def off_its_line(case, run):
     return np.linalg.norm(tip - np.outer(tip @ way, way), axis=1).max()
 
 
-def test_leaning_arm_keeps_to_its_line(leaning_arm):
+def test_leaning_arm_keeps_to_its_line(solved):
     """Offsets, a leaning axis, bending in both planes, gravity, a payload: the replay in the nonlinear model."""
+    leaning_arm = solved("arm_3r_motors_only")
     assert off_its_line(leaning_arm, "exact") < 1e-9
     assert off_its_line(leaning_arm, "exact_forward") < 5e-6
     assert off_its_line(leaning_arm, "joints_only") > 1e-3
@@ -77,14 +73,14 @@ def test_leaning_arm_keeps_to_its_line(leaning_arm):
 
 
 @pytest.mark.nightly
-def test_moments_carry_an_arm_of_rods_along_the_same_line(leaning_arm):
+def test_moments_carry_an_arm_of_rods_along_the_same_line(solved):
     """Rods and springs of another program: within what 1/(4 · 3²) of too much stiffness is of the deflections."""
     axis = np.array([0.0, -1.0, 0.2]) / np.hypot(1.0, 0.2)
     column = Body(np.zeros(3), Z, 4.0, 0.2 * Z, np.diag([0.06, 0.06, 0.02]))
     upper = bar(0.5, 0.010, 0.014, 3, np.array([0.0, 0.1, 0.4]), -Y)
     fore = bar(0.4, 0.008, 0.010, 3, 0.5 / 6 * X, axis, payload=0.2)
     chain = RodChain([column, *upper, *fore], 0.4 / 6 * X, [0, 1, 1 + len(upper)])
-    file, names = leaning_arm.file, ("waist", "shoulder", "elbow")
+    file, names = solved("arm_3r_motors_only").file, ("waist", "shoulder", "elbow")
     t = file["exact/time"][()]
     t = t[t < 0.55]
     found = np.array([file[f"exact/joints/{name}/moment"][: len(t)] for name in names]).T

@@ -94,15 +94,9 @@ def test_what_links_in_such_loops_cannot_do_is_told():
     times = {"end": 0.02, "output_step": 0.001}
     with pytest.raises(ffrobot.SolveError, match='"D" closes are redundant with straight links'):
         four_bar(-5.0, {"name": "shape", "kind": "fcid", "shape": "static"} | times)
-    control = {
-        "kind": "closed-loop",
-        "actuation": "inverse",
-        "feed_forward": "none",
-        "sample_time": 0.001,
-        "delay": 0.0,
-    }
-    torque = {"name": "torque", "controller": [{"kind": "computed-torque", "bandwidth": 10.0}]}
-    with four_bar(-5.0, ANALYSES[0] | times, control | torque) as run:
+    torque = {"name": "torque", "kind": "closed-loop", "actuation": "inverse", "feed_forward": "none", "delay": 0.0}
+    torque |= {"sample_time": 0.001, "controller": [{"kind": "computed-torque", "bandwidth": 10.0}]}
+    with four_bar(-5.0, ANALYSES[0] | times, torque) as run:
         first = run["torque/joints/A/moment"][0]
     with four_bar(-5.0, ANALYSES[0] | times, is_rigid=True) as run:
         assert first == pytest.approx(run["inverse/joints/A/moment"][0], rel=1e-6)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import scenes_in_3d
 from beam_links import beam_link, rectangle
+from tables_3d import ORIGIN, revolute, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -21,17 +21,14 @@ EDGE = SIDE | {"name": "edge", "bends": "out-of-plane", "count": 3}
 ZETA = 0.03
 
 
-def rod(folder, *analyses, layouts=(FLAT, EDGE)):
-    scenes_in_3d.write(ROD, folder / "rod.toml")
-    hub = {"name": "hub", "type": "revolute", "between": ["ground", "rod.root"], "axis": [0.0, 0.0, 1.0]}
-    return {
-        "name": "rod", "space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{"name": "rod", "link": "rod.toml"}],
-        "joint": [hub | {"rotor_inertia": 1e5}], "pzt": list(layouts),
-        "trajectory": [{"name": "still", "joint": "hub", "value": "0"}],
-        "analysis": [
-            {"name": "still", "kind": "fcid", "shape": "zero", "end": 0.6, "output_step": 5e-4}, *analyses,
-        ],
-    }  # fmt: skip
+def solved(*analyses):
+    still = {"name": "still", "kind": "fcid", "shape": "zero", "end": 0.6, "output_step": 5e-4}
+    hub, path = (
+        revolute("hub", "ground", "rod.root", rotor_inertia=1e5),
+        {"name": "still", "joint": "hub", "value": "0"},
+    )
+    tables = scene([{"name": "rod", "link": ROD}], [hub], still, *analyses, gravity=ORIGIN, trajectory=[path])
+    return ffrobot.solve(ffrobot.make_scene(**tables, pzt=[FLAT, EDGE]))
 
 
 def loop(**keys):
@@ -41,22 +38,17 @@ def loop(**keys):
     return found | {"tip": "rod.tip", "tolerance": 1e-6} | keys
 
 
-def solve(scene, folder):
-    return ffrobot.solve(scenes_in_3d.write(scene, folder / "scene.toml"))
-
-
 def modal(found, ending=""):
     """(K, 8) at samples."""
     outputs = list(found.attributes("loop/control")["outputs"])
     return found["loop/control/readings"][:, [outputs.index(f"modal/rod/{k}{ending}") for k in range(1, 9)]]
 
 
-def test_patches_in_two_planes_damp_both_as_much_as_they_are_asked_to(tmp_path):
+def test_patches_in_two_planes_damp_both_as_much_as_they_are_asked_to():
     """Amplitudes √(p² + (ṗ/ω)²) decay as exp(−ζωt): the two lowest modes in each plane, the others not at all."""
     damper = {"kind": "modal-velocity", "bodies": ["rod"], "modes": 4, "damping_ratio": ZETA, "sensor": "ideal"}
     linear = {"name": "linear", "kind": "linear", "about": "still", "times": [0.0]}
-    scene = rod(tmp_path, linear, loop(controller=[damper], sensor=[{"modal": "rod"}]))
-    with solve(scene, tmp_path) as found:
+    with solved(linear, loop(controller=[damper], sensor=[{"modal": "rod"}])) as found:
         inputs = list(found.attributes("loop/control")["inputs"])
         assert inputs[1:] == [f"pzt/{name}/{k}" for name, n in (("flat", 4), ("edge", 3)) for k in range(1, n + 1)]
         t, omega = found["loop/control/time"], 2 * np.pi * found["linear/linear/frequency"][0][1:]
@@ -68,11 +60,11 @@ def test_patches_in_two_planes_damp_both_as_much_as_they_are_asked_to(tmp_path):
             assert amplitude[-1, k] > 0.8 * amplitude[40, k]
 
 
-def test_what_patches_read_is_what_they_would_do_with_a_volt(tmp_path):
+def test_what_patches_read_is_what_they_would_do_with_a_volt():
     """Charge of a motion is the modal force per volt of it (Lee and Moon 1990), over the capacitance, by layout."""
     sensor = [{"pzt": "flat", "capacitance": 2e-8}, {"pzt": "edge", "capacitance": 5e-8}, {"modal": "rod"}]
     linear = {"name": "linear", "kind": "linear", "about": "still", "times": [0.0]}
-    with solve(rod(tmp_path, linear, loop(sensor=sensor)), tmp_path) as found:
+    with solved(linear, loop(sensor=sensor)) as found:
         (model,) = found.linear("linear")
         outputs = list(found.attributes("loop/control")["outputs"])
         coordinates = [model.state_names.index(f"modal/rod/{k}") for k in range(1, 9)]
@@ -85,7 +77,6 @@ def test_what_patches_read_is_what_they_would_do_with_a_volt(tmp_path):
             np.testing.assert_allclose(volts, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_layouts_are_named(tmp_path):
-    expected = 'pzt: expected one of the layouts "flat", "edge", found "rod"'
-    with pytest.raises(InputError, match=expected):
-        solve(rod(tmp_path, loop(sensor=[{"pzt": "rod"}])), tmp_path)
+def test_layouts_are_named():
+    with pytest.raises(InputError, match='pzt: expected one of the layouts "flat", "edge", found "rod"'):
+        solved(loop(sensor=[{"pzt": "rod"}]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link
 from scipy.integrate import solve_bvp
-from tables_3d import joint, scene
+from tables_3d import joint, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -219,18 +219,12 @@ def test_auto_takes_as_many_as_the_deflection_needs():
         assert "pieces" not in results.attributes("rest/bodies/beam")
 
 
-RIGID = {
-    "mass": 1.0,
-    "inertia": [0.1] * 3,
-    "center": [0.5, 0.0, 0.0],
-    "points": {"root": [0.0] * 3, "tip": [1.0, 0, 0]},
-}
 SOLID = {"geometry": link()["geometry"] | {"kind": "solid"}}
 MISTAKES = {
     r'body "beam": expected "pieces" with "link" alone, found "modes"': {
         "body": [{"name": "beam", "link": link(), "pieces": 2, "modes": 2}]
     },
-    r'expected "pieces" with "link" alone, found "rigid"': {"body": [{"name": "beam", "rigid": RIGID, "pieces": 2}]},
+    r'expected "pieces" with "link" alone, found "rigid"': {"body": [rigid("beam", tip=[1.0, 0, 0]) | {"pieces": 2}]},
     "expected none with subdivided bodies": {"actuation_points": [{"body": "beam"}]},
     r'geometry.kind: expected "beam" of a subdivided body': {
         "body": [{"name": "beam", "link": link(mesh={}) | SOLID, "pieces": 2}]

@@ -2,16 +2,11 @@
 
 import numpy as np
 import pytest
-import scenes_in_3d
 from beam_links import beam_link, rectangle
+from tables_3d import ORIGIN, Y, revolute, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
-
-
-def solve(scene, folder, name="scene"):
-    return ffrobot.solve(scenes_in_3d.write(scene, folder / f"{name}.toml"))
-
 
 STRIP = beam_link(
     0.6, rectangle(0.02, 0.004), 20, nu=None, name="strip",
@@ -21,31 +16,25 @@ LAYOUT = {
     "body": "arm", "count": 1, "length": 0.06, "width": 0.02, "thickness": 0.5e-3, "modulus": 63e9, "d31": 110e-12,
     "structural": False, "bends": "out-of-plane", "limit": 200.0, "allocation": "least-squares",
 }  # fmt: skip
-
-
 BESIDE = {"name": "b", "bends": "in-plane", "width": 0.004}
 
 
-def strip(folder, layouts, placement):
-    scenes_in_3d.write(STRIP, folder / "strip.toml")
-    hub = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 1.0, 0.0]}
-    return {
-        "name": "strip", "space": "spatial", "gravity": [0.0, 0.0, 0.0],
-        "body": [{"name": "arm", "link": "strip.toml"}],
-        "joint": [hub], "pzt": layouts, "analysis": [{"name": "where", "kind": "placement", "placement": placement}],
-    }  # fmt: skip
+def placed(layouts, placement):
+    where = {"name": "where", "kind": "placement", "placement": placement}
+    tables = scene([{"name": "arm", "link": STRIP}], [revolute("hub", "ground", "arm.root", Y)], where, gravity=ORIGIN)
+    return ffrobot.solve(ffrobot.make_scene(**tables, pzt=layouts))
 
 
 @pytest.mark.parametrize(
     ("layouts", "placement"),
     [([LAYOUT], {"body": "arm"}), ([LAYOUT | {"name": "up"}, LAYOUT | BESIDE], {"body": "arm", "pzt": "up"})],
 )
-def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path, layouts, placement):
+def test_patches_out_of_plane_reach_modes_out_of_plane_alone(layouts, placement):
     """A cantilever that its motor holds: one patch for its first mode sits at the root, where the curvature is most.
 
     Whatever other layouts the link has.
     """
-    with solve(strip(tmp_path, layouts, placement), tmp_path) as found:
+    with placed(layouts, placement) as found:
         assert found["where/placement/best/centers"] == pytest.approx([0.03])
         reach = found["where/placement/candidate_reach"][0]
         assert (np.diff(reach) < 0).all()
@@ -68,6 +57,6 @@ def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path, layouts, 
         ([LAYOUT], {"body": "arm", "criterion": "voltage"}, "about: expected an earlier analysis"),
     ],
 )  # fmt: skip
-def test_bad_input(tmp_path, layouts, placement, expected):
+def test_bad_input(layouts, placement, expected):
     with pytest.raises(InputError, match=expected):
-        solve(strip(tmp_path, layouts, placement), tmp_path)
+        placed(layouts, placement)

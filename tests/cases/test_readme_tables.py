@@ -1,7 +1,7 @@
 """Numbers in tables of the cases' READMEs, against runs.
 
 The program wrote them, in two to five digits. That they are right is tested against closed forms, by identities and by
-orders, and in test_two_link.py, test_slider_crank.py and test_cases.py against independent codes.
+orders, and in test_two_link.py and test_cases.py against independent codes.
 """
 
 import re

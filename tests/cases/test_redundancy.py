@@ -67,17 +67,17 @@ def arm(*analyses, **keys):
     } | keys  # fmt: skip
 
 
-def solve(tables, folder, name="scene"):
-    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
+def solve(tables):
+    return ffrobot.solve(ffrobot.make_scene(**tables))
 
 
 def read(found, key):
     return np.stack([found[f"inverse/joints/{joint}/{key}"] for joint in JOINTS], axis=1)
 
 
-def test_least_motion_has_no_part_in_the_freedom_left(tmp_path):
+def test_least_motion_has_no_part_in_the_freedom_left():
     """q̇ = J⁺ẋ, J by the cross products of axes and arms: q̇ is square to what leaves the tip where it is."""
-    with solve(arm(RUN, redundancy="least-motion"), tmp_path) as found:
+    with solve(arm(RUN, redundancy="least-motion")) as found:
         q, rates = read(found, "coordinate"), read(found, "rate")
         across = [left_free(angles) @ rate for angles, rate in zip(q, rates, strict=True)]
         assert np.abs(rates).max() > 0.5
@@ -86,14 +86,14 @@ def test_least_motion_has_no_part_in_the_freedom_left(tmp_path):
         assert len(found.attributes("inverse")["resolved_by"]) == 1
 
 
-def test_least_torque_is_the_least_of_whole_motions(tmp_path):
+def test_least_torque_is_the_least_of_whole_motions():
     """∫ Σ τ² over ε, the size of (t/T)² that the joint has besides: the lowest point of the parabola is at ε = 0."""
     tables = arm(RUN | {"end": 0.4, "tolerance": 1e-7}, redundancy="least-torque")
 
     def integral(found):
         return simpson(np.sum(read(found, "moment") ** 2, axis=1), x=found["inverse/time"])
 
-    with solve(tables, tmp_path) as found:
+    with solve(tables) as found:
         (joint,) = found.attributes("inverse")["resolved_by"]
         time, angle, least = found["inverse/time"], found[f"inverse/joints/{joint}/coordinate"], integral(found)
     del tables["redundancy"]
@@ -104,13 +104,13 @@ def test_least_torque_is_the_least_of_whole_motions(tmp_path):
     for epsilon in sizes:
         terms = [f"({c!r})*(t/0.2 - 1)**{k}" for k, c in enumerate(curve.coef.tolist())]
         tables["trajectory"][-1]["value"] = " + ".join([*terms, f"({epsilon!r})*(t/0.4)**2"])
-        with solve(tables, tmp_path) as found:
+        with solve(tables) as found:
             sums.append(integral(found))
     a, b = (sums[0] + sums[2]) / 2 - sums[1], (sums[2] - sums[0]) / 2  # of ε/0.1
     assert sums[1] == pytest.approx(least, rel=1e-4)
     assert a > 1e-3 * least
     assert abs(b / (2 * a)) < 0.03
-    with solve(arm(RUN | {"end": 0.4, "tolerance": 1e-7}, redundancy="least-motion"), tmp_path) as found:
+    with solve(arm(RUN | {"end": 0.4, "tolerance": 1e-7}, redundancy="least-motion")) as found:
         assert integral(found) > 1.001 * least
 
 
@@ -148,8 +148,8 @@ def test_least_torque_near_the_edge_of_reach(reach, least):
     assert sums[0] < 0.85 * sums[1]
 
 
-def test_freedom_that_nothing_settles_is_told_with_the_joints_that_move(tmp_path):
-    with solve(arm(RUN), tmp_path) as found:
+def test_freedom_that_nothing_settles_is_told_with_the_joints_that_move():
+    with solve(arm(RUN)) as found:
         (told,) = (text for text in found.attributes("inverse")["warnings"] if "forces and inertia move" in text)
         moving = np.abs(left_free(GUESS)) > 1e-6
         assert told.startswith("1 degrees of freedom are not prescribed")
@@ -157,10 +157,10 @@ def test_freedom_that_nothing_settles_is_told_with_the_joints_that_move(tmp_path
         assert 'redundancy = "least-motion"' in told
 
 
-def test_equilibrium_and_prescribed_shape_are_settled_as_well(tmp_path):
+def test_equilibrium_and_prescribed_shape_are_settled_as_well():
     rest, straight = {"name": "rest", "kind": "static"}, RUN | {"name": "inverse", "kind": "fcid", "shape": "zero"}
     straight.pop("tolerance")
-    with solve(arm(rest, straight, redundancy="least-motion"), tmp_path) as found:
+    with solve(arm(rest, straight, redundancy="least-motion")) as found:
         np.testing.assert_allclose([found[f"rest/joints/{joint}/coordinate"][0] for joint in JOINTS], GUESS, atol=1e-9)
         across = [left_free(q) @ v for q, v in zip(read(found, "coordinate"), read(found, "rate"), strict=True)]
         assert np.abs(across).max() < 1e-6 * np.abs(read(found, "rate")).max()
@@ -179,7 +179,7 @@ def test_flexible_arm_on_a_turntable_follows_its_path_and_comes_back(tmp_path, c
     tables["body"].insert(0, {"name": "table", "rigid": table})
     tables["joint"].insert(0, swivel | {"at": [at[0] - 0.1, at[1], at[2]]})
     tables["analysis"] = [{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.005, "tolerance": 1e-7}]
-    with solve(tables | {"redundancy": criterion}, tmp_path) as found:
+    with solve(tables | {"redundancy": criterion}) as found:
         assert found["inverse/constraint_violation"][:, 0].max() < 1e-10
         (joint,) = found.attributes("inverse")["resolved_by"]
         moments = [found[f"inverse/joints/{each['name']}/moment"] for each in tables["joint"]]
@@ -206,10 +206,10 @@ def test_a_path_out_of_reach_ends_where_the_arm_is_straight(criterion):
     assert float(re.search(r"at t = ([\d.]+) s", str(error.value))[1]) == pytest.approx(reached, abs=1e-6)
 
 
-def test_keys_that_settle_nothing_are_refused(tmp_path):
+def test_keys_that_settle_nothing_are_refused():
     tables = arm(RUN, redundancy="least-motion")
     tables["trajectory"].append({"name": "held", "joint": "q3", "value": "0.3"})
     with pytest.raises(InputError, match="redundancy: expected a mechanism with more degrees of freedom"):
-        solve(tables, tmp_path)
+        solve(tables)
     with pytest.raises(InputError, match="redundancy: expected"):
-        solve(arm(RUN, redundancy="least"), tmp_path)
+        solve(arm(RUN, redundancy="least"))

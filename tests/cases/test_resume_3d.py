@@ -5,7 +5,6 @@ from stopped_runs import SAME, Stops, differences, go_on
 
 import ffrobot
 
-END = 0.2
 PATCHES = """
 [[pzt]]
 body = "fore"
@@ -25,24 +24,6 @@ apply = "joints+pzt"
 integrator = "dop853"
 tolerance = 1e-6
 """
-
-
-@pytest.fixture
-def arm(case_copy):
-    """The arm of three joints, a part of its motion, with patches on its forearm; and texts replaced."""
-
-    def copy(*edits):
-        scene = case_copy("arm_3r")
-        short = [("end = 0.6", f"end = {END}"), ("tolerance = 1e-8", "tolerance = 1e-6")]
-        text = scene.read_text(encoding="utf-8")
-        text = text.replace("[[analysis]]", PATCHES + "\n[[analysis]]", 1) + FORWARD
-        for old, new in (*short, *edits):
-            assert old in text, old
-            text = text.replace(old, new)
-        scene.write_text(text, encoding="utf-8")
-        return scene
-
-    return copy
 
 
 def test_a_body_that_tumbles_goes_on(tmp_path):
@@ -68,9 +49,17 @@ def test_a_body_that_tumbles_goes_on(tmp_path):
         assert found[name] < 1e-10, name
 
 
-def test_outputs_that_fail_leave_the_integration(arm, monkeypatch):
-    """It is kept as if it had been stopped at its end: outputs are made from it without another step."""
-    scene = arm()
+def test_outputs_that_fail_leave_the_integration(case_copy, monkeypatch):
+    """It is kept as if it had been stopped at its end: outputs are made from it without another step.
+
+    Of the arm of three joints, a part of its motion, with patches on its forearm.
+    """
+    scene = case_copy("arm_3r")
+    text = scene.read_text(encoding="utf-8").replace("[[analysis]]", PATCHES + "\n[[analysis]]", 1) + FORWARD
+    for old, new in (("end = 0.6", "end = 0.2"), ("tolerance = 1e-8", "tolerance = 1e-6")):
+        assert old in text, old
+        text = text.replace(old, new)
+    scene.write_text(text, encoding="utf-8")
     expected, path = ffrobot.solve(scene), scene.with_suffix(".h5")
     with monkeypatch.context() as fault:
         fault.setattr("ffrobot.run.solve.totals", lambda motion: 1 / 0)

@@ -1,15 +1,15 @@
-"""What is left of computed motions where the robot is not its model: scaled links, lanes, bad input."""
+"""What is left of computed motions where the robot is not its model: scaled links, lanes, more modes, bad input."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle
+from planar_features import link, one_link
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
-from test_tracked_robots import geared, patches, revolute, strip
+from test_tracked_robots import geared, in_plane, patches, revolute, strip
 from test_tracked_robots import scene as tables_of
 
 import ffrobot
@@ -17,8 +17,6 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.body import from_modal_body, scaled
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
-
-PAGE = Path(__file__).parents[2] / "docs" / "howto" / "tracking.md"
 
 
 def test_scaled_bodies_are_those_of_other_materials():
@@ -43,22 +41,6 @@ def test_scaled_bodies_are_those_of_other_materials():
         (found.stiffening.at("tip"), wanted.stiffening.at("tip")),
     ):
         np.testing.assert_allclose(ours * signs * signs[:, None], theirs, atol=1e-6 * np.abs(theirs).max())
-
-
-def scene(folder, robustness):
-    blocks = dict(re.findall(r"`(\w+\.toml)`:\n\n```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
-    for name, text in blocks.items():
-        text = text.replace("tolerance = 1e-4\n", f"tolerance = 1e-4\nrobustness = {{ {robustness} }}\n")
-        text = text.replace('kind = "forward"\nactuation = "carried"\napply = "joints"\n', HELD)
-        (folder / name).write_text(text, encoding="utf-8")
-    return folder / "scene.toml"
-
-
-HELD = """kind = "closed-loop"
-actuation = "carried"
-sample_time = 1e-3
-feed_forward = "joints+pzt"
-"""
 
 
 T, HOLD, BANDWIDTH, FORCE, INERTIA, GEAR = 0.4, 2e-3, 25.0, 1e-4, 0.05, 2 * np.pi * 20
@@ -168,11 +150,39 @@ def test_gears_of_slides_vary_like_those_of_hinges(kind):
 @pytest.mark.parametrize(
     ("keys", "text"),
     [
-        ("parameters = [1.5]", "robustness.parameters[0]: expected a number less than 1, found 1.5"),
-        ("sample_time = 0.0", "robustness.sample_time: expected a number greater than 0"),
-        ("sampletime = 1e-3", 'did you mean "sample_time"?'),
+        ({"parameters": [1.5]}, "robustness.parameters[0]: expected a number less than 1, found 1.5"),
+        ({"sample_time": 0.0}, "robustness.sample_time: expected a number greater than 0"),
+        ({"sampletime": 1e-3}, 'did you mean "sample_time"?'),
     ],
 )
-def test_deviations_that_are_none(tmp_path, keys, text):
+def test_deviations_that_are_none(keys, text):
+    tables = in_plane()
+    tables["analysis"][0]["robustness"] = keys
     with pytest.raises(InputError, match=re.escape(text)):
-        ffrobot.solve(scene(tmp_path, keys))
+        ffrobot.make_scene(**tables)
+
+
+CHECKED = {"kind": "pcid", "check": "finer"}
+
+
+def checked(modes, **of_joint):
+    """Of one link in 3D that turns about its root, with as many patches as modes unless its joint is changed."""
+    body = {"link": link(modes={"count": modes, "family": "in-plane-bending", "attachment_modes": False})}
+    _, tables = one_link(CHECKED, body, count=0 if of_joint else modes)
+    tables["joint"] = [tables["joint"][0] | of_joint]
+    return ffrobot.solve(ffrobot.make_scene(**tables))
+
+
+def test_error_is_that_of_the_modes_left_out():
+    """It falls with every mode."""
+    errors = []
+    for modes in (1, 3):
+        with checked(modes) as results:
+            errors.append(results.attributes("inverse")["check_error"])
+    assert errors[0] > 4 * errors[1]
+
+
+@pytest.mark.parametrize("change", [{"motor": False}, {"stiffness": 1e4, "damping": 1.0, "rotor_inertia": 1e-4}])
+def test_what_a_replay_cannot_do(change):
+    with pytest.raises(InputError, match="check: expected motors, and joints without stiffness"):
+        checked(2, **change)

@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from scenes_in_3d import write
 from tables_3d import ORIGIN, revolute, rigid, scene
 
 import ffrobot as program
@@ -95,27 +96,9 @@ def test_a_damped_axis_settles_at_the_time_of_the_closed_form_whatever_the_outpu
 
 def test_residual_and_settling_are_responses(tmp_path, ffrobot):
     """Columns of a sweep by the closed form; a point that does not settle takes as long as the run leaves it."""
-    body = f"mass = 1.0, inertia = {INERTIA}, center = [0.0, 0.0]"
-    points = f"{{ root = [0.0, 0.0], tip = [{LENGTH}, 0.0] }}"
-    (tmp_path / "scene.toml").write_text(
-        f"""name = "axis"
-gravity = [0.0, 0.0]
-body = [{{ name = "b", rigid = {{ {body}, points = {points} }} }}]
-trajectory = [{{ name = "turn", motor = "hub", via = [0.0, {WAY}], duration = 0.4, profile = "trapezoid" }}]
-analysis = [{{ name = "run", kind = "pcid", end = 1.5, output_step = 0.01 }}]
-[[joint]]
-name = "hub"
-type = "revolute"
-between = ["ground", "b.root"]
-gear_ratio = 9.0
-rotor_inertia = 1e-4
-stiffness = 500.0
-"""
-    )
+    path = write(axis(0.4, profile="trapezoid"), tmp_path / "scene.toml")
     stiffnesses, responses = (500.0, 700.0), ("--collect", "residual b.tip", "--collect", "settling run/b.tip")
-    ffrobot.ok(
-        "sweep", tmp_path / "scene.toml", "--vary", "joint.hub.stiffness=500,700", *responses, "-o", tmp_path / "out"
-    )
+    ffrobot.ok("sweep", path, "--vary", "joint.hub.stiffness=500,700", *responses, "-o", tmp_path / "out")
     rows = list(csv.DictReader((tmp_path / "out/table.csv").read_text().splitlines()))
     for row, stiffness in zip(rows, stiffnesses, strict=True):
         expected = swing(amplitude("trapezoid", 0.4, np.sqrt(stiffness / INERTIA)))

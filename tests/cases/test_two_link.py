@@ -1,4 +1,4 @@
-"""The paper's two-link manipulator through `ffrobot solve`: what its results file says, number by number."""
+"""The paper's two-link manipulator and slider-crank through `ffrobot solve`: their results files, number by number."""
 
 import json
 from pathlib import Path
@@ -9,11 +9,9 @@ from checkpoints import check_column, reference, with_analyses
 
 from ffrobot.fe_models.modal_body_file import read_modal_body
 
-CHECKPOINTS = reference("two_link/reference.csv")
+CHECKPOINTS = {case: reference(f"{case}/reference.csv") for case in ("two_link", "slider_crank")}
 VOLTAGES = reference("two_link/reference_voltages.csv")
-RELATIVE = 1e-7  # of each quantity's peak
-TIMES = np.arange(1001) * 0.001
-TIMES[-1] = 1.0
+RELATIVE = {"two_link": 1e-7, "slider_crank": 1e-6}  # of each quantity's peak
 PZT = ("link1", "link2")
 
 
@@ -26,10 +24,13 @@ def frame_motors(solved):
     )
 
 
-@pytest.mark.parametrize("name", [name for name in CHECKPOINTS if name != "t"])
-def test_checkpoints(two_link, name):
-    times = np.array(CHECKPOINTS["t"], dtype=float)
-    check_column(two_link, "inverse", name, times, CHECKPOINTS[name], RELATIVE)
+@pytest.mark.parametrize(
+    ("case", "name"), [(case, name) for case, table in CHECKPOINTS.items() for name in table if name != "t"]
+)
+def test_checkpoints(request, case, name):
+    table = CHECKPOINTS[case]
+    times = np.array(table["t"], dtype=float)
+    check_column(request.getfixturevalue(case), "inverse", name, times, table[name], RELATIVE[case])
 
 
 @pytest.mark.parametrize("motors", ["section", "frame"])
@@ -38,7 +39,7 @@ def test_voltages(request, motors, name):
     case = request.getfixturevalue("two_link" if motors == "section" else "frame_motors")
     rows = [i for i, value in enumerate(VOLTAGES["motors"]) if value == motors]
     times = np.array([float(VOLTAGES["t"][i]) for i in rows])
-    check_column(case, "inverse", name, times, [VOLTAGES[name][i] for i in rows], RELATIVE)
+    check_column(case, "inverse", name, times, [VOLTAGES[name][i] for i in rows], RELATIVE["two_link"])
 
 
 def modal_force_per_volt(body):

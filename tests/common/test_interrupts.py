@@ -1,5 +1,6 @@
-"""Signals that wait for the end of what may not be interrupted, and those that end a process at once."""
+"""Signals that wait for the end of what may not be interrupted, or end a process at once; what MPI leaves of one."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -99,3 +100,22 @@ def test_a_long_call_of_a_library_is_ended_at_once(number):
 def test_afterwards_signals_are_answered_as_before():
     done = subprocess.run([sys.executable, "-c", COMMAND.format(seconds=0)], capture_output=True, text=True)
     assert done.stdout == "begins\nkept\n", done.stderr
+
+
+KILLED = """
+import os
+from ffrobot.common.parallel import without_daemon
+without_daemon()
+from mpi4py import MPI
+print(MPI.COMM_WORLD.size)
+os._exit(0)
+"""
+
+
+def test_a_process_that_is_killed_leaves_no_folder_of_open_mpi(tmp_path):
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_")}
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED], env=environment | {"TMPDIR": str(tmp_path)}, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout) == (0, "1\n")
+    assert not list(tmp_path.iterdir())

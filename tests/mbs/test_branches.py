@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tree_oracle
+from four_bar import planar
 from rods import arm_of_rods
 
 from ffrobot import make_scene, solve
@@ -30,26 +31,15 @@ def test_elbow_up_and_down():
 
 @pytest.mark.parametrize(
     ("path", "words"),
-    [
-        ({"joint": "D", "value": "1.4"}, ("up", "down")),
-        ({"point": "b.m", "y": "0.25"}, ("down", "up")),
-    ],
+    [({"joint": "D", "value": "1.4"}, ("up", "down")), ({"point": "coupler.m", "y": "0.25"}, ("down", "up"))],
 )
 def test_elbows_of_a_loop_next_to_where_it_is_cut(path, words):
     """Of four bars B is between A and C, at which the loop is cut: above or below the line of these two."""
-    ends = {"a": ([0.2, 0.0], {}), "b": ([0.5, 0.0], {"m": [0.25, 0.1]}), "c": ([0.4, 0.0], {})}
-    model = prepare_scene(make_scene(
-        name="four bars", gravity=[0.0, -9.81],
-        body=[{"name": name, "rigid": {"mass": 1.0, "inertia": 0.02, "center": [0.1, 0.0],
-                                       "points": {"p": [0.0, 0.0], "q": end} | more}}
-              for name, (end, more) in ends.items()],
-        joint=[{"name": name, "type": "revolute", "between": list(sides)} | ({"at": [0.5, 0.0]} if name == "D" else {})
-               for name, *sides in (("A", "ground", "a.p"), ("B", "a.q", "b.p"), ("C", "b.q", "c.q"),
-                                    ("D", "ground", "c.p"))],
-        trajectory=[{"name": "t"} | path],
-        initial={"joints": {"A": 1.0, "B": -0.7, "D": 1.5}},
-        analysis=[{"name": "i", "kind": "pcid", "end": 0.5, "output_step": 0.1}],
-    )).model  # fmt: skip
+    run = {"name": "i", "kind": "pcid", "end": 0.5, "output_step": 0.1}
+    start = {"joints": {"A": 1.0, "B": -0.7, "D": 1.5}}
+    tables = planar({name: {} for name in "ABCD"}, [run], trajectory=[{"name": "t"} | path], initial=start)
+    tables["body"][1]["rigid"]["points"]["m"] = [0.25, 0.1]
+    model = prepare_scene(make_scene(**tables)).model
     found = start_postures(model)
     assert [one.branch for one in found] == [{"B": word} for word in words]
     for one, word in zip(found, words, strict=True):

@@ -22,8 +22,7 @@ from ffrobot.mbs.run.gears import with_motor_coordinates
 from ffrobot.mbs.tracking.advice import singular_times
 from ffrobot.mbs.tracking.gear_motion import behind_gears
 from ffrobot.mbs.tracking.geared import Gears, with_gears
-from ffrobot.mbs.tracking.intervals import graded
-from ffrobot.mbs.tracking.problem import track
+from ffrobot.mbs.tracking.problem import graded, track
 from ffrobot.mbs.tracking.tracking import _pose
 from ffrobot.mbs.tracking.transition import Limits, Transition, Weights
 from ffrobot.run.solve import prepare_scene, solve_scene
@@ -89,7 +88,7 @@ def test_closed_form_of_one_mode(f, J, V):
 
 def strip(modes, T, f):
     solution = prepare_scene(strip_scene(modes, T, of_hub=gear(f)), Watcher())
-    servo = with_gears(make_servo(solution.model, T, "strip", lambda: True, 1.0))
+    servo = with_gears(make_servo(solution.model, T, "strip", lambda: True))
     return servo, servo.model.modal_directions(solution.patches["arm"].per_volt)[:, servo.of_modes].T
 
 
@@ -189,10 +188,10 @@ def test_twisting_rotors_push_the_links_that_carry_them():
     around_end, along = posed.coarse[-1] + np.array([-1e-9, 1e-9]), np.linspace(0.0, posed.coarse[-1], 999)
     for of in found.gears.values():  # a rate that jumps would take an impulse
         assert np.ptp(of.twist(around_end, 1)) < 1e-6 * np.abs(of.twist(along, 1)).max()
-    run = outcome_along(found.curve, posed.servo, scene.analysis[0], solution.model, None, at)
+    run = outcome_along(found.curve, posed.asked.driven, scene.analysis[0], solution.model, None, at)
     moved = with_motor_coordinates(replace(run, twists=found.gears), with_compliance(solution.model))
     needed = required_forces(with_compliance(solution.model), moved, at)
-    modes, torques = posed.servo.of_modes, [found.gears[name].torque(at) for name in problem.gears.joints]
+    modes, torques = posed.asked.driven.of_modes, [found.gears[name].torque(at) for name in problem.gears.joints]
     off = np.abs(needed[:, modes] - found.voltage(at) @ problem.Phi_V.T).max(axis=0)
     assert np.all(off < 1e-5 * np.abs(needed[:, modes]).max())
     assert np.abs(needed[:, -2:] - np.column_stack(torques)).max() < 1e-9 * np.abs(torques).max()
@@ -217,7 +216,7 @@ def test_zeros_that_a_rotor_takes_to_infinity(tolerance, expected):
     _, tables = random_arm(np.random.default_rng([62, 7]), tolerance)
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
     end = solution.scene.analysis[0].end
-    servo = with_gears(make_servo(solution.model, end, "arm", lambda: True, 1.0))
+    servo = with_gears(make_servo(solution.model, end, "arm", lambda: True))
     linear = linearise(servo, end)
     np.testing.assert_allclose(own_changes(tables), expected, atol=1e-3)
     np.testing.assert_allclose(linear.times[list(linear.singular_after)], expected, atol=linear.times[1])

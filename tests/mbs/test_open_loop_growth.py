@@ -29,20 +29,15 @@ def growth(robot, **keys):
     return open_loop_growth(run(robot, pcid(**keys)).outcome)
 
 
-def test_an_inverted_pendulum():
-    """λ = √(m g l/J), l = L/2 and J = m L²/3: √(3 g/2 L)."""
-    assert growth(pendulum(along("pi/2"))) == pytest.approx(np.sqrt(1.5 * G / L), rel=1e-9)
-
-
 @pytest.mark.parametrize("angle", [-np.pi / 2, -0.5, 0.0])
 def test_no_growth_where_gravity_leads_back(angle):
     """Hanging, and level, where the slope of the weight's moment is none."""
     assert growth(pendulum(along(f"{angle!r}"), initial=angle)) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_friction_and_a_rotor_slow_it():
-    """λ² (J + J_m N²) + λ c = m g l."""
-    c, rotor, N = 1.5, 3e-4, 50.0
+@pytest.mark.parametrize(("c", "rotor", "N"), [(0.0, 0.0, 1.0), (1.5, 3e-4, 50.0)])
+def test_an_inverted_pendulum_that_friction_and_a_rotor_slow(c, rotor, N):
+    """λ² (J + J_m N²) + λ c = m g l, l = L/2 and J = m L²/3."""
     total = J + rotor * N**2
     expected = (-c + np.sqrt(c**2 + 4 * total * WEIGHT)) / (2 * total)
     keys = {"viscous_friction": c, "rotor_inertia": rotor, "gear_ratio": N}

@@ -1,5 +1,7 @@
 """Inverse dynamics with motors only: against closed forms, a linear inverse by FFT, and forward runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from body_equations import absolute_states, accelerated, mechanism_of, required_forces
@@ -19,7 +21,6 @@ from ffrobot.mbs.inversion.zero_dynamics import (
     equilibrium,
     is_unstable,
     linear_dynamics,
-    zeros,
 )
 from ffrobot.mbs.quantities.motion import constraint_rows
 
@@ -43,7 +44,7 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 def at_rest(model, factor=1.0):
     """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
-    servo = make_servo(model.model, 1.0, "scene", lambda: True, factor)
+    servo = replace(make_servo(model.model, 1.0, "scene", lambda: True), factor=factor)
     p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 
@@ -72,7 +73,7 @@ def test_zeros_of_a_uniform_beam():
     η = 2.36502, 5.49780: the second roots are those of tan η = −1 to 1e-5.
     """
     servo, dynamics = at_rest(single_link("0*t", modes=10))
-    s = slowest_first(zeros(dynamics, servo.scale)[0])
+    s = slowest_first(Linearisation(dynamics, None, servo.scale).zeros[0])
     expected = 2 * np.array([2.36502037, 5.49780388]) ** 2 * C
     np.testing.assert_allclose(s.imag[:2], 0, atol=1e-6)
     np.testing.assert_allclose(np.sort(s.real[:2]), [-expected[0], expected[0]], rtol=1e-3)
@@ -82,7 +83,7 @@ def test_zeros_of_a_uniform_beam():
 def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
     """factor = 0 asks for a motion of the hub: what is left is the cantilever of the link itself, s = ±iω."""
     servo, dynamics = at_rest(single_link("0*t"), factor=0.0)
-    s = slowest_first(zeros(dynamics, servo.scale)[0])
+    s = slowest_first(Linearisation(dynamics, None, servo.scale).zeros[0])
     assert np.all(np.abs(s.real) < 1e-6 * np.abs(s))
     np.testing.assert_allclose(np.sort(s.imag)[4:], servo.scale, rtol=1e-6)
 
