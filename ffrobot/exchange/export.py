@@ -23,13 +23,15 @@ from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import c_table, linear_fmu
-from .motion.read_motion import TEXTS, path_text, read_motion
-from .motion.robot_motion import (
+from .motion import (
+    TEXTS,
     JointMotions,
     Side,
     csv_text,
     joint_trajectory_bag,
     joint_trajectory_text,
+    path_text,
+    read_motion,
     robot_motion,
 )
 from .urdf.export_urdf import scene_as_urdf
@@ -47,45 +49,36 @@ class Exported(NamedTuple):
     remarks: tuple[str, ...]
 
 
-class FileContent(NamedTuple):
-    """Content of a file, a few words on it, remarks, and the analysis that it is of ("" of none)."""
-
-    content: Content
-    what: str
-    remarks: tuple[str, ...]
-    analysis: str = ""
-
-
 Converted = tuple[Content, tuple[str, ...]]
 """A content, and remarks on what it does not carry."""
-Make = Callable[[Path, str | None, Side], FileContent]
-"""Of a file, of an analysis of it where one is named, and of a side of compliant gears."""
+Made = tuple[Content, str, tuple[str, ...], str]
+"""Content of a file, a few words on it, remarks, and the analysis that it is of ("" of none)."""
 
 
-def _motion(convert: Callable[[JointMotions], Converted], what: str, *of: Any) -> FileContent:
+def _motion(convert: Callable[[JointMotions], Converted], what: str, *of: Any) -> Made:
     motion = robot_motion(*of)
     content, remarks = convert(motion)
     counted = what.format(joints=len(motion.joints), points=len(motion.time))
-    return FileContent(content, f"{counted} of {motion.analysis}", remarks, motion.analysis)
+    return content, f"{counted} of {motion.analysis}", remarks, motion.analysis
 
 
-def _body(convert: Callable[[ModalBody], Converted], path: Path, *_: Any) -> FileContent:
+def _body(convert: Callable[[ModalBody], Converted], path: Path, *_: Any) -> Made:
     body = read_modal_body(path)
     content, remarks = convert(body)
-    return FileContent(content, f"{body.name}, {body.modes_in_words}", remarks)
+    return content, f"{body.name}, {body.modes_in_words}", remarks, ""
 
 
-FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
+FORMATS: Mapping[str, Mapping[str, tuple[str, Callable[[Path, str | None, Side], Made]]]] = {
     "results": {
         "csv": (".csv", partial(_motion, lambda motion: (csv_text(motion), motion.remarks), "{joints} joints")),
         "joint-trajectory": (".joint-trajectory.json", partial(_motion, joint_trajectory_text, "{points} points")),
         "rosbag2": (".rosbag2", partial(_motion, joint_trajectory_bag, "a JointTrajectory with {points} points")),
-        "fmu": (".fmu", lambda path, analysis, _: FileContent(*linear_fmu(path, analysis))),
-        "c": (".h", lambda path, analysis, _: FileContent(*c_table(path, analysis))),
+        "fmu": (".fmu", lambda path, analysis, _: linear_fmu(path, analysis)),
+        "c": (".h", lambda path, analysis, _: c_table(path, analysis)),
     },
     "a scene": {
-        "urdf": (".urdf", lambda path, *_: FileContent(*scene_as_urdf(path))),
-        "fmu": (".fmu", lambda path, analysis, _: FileContent(*forward_fmu(path, analysis))),
+        "urdf": (".urdf", lambda path, *_: (*scene_as_urdf(path), "")),
+        "fmu": (".fmu", lambda path, analysis, _: forward_fmu(path, analysis)),
     },
     "a modal body": {
         "sid": (".SID_FEM", partial(_body, sid_text)),
@@ -94,9 +87,7 @@ FORMATS: Mapping[str, Mapping[str, tuple[str, Make]]] = {
         "exudyn": (".exudyn.npz", partial(_body, exudyn_file)),
     },
 }
-"""Formats of each kind of file: end of the new file's name, and what makes its content."""
-
-
+"""Formats of each kind of file: end of the new file's name, and what makes its content of an analysis and a side."""
 SIDED = ("joint-trajectory", "rosbag2")
 """Formats with positions of one side of compliant gears."""
 
@@ -129,10 +120,10 @@ def export_file(
     suffix, make = known[file_format]
     if output is not None:
         check_not_an_input(output)
-    made = make(path, analysis, side or "motor")
-    target = output or path.with_suffix(f".{made.analysis}{suffix}" if made.analysis else suffix)
-    write_content(target, made.content, force=force)
-    return Exported(target, made.what, made.remarks)
+    content, what, remarks, name = make(path, analysis, side or "motor")
+    target = output or path.with_suffix(f".{name}{suffix}" if name else suffix)
+    write_content(target, content, force=force)
+    return Exported(target, what, remarks)
 
 
 def write_content(target: Path, content: Content, *, force: bool) -> None:
@@ -154,8 +145,6 @@ READERS: Mapping[str, Callable[[str, str], tuple[ModalBody, tuple[str, ...]]]] =
     ".fem": read_fem,
 }
 """What reads bodies of other programs, by the end of the file's name."""
-
-
 MOTIONS = (*TEXTS, ".bag", ".db3", ".mcap")
 """Ends of files with motions of joints; a folder is a bag of ROS 2."""
 
@@ -169,8 +158,7 @@ def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
     """
     motion = read_motion(path)
     write_content(output, path_text(motion), force=force)
-    whole = motion.times[-1] - motion.times[0]
-    what = f"{len(motion.times)} points of {len(motion.columns)} joints over {whole:.6g} s"
+    what = f"{len(motion.times)} points of {len(motion.columns)} joints over {np.ptp(motion.times):.6g} s"
     use = f'a [[trajectory]] with joint = "{shown(motion.columns[0])}" takes waypoints = "{output.name}"'
     return Exported(output, what, (*motion.remarks, use))
 
@@ -218,7 +206,23 @@ def print_import(imported: Imported, console: Console) -> None:
     headers = "joint", "type", "range", "moment or force", "speed", "damping", "friction"
     console.print(plain_table(headers, rows))
     if imported.masses:
-        _print_masses(imported, console)
+        rows = []
+        for each in imported.masses:
+            inertial = robot.links[each.link].inertial
+            mass = inertial.mass if inertial is not None else 0.0
+            ratios = f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}"
+            ratios = ratios if each.volume else ("–", "–", "–")
+            rows.append(
+                (each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}", *ratios)
+            )
+        headers = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
+        console.print()
+        console.print(plain_table(headers, rows))
+        console.print(
+            "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
+            " --flexible names a file",
+            soft_wrap=True,
+        )
     for remark in imported.remarks:
         console.print(f"note       {remark}", soft_wrap=True)
     for path in imported.files:
@@ -230,21 +234,3 @@ def print_export(exported: Exported, console: Console) -> None:
     for remark in exported.remarks:
         console.print(f"note       {remark}", soft_wrap=True)
     console.print(f"written    {exported.path}: {exported.what}", soft_wrap=True)
-
-
-def _print_masses(imported: Imported, console: Console) -> None:
-    rows = []
-    for each in imported.masses:
-        inertial = imported.robot.links[each.link].inertial
-        mass = inertial.mass if inertial is not None else 0.0
-        ratios = f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}"
-        ratios = ratios if each.volume else ("–", "–", "–")
-        rows.append((each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}", *ratios))
-    headers = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
-    console.print()
-    console.print(plain_table(headers, rows))
-    console.print(
-        "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
-        " --flexible names a file",
-        soft_wrap=True,
-    )

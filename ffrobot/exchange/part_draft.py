@@ -16,7 +16,6 @@ from ..mesh.inspection import Inspection, PartFace
 
 MATERIALS = (("aluminum", 70e9, 0.33, 2700.0), ("steel", 210e9, 0.3, 7850.0), ("titanium", 114e9, 0.34, 4430.0))
 """Name, Young's modulus (Pa), Poisson's ratio and density (kg/m³)."""
-LIKE = 0.1  # densities of one material, relative
 AT_END = 1e-3  # of the length: how far a plane end is from the end of the bounding box
 ROUND_JOINT = 0.1  # least radius of a bore for a joint, of the part's extent across
 SQUARE = 0.1  # largest cosine between the axis of such a bore and the part
@@ -42,7 +41,8 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
         for k, face in enumerate(part.faces, start=1)
         if face.kind in ("plane", "bore") and face is not root and face is not tip
     }
-    mass_on, (material, about) = _masses(part, [root, tip, *others.values()]), _material(density)
+    mass_on = _masses(part, [root, tip, *others.values()])
+    material, about = _material(MATERIALS[0][-1] if density is None else density)
 
     def interface(label: str, face: PartFace) -> dict[str, Any]:
         position, normal = _numbers(axes @ (face.point - root.point)), _numbers(axes @ face.direction)
@@ -66,21 +66,19 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
         "damping": {"ratio": 0.01},
         "interface": [interface("root", root), interface("tip", tip)],
     }
-    head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n{about}\n"
-    text = head + toml_text(keys)
+    text = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n"
+    text += f"{about}\n\n{toml_text(keys)}"
     for label, face in others.items():
         table = toml_text({"interface": [interface(label, face)]})
         text += "\n" + "".join(f"# {line}\n" for line in table.strip().splitlines())
     return text
 
 
-def _material(density: float | None) -> tuple[dict[str, float], str]:
-    wanted = MATERIALS[0][-1] if density is None else density
-    name, E, nu, rho = min(MATERIALS, key=lambda one: abs(one[-1] / wanted - 1.0))
-    keys = {"youngs_modulus": E, "poissons_ratio": nu, "density": wanted}
-    if abs(rho / wanted - 1.0) < LIKE:
-        return keys, f"# Stiffness of {name}.\n"
-    return keys, f"# Stiffness of {name}, which is not the material of {wanted:g} kg/m3: replace it.\n"
+def _material(density: float) -> tuple[dict[str, float], str]:
+    name, E, nu, rho = min(MATERIALS, key=lambda one: abs(one[-1] / density - 1.0))
+    is_like = abs(rho / density - 1.0) < 0.1
+    other = "" if is_like else f", which is not the material of {density:g} kg/m3: replace it"
+    return {"youngs_modulus": E, "poissons_ratio": nu, "density": density}, f"# Stiffness of {name}{other}."
 
 
 def _principal(part: Inspection) -> tuple[Array, Array]:
@@ -130,27 +128,24 @@ def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
 
 
 def _frame(part: Inspection, root: PartFace, tip: PartFace) -> tuple[Array, float]:
-    """Axes (3, 3) of the link, rows, and its length: x is square to a plane root, and to the axis of a bore."""
+    """Axes (3, 3) of the link, rows, and its length: x is square to a plane root, and to the axis of a bore.
+
+    y is square to the axis of the root's bore, else the direction in which the part is thinnest.
+    """
     way = tip.point - root.point
     along = (way @ root.direction) * root.direction
     way = along if root.kind == "plane" else way - along
     length = float(np.linalg.norm(way))
     x = way / length
-    y = _across(part, root, x)
+    for z in (root.direction if root.kind == "bore" else _widest(part, x), np.eye(3)[np.abs(x).argmin()]):
+        across = z - (z @ x) * x
+        if np.linalg.norm(across) >= SQUARE:
+            break
+    y = np.cross(across / np.linalg.norm(across), x)
     return np.stack([x, y, np.cross(x, y)]), length
 
 
-def _across(part: Inspection, root: PartFace, x: Array) -> Array:
-    """The link's y axis: square to the axis of the root's bore, else the direction in which the part is thinnest."""
-    z = root.direction if root.kind == "bore" else _squared(part, x)
-    z = z - (z @ x) * x
-    if np.linalg.norm(z) < SQUARE:
-        z = np.eye(3)[np.abs(x).argmin()]
-        z = z - (z @ x) * x
-    return np.cross(z / np.linalg.norm(z), x)
-
-
-def _squared(part: Inspection, x: Array) -> Array:
+def _widest(part: Inspection, x: Array) -> Array:
     """The direction in which the part is wide: the normal of the largest plane face that nearly has it, if any.
 
     Nodes of a mesh show it roughly; where the part is as thick as it is wide, of any large face along x, that of the

@@ -12,7 +12,7 @@ from ..common.arrays import Array, Booleans, as_floats
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.libraries import scipy
 from ..common.structs import struct
-from ..exchange.motion.read_motion import read_record
+from ..exchange.motion import read_record
 from ..mbs.analysis.pcid import Pcid
 from ..mbs.fields.waypoints import Recorded, column_of, difference_quotients, load_record
 from ..mbs.joints.joint import JointRecord

@@ -11,7 +11,7 @@ from ..common.errors import InputError, SolveError, check_known, either, quoted
 from ..common.files import AnyPath, check_new_file, check_new_folder
 from ..common.structs import struct
 from ..exchange.export import Content, write_content
-from ..exchange.motion.robot_motion import (
+from ..exchange.motion import (
     JointMotion,
     JointMotions,
     csv_text,

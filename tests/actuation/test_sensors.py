@@ -8,7 +8,7 @@ from observed_wheel import INERTIA, T, wheel
 import ffrobot
 from ffrobot.actuation.control.sensor_records import Sensor
 from ffrobot.actuation.control.signals import Filter, Signal
-from ffrobot.exchange.fmu.forward_model import joint_units, linear_variables
+from ffrobot.exchange.fmu.linear_fmu import joint_units, linear_variables
 from ffrobot.scene.load import make_scene
 
 

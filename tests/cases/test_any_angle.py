@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from tables_3d import ORIGIN, X, Z, joint, revolute, rigid, scene
 
 import ffrobot
-from ffrobot.exchange.urdf.read import read_urdf
+from ffrobot.exchange.urdf.robot import read_urdf
 from ffrobot.mbs.quantities.motion import node_of
 from ffrobot.mbs.quantities.validity import doubts
 from ffrobot.run.solve import solve_scene

@@ -8,7 +8,7 @@ import pytest
 
 from ffrobot import InputError
 from ffrobot.common.validation import validate
-from ffrobot.exchange.motion.read_motion import read_motion
+from ffrobot.exchange.motion import read_motion
 from ffrobot.mbs.fields.waypoints import Waypoints, load_waypoints
 from ffrobot.mbs.scene.trajectories import Trajectory
 

@@ -12,7 +12,7 @@ from rigid_robots import ROBOTS, with_motion
 
 from ffrobot import Results
 from ffrobot.exchange.export import export_file
-from ffrobot.exchange.motion.robot_motion import JointMotion, csv_text, joint_trajectory, robot_motion
+from ffrobot.exchange.motion import JointMotion, csv_text, joint_trajectory, robot_motion
 
 # Fields in the order of the message definitions of ROS 2 (common_interfaces: trajectory_msgs/msg).
 TRAJECTORY = ["header", "joint_names", "points"]

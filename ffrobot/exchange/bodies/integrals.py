@@ -48,7 +48,7 @@ class ShapeIntegrals:
     spin_slope: Array  # (3, n, n) ∫ρ Φ_k × Φ_l dV at [l, k]
     modal_mass: Array  # (n, n) M_e
     centrifugal_slope: Array  # (6, n, n) ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`; both orders where a ≠ b
-    # stiffness, damping: (n, n)
+    # stiffness, damping: (n, n), of modal coordinates in m·√kg: 1/s² and 1/s
     stiffness: Array
     damping: Array
 
@@ -59,30 +59,30 @@ class ShapeIntegrals:
 
     @property
     def I_bar(self) -> Array:
-        """Return (3, 3, n) ∫ρ x_k Φ_l dV, √kg·m, at [k, l], from the symmetric part in J_l and the rest in C_r0."""
+        """Return ∫ρ x_k Φ_l dV at [k, l] (3, 3, n), √kg·m, from the symmetric part in J_l and the rest in C_r0."""
         trace = np.einsum("aan->n", self.inertia_slope) / 4
         symmetric = trace * np.eye(3)[:, :, None] - self.inertia_slope / 2
         return symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
 
     @property
     def gyroscopic(self) -> Array:
-        """G_r (3, 3, n), √kg·m."""
+        """Return G_r (3, 3, n), √kg·m."""
         I_bar = self.I_bar
-        return np.asarray(2 * (np.einsum("ccn,ab->abn", I_bar, np.eye(3)) - I_bar.transpose(1, 0, 2)))
+        return 2 * (np.trace(I_bar) * np.eye(3)[:, :, None] - I_bar.transpose(1, 0, 2))
 
     @property
     def centrifugal(self) -> Array:
-        """O_e of the undeformed body, (n, 6): ∫ρ Φ_lᵀ ω~ω~ x dV = −½ J_l of squares, −J_l of products."""
+        """Return O_e of the undeformed body (n, 6), √kg·m: ∫ρ Φ_lᵀ ω~ω~ x dV = −½ J_l of squares, −J_l of products."""
         return np.stack([-(0.5 if a == b else 1.0) * self.inertia_slope[a, b] for a, b in PAIRS], axis=1)
 
     @property
     def translational_mass(self) -> Array:
-        """Modal masses (n, n), relative, ∫ρ Φᵀ Φ dV of translation: M_e without the rotation of sections."""
-        return np.asarray(-0.5 * self.centrifugal_slope[:3].sum(axis=0))
+        """Return ∫ρ Φᵀ Φ dV (n, n), modal masses without the rotation of sections; no unit."""
+        return -0.5 * self.centrifugal_slope[:3].sum(axis=0)
 
     @property
     def S_bar_kl(self) -> Array:
-        """Return (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l], from symmetric parts in O_e and other parts in C_r."""
+        """Return ∫ρ Φ_kᵀ Φ_l dV at [k, l] (3, 3, n, n), from symmetric parts in O_e and other parts in C_r; no unit."""
         n = self.n_modes
         S = np.zeros((3, 3, n, n))
         for k, (a, b) in enumerate(PAIRS):
@@ -96,11 +96,11 @@ class ShapeIntegrals:
 
     @property
     def about_center(self) -> Array:
-        """Inertia (3, 3) about the center of mass, kg·m²."""
+        """Return the inertia (3, 3) about the center of mass, kg·m², in axes of the body."""
         return as_floats(self.inertia - point_inertia(self.mass, self.first_moment / self.mass))
 
     def transformed(self, T: Array) -> ShapeIntegrals:
-        """Return the integrals in modal coordinates p with q = T p."""
+        """Return the integrals in modal coordinates p (m,) with q = T p, T (n, m)."""
         return replace(
             self,
             S_bar=self.S_bar @ T,
@@ -134,17 +134,16 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
 
 
 def slopes(S: Array) -> tuple[Array, Array]:
-    """Return `spin_slope` and `centrifugal_slope` from S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV at [k, l]."""
-    total = S[0, 0] + S[1, 1] + S[2, 2]
-    centrifugal = [S[a, a] - total if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
+    """Return `spin_slope` (3, n, n) and `centrifugal_slope` (6, n, n) of S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV; no unit."""
+    centrifugal = [S[a, a] - np.trace(S) if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
     return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)
 
 
 def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
-    """Adjust modal masses to those of the mode shapes; returns the integrals and the changes made.
+    """Adjust modal masses to those of the mode shapes; returns the integrals and a remark on the change, if any.
 
-    Files of few digits give M_e otherwise than the masses and shapes beside it do. Where nothing has inertia about the
-    axis, so that no section can account for that, ∫ρΦᵀΦ of these is taken.
+    In files of few digits M_e is off ∫ρΦᵀΦ of masses and shapes. Where nothing has inertia about the axis, so that no
+    section can account for that, ∫ρΦᵀΦ is taken.
 
     Raises:
         InputError: M_e and ∫ρΦᵀΦ contradict each other there, or M_e is less than what the mean motion of the shapes
@@ -174,13 +173,12 @@ def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple
     return replace(integrals, modal_mass=translational), (remark,)
 
 
-def section_inertia(integrals: ShapeIntegrals) -> dict[str, Array | float]:
-    """J_spin, h_spin, S_spin and second_moment of `ModalBody`, which only together make J_0, C_r0 and M_e.
+def _section_inertia(integrals: ShapeIntegrals) -> dict[str, Array | float]:
+    """J_spin, h_spin, S_spin and second_moment of `ModalBody`: formats have the sums alone that these make.
 
-    Formats have the sums alone, which these reproduce. Where sections turn (M_e is more than ∫ρΦᵀΦ) all of the inertia
-    about x that no mass beside the axis needs is booked as theirs: J_s = 1/(J⁻¹)_xx about the center of mass, and h_s =
-    C_r0 about x, both exact of a line of mass. Where that is more than S_s allows, of a line with masses that turn as
-    well, C_r0 stays in I_bar.
+    Where sections turn (M_e is more than ∫ρΦᵀΦ) all of the inertia about x that no mass beside the axis needs is booked
+    as theirs: J_s = 1/(J⁻¹)_xx about the center of mass, and h_s = C_r0 about x, both exact of a line of mass. Where
+    that is more than S_s allows, of a line with masses that turn as well, C_r0 stays in I_bar.
     """
     turning = integrals.modal_mass - integrals.translational_mass
     J_spin, h_spin = 0.0, np.zeros(integrals.n_modes)
@@ -202,7 +200,7 @@ PARTS = ("position", "translation", "rotation")
 
 
 def nodes_of(body: ModalBody) -> tuple[dict[int, Interface], dict[str, int]]:
-    """Stations, then interfaces that are at none of them; and the number of each interface."""
+    """Stations, then interfaces that are at none of them, by numbers from 1; and the number of each interface."""
     stations = zip(*(getattr(body.stations, part) for part in PARTS), strict=True)
     nodes = {number: Interface(*parts) for number, parts in enumerate(stations, 1)}
     numbers = dict[str, int]()
@@ -222,29 +220,26 @@ def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
     return f"ffrobot: {body.reference_condition}; {', '.join(f'{name}={number}' for name, number in numbers.items())}"
 
 
-NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
-
-
 def noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
-    """Reference condition and number of each interface, where this program wrote them into `text`; None and {} else.
+    """Reference condition and number of each interface from a `note` in `text`; None and {} without one.
 
     Raises:
         InputError: they are no numbers of `nodes`.
     """
-    match = NOTE.search(text)
+    match = re.search(r"ffrobot: ([\w-]+); (.*)", text)
     if match is None:
         return None, {}
     numbers = dict[str, int]()
-    for pair in match["numbers"].strip().split(", "):
+    for pair in match[2].strip().split(", "):
         name, _, number = pair.rpartition("=")
         if not name or not number.isdecimal() or int(number) not in nodes:
             raise InputError("interfaces: expected NAME=NUMBER of nodes in the file", f'"{shown(pair)}"')
         numbers[name] = int(number)
-    return match["condition"], numbers
+    return match[1], numbers
 
 
-def interfaces_of(nodes: Nodes, numbers: Mapping[str, int]) -> dict[str, Interface]:
-    """Return interfaces by name: those of `numbers`, `root`, `tip` (nearest, farthest), else "node_NUMBER"."""
+def _interfaces(nodes: Nodes, numbers: Mapping[str, int]) -> dict[str, Interface]:
+    """By name: those of `numbers`, `root`, `tip` (nearest, farthest), else "node_NUMBER"."""
     by_distance = sorted(nodes, key=lambda number: float(np.linalg.norm(nodes[number].position)))
     ends = {"root": by_distance[0], "tip": by_distance[-1]}
     names = {number: name for name, number in reversed(ends.items())}
@@ -256,7 +251,7 @@ def interfaces_of(nodes: Nodes, numbers: Mapping[str, int]) -> dict[str, Interfa
 
 ORTHONORMAL = 1e-12  # of M_e = E and of K_e diagonal: then modes stay as they are
 ON_AXIS = 1e-9  # of the body's size
-
+FAMILIES = ("axial", "in-plane-bending", "out-of-plane-bending", "torsion")
 NOT_IN_THE_FILE = (
     "not in the file: geometric stiffness, stresses, sections (so no patches on this body), the surface for pictures,"
     " names of mode families, which are inferred from the direction of most mass"
@@ -266,7 +261,7 @@ NOT_IN_THE_FILE = (
 def modal_body(
     name: str, integrals: ShapeIntegrals, nodes: Nodes, numbers: Mapping[str, int], condition: str | None = None
 ) -> ModalBody:
-    """The body of foreign integrals and nodes.
+    """The body of foreign integrals and nodes, with modes of unit mass; `numbers` of the nodes that are interfaces.
 
     Raises:
         InputError: a mode has no stiffness, or the integrals cannot be those of a body.
@@ -274,12 +269,14 @@ def modal_body(
     T, omega2 = _orthonormal(integrals)
     integrals, n = integrals.transformed(T), len(omega2)
     nodes = {number: Interface(at.position, at.translation @ T, at.rotation @ T) for number, at in nodes.items()}
-    interfaces = interfaces_of(nodes, numbers)
+    interfaces = _interfaces(nodes, numbers)
     ends = [interfaces["root"], interfaces["tip"]]
     length = float(np.linalg.norm(ends[1].position - ends[0].position))
-    sections = section_inertia(integrals)
+    sections = _section_inertia(integrals)
     S_bar_kl, S_spin = integrals.S_bar_kl, np.asarray(sections["S_spin"])
-    families = _families(S_bar_kl, S_spin)
+    # Families are those of the direction in which most of a mode's mass moves.
+    shares = [*(np.diag(S_bar_kl[a, a]) for a in range(3)), np.diag(S_spin)]
+    families = tuple(FAMILIES[k] for k in np.argmax(shares, axis=0))
     S_bar_kl[2, 2] += S_spin  # as `ModalBody` books it
     without_sections = replace(integrals, spin=integrals.spin - np.outer([1.0, 0.0, 0.0], sections["h_spin"]))
     constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
@@ -327,7 +324,7 @@ def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
         raise InputError("M_e: expected a positive definite matrix of modal masses", "one that is not") from None
     if omega2[0] <= 0:
         raise InputError("K_e: expected a positive definite stiffness", f"an eigenvalue of {omega2[0]:g}")
-    return np.asarray(T), np.asarray(omega2)
+    return T, omega2
 
 
 def _condition(interfaces: Mapping[str, Interface]) -> str:
@@ -336,22 +333,14 @@ def _condition(interfaces: Mapping[str, Interface]) -> str:
     return "cantilever" if sizes["root"] <= 1e-9 * max(sizes.values()) else "simply-supported"
 
 
-def _families(S_bar_kl: Array, S_spin: Array) -> tuple[str, ...]:
-    """By the direction in which most of a mode's mass moves."""
-    shares = [*(np.diag(S_bar_kl[a, a]) for a in range(3)), np.diag(S_spin)]
-    names = ("axial", "in-plane-bending", "out-of-plane-bending", "torsion")
-    return tuple(names[k] for k in np.argmax(shares, axis=0))
-
-
 def _stations(nodes: Nodes, ends: list[Interface], length: float) -> Stations:
     """The nodes on the line from root to tip, ascending in x; root and tip where the body lies otherwise."""
     on_axis = [at for at in nodes.values() if np.abs(at.position[1:]).max() <= ON_AXIS * length]
     points = sorted(on_axis if len(on_axis) > 1 else ends, key=lambda at: float(at.position[0]))
-    stations = [points[0]]
-    stations += [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
-    if len(stations) < 2:
+    after = [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
+    if not after:
         raise InputError("nodes: expected root and tip at different x", "them at the same: turn the body's frame")
-    return _stations_at(stations)
+    return _stations_at([points[0], *after])
 
 
 def _stations_at(points: list[Interface]) -> Stations:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import as_floats
 from ...common.errors import InputError
 from ...common.rotations import skew
 from ...fe_models.modal_body import ModalBody
@@ -29,9 +29,9 @@ REMARKS = (
 
 
 def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
-    """Return the .npz content of a body, nodes in the order stated in its remark, and remarks on what is lost."""
+    """Return the .npz content of a body for EXUDYN, SI units, and remarks: order of the nodes, what is lost."""
     nodes, numbers = nodes_of(body)
-    arrays = reduced_order(integrals_of(body)) | {
+    arrays = _reduced_order(integrals_of(body)) | {
         "modeBasis": np.concatenate([at.translation for at in nodes.values()]),
         "xRef": np.concatenate([at.position for at in nodes.values()]),
         "trigList": np.zeros((0, 3), dtype=np.int64),
@@ -47,8 +47,7 @@ def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     return content.getvalue(), (*REMARKS, f"numbers of nodes, from 0: {names}")
 
 
-def reduced_order(integrals: ShapeIntegrals) -> dict[str, Any]:
-    """The constant matrices of ObjectFFRFreducedOrder."""
+def _reduced_order(integrals: ShapeIntegrals) -> dict[str, Any]:
     n, S, one = integrals.n_modes, integrals.S_bar_kl, np.eye(3)
     center = as_floats(integrals.first_moment / integrals.mass)
     tilde_tilde = np.einsum("ab,lm->lamb", one, np.trace(S)) - np.einsum("balm->lamb", S)
@@ -75,7 +74,9 @@ LOST = (
 
 
 def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
-    """An .npz file with M, K, C, origins, interfaces, coordinates and the recovery of displacements.
+    """An .npz file with M, K, C (m, m) by the m `coordinates` (m, rad), SI units, and remarks.
+
+    `origins` (i, 3), m, are where the `interfaces` are, `recovery` (3 k, m) are displacements of `points` (k, 3), m.
 
     Raises:
         InputError: the body has other modes, or its interfaces do not move in all six components.
@@ -96,19 +97,14 @@ def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
             f'none for {", ".join(missing)}: use [modes] family = "all"',
         )
     damping = np.diag(2 * body.damping_ratio * 2 * np.pi * body.frequency)
+    points = body.stations.position
+    shapes = body.stations.translation @ link.recovery  # those of the modes, and of the root's frame
+    shapes[:, :, :3] += np.eye(3)
+    shapes[:, :, 3:6] -= skew(points - body.interfaces[ROOT].position)
     content = io.BytesIO()
     np.savez(
         content, M=link.mass, K=link.stiffness, C=link.recovery.T @ damping @ link.recovery,
         origins=np.array([body.interfaces[name].position for name in names]), interfaces=np.array(names),
-        coordinates=np.array(link.coordinates), points=body.stations.position, recovery=_recovery(body, link.recovery),
+        coordinates=np.array(link.coordinates), points=points, recovery=shapes.reshape(3 * len(points), -1),
     )  # fmt: skip
     return content.getvalue(), LOST
-
-
-def _recovery(body: ModalBody, modal: Array) -> Array:
-    """(3 k, m) displacements of the k stations by the coordinates: those of the root's frame, and of the modes."""
-    x, Phi = body.stations.position, body.stations.translation
-    shapes = np.einsum("ian,nm->iam", Phi, modal)
-    shapes[:, :, :3] += np.eye(3)
-    shapes[:, :, 3:6] -= skew(x - body.interfaces[ROOT].position)
-    return np.asarray(shapes.reshape(3 * len(x), -1))

@@ -87,7 +87,7 @@ def _lines(rows: Iterable[Iterable[float]]) -> Iterator[str]:
 
 
 def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body in the text of a .fem file, and remarks.
+    """The body in the text of a .fem file, and remarks on it.
 
     Raises:
         InputError: it is no such file, records are missing or have other sizes, or it cannot be a body.
@@ -170,7 +170,7 @@ def _of_invariants(records: dict[int, list[str]], n: int) -> dict[str, Any]:
 
 
 def _of_lumped_masses(masses: Array, x: Array, shapes: Array) -> dict[str, Any]:
-    """Sums over nodes: masses (count, 6), places (count, 3), shapes (n, count, 6)."""
+    """Sums over nodes: masses (count, 6), x (count, 3), shapes (n, count, 6)."""
     if np.any(np.ptp(masses[:, :3], axis=1) > 1e-9 * np.abs(masses[:, :3]).max()):
         raise InputError("record 11: expected the same mass along x, y and z at each node", "others")
     m, J = masses[:, 0], masses[:, 3:]
@@ -186,7 +186,7 @@ def _of_lumped_masses(masses: Array, x: Array, shapes: Array) -> dict[str, Any]:
         "first_moment": m @ x,
         "S_bar": np.einsum("i,nia->an", m, Phi),
         "inertia": np.trace(second) * np.eye(3) - second + np.diag(J.sum(axis=0)),
-        "inertia_slope": 2 * np.einsum("ccn,ab->abn", I_bar, np.eye(3)) - I_bar - I_bar.transpose(1, 0, 2),
+        "inertia_slope": 2 * np.trace(I_bar) * np.eye(3)[:, :, None] - I_bar - I_bar.transpose(1, 0, 2),
         "spin": np.einsum("abc,bcn->an", LEVI_CIVITA, I_bar) + np.einsum("ia,nia->an", J, turn),
         "spin_slope": spin_slope,
         "centrifugal_slope": centrifugal_slope,

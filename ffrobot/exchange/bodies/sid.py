@@ -44,7 +44,7 @@ def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
     lines = [f"{len(nodes):5d}{integrals.n_modes:5d}    : nodes, modes : {body.name} : {note(body, numbers)}", " part"]
     lines += ["      new modal                        =", "           refmod"]
-    lines.append(f"                mass                   = {fortran(integrals.mass)}")
+    lines.append(f"                mass                   = {_fortran(integrals.mass)}")
     lines.append(f"                nelastq                = {integrals.n_modes:5d}")
     lines += [
         f"                ielastq ({k + 1:4d})         = Eigen Mode {k + 1:4d} : {value:12.6g} Hz"
@@ -52,37 +52,35 @@ def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
     ]
     lines += ["           end refmod", "           frame"]
     for number, at in nodes.items():
-        lines += _node_lines(number, at)
+        lines += [
+            f"                new node               = {number:5d}",
+            "                     rframe            = body ref",
+            *_lines_of("origin", at.position[:, None], at.translation[:, :, None], 21),
+            *_lines_of("phi", at.translation, None, 21),
+            *_lines_of("psi", at.rotation, None, 21),
+            *_lines_of("AP", np.eye(3), skew(at.rotation.T).transpose(1, 0, 2), 21),  # (row, mode, column)
+            "                end node",
+        ]
     lines += ["           end frame", *_integral_lines(integrals), "      end modal", " end part"]
     return "\n".join(lines) + "\n", REMARKS
-
-
-def _node_lines(number: int, at: Interface) -> Iterator[str]:
-    yield f"                new node               = {number:5d}"
-    yield "                     rframe            = body ref"
-    yield from lines_of("origin", at.position[:, None], at.translation[:, :, None], 21)
-    yield from lines_of("phi", at.translation, None, 21)
-    yield from lines_of("psi", at.rotation, None, 21)
-    yield from lines_of("AP", np.eye(3), skew(at.rotation.T).transpose(1, 0, 2), 21)  # (row, mode, column)
-    yield "                end node"
 
 
 def _integral_lines(integrals: ShapeIntegrals) -> Iterator[str]:
     n = integrals.n_modes
     J, slope = integrals.inertia, integrals.inertia_slope
     by_axis = 2 * np.concatenate(list(integrals.spin_slope), axis=1)  # G_e = 2∫ρΦᵀe~Φ = twice the slope of C_r
-    yield from lines_of("mdCM", integrals.first_moment[:, None], integrals.S_bar[:, :, None])
-    yield from lines_of("J", np.array([[J[k]] for k in ROWS]), np.array([slope[k] for k in ROWS])[:, :, None])
-    yield from lines_of("Ct", integrals.S_bar.T)
-    yield from lines_of("Cr", integrals.spin.T, integrals.spin_slope.transpose(1, 2, 0))
+    yield from _lines_of("mdCM", integrals.first_moment[:, None], integrals.S_bar[:, :, None])
+    yield from _lines_of("J", np.array([[J[k]] for k in ROWS]), np.array([slope[k] for k in ROWS])[:, :, None])
+    yield from _lines_of("Ct", integrals.S_bar.T)
+    yield from _lines_of("Cr", integrals.spin.T, integrals.spin_slope.transpose(1, 2, 0))
     is_unit = np.array_equal(integrals.modal_mass, np.eye(n))
-    yield from lines_of("Me", integrals.modal_mass, structure=IDENTITY if is_unit else None)
-    yield from lines_of("Gr", integrals.gyroscopic.transpose(0, 2, 1).reshape(3, 3 * n))
-    yield from lines_of("Ge", by_axis)
-    yield from lines_of("Oe", integrals.centrifugal, integrals.centrifugal_slope.transpose(1, 2, 0))
-    yield from lines_of("ksigma", np.zeros((n, 1)))
-    yield from lines_of("Ke", integrals.stiffness)
-    yield from lines_of("De", integrals.damping)
+    yield from _lines_of("Me", integrals.modal_mass, structure=IDENTITY if is_unit else None)
+    yield from _lines_of("Gr", integrals.gyroscopic.transpose(0, 2, 1).reshape(3, 3 * n))
+    yield from _lines_of("Ge", by_axis)
+    yield from _lines_of("Oe", integrals.centrifugal, integrals.centrifugal_slope.transpose(1, 2, 0))
+    yield from _lines_of("ksigma", np.zeros((n, 1)))
+    yield from _lines_of("Ke", integrals.stiffness)
+    yield from _lines_of("De", integrals.damping)
 
 
 def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
@@ -91,7 +89,7 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     Raises:
         InputError: it is no such file, or what it holds cannot be a body.
     """
-    head, top = parse(text)
+    head, top = _parse(text)
     part = top["part"]
     modal = Modal(next((one for one in part.inside if one.name == "modal"), None) or part["modal"])
     integrals = _integrals(modal)
@@ -111,9 +109,11 @@ def _interface(modal: Modal, node: SidObject) -> Interface:
 
 def _turned_nodes(modal: Modal) -> Iterator[str]:
     """A line on nodes whose own axes, A_P, are not those of the body, which interfaces here have."""
-    axes = ((node, part) for node in modal.nodes for part in node.inside if part.name.lower() == "ap")
     turned = [
-        node.keys["number"] for node, part in axes if np.abs(modal.taylor(part, (3, 3)).m0 - np.eye(3)).max() > SAME
+        node.keys["number"]
+        for node in modal.nodes
+        for part in node.inside
+        if part.name.lower() == "ap" and np.abs(modal.taylor(part, (3, 3)).m0 - np.eye(3)).max() > SAME
     ]
     if turned:
         yield f"AP: turned axes of nodes {', '.join(turned)} are omitted: joints there have the axes of the body"
@@ -123,7 +123,10 @@ def _integrals(modal: Modal) -> ShapeIntegrals:
     n = modal.modes
     mdCM, J, Cr, Oe = modal["mdCM", (3, 1)], modal["J", (6, 1), (3, 3)], modal["Cr", (n, 3)], modal["Oe", (n, 6)]
     Me, Ke, De = (modal[key, (n, n)].m0 for key in ("Me", "Ke", "De"))
-    J0, J1 = _inertia(J)
+    J0, J1 = J.m0, J.m1.transpose(0, 2, 1)
+    if len(J0) == len(ROWS):
+        row_of = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+        J0, J1 = J.m0[row_of, 0], J.m1[row_of, :, 0]
     slope = Cr.m1.transpose(2, 0, 1)
     if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope):
         raise InputError(
@@ -162,16 +165,6 @@ def _is_in_both(modal: Modal, slope: Array) -> bool:
     twice = slope + slope.transpose(0, 2, 1)
     parts = (0.5 * (each + each.transpose(0, 2, 1)) for each in layouts)
     return any(np.abs(part - twice).max() < SAME * np.abs(twice).max() for part in parts)
-
-
-def _inertia(J: Taylor) -> tuple[Array, Array]:
-    if len(J.m0) == 3:
-        return J.m0, J.m1.transpose(0, 2, 1)
-    J0, J1 = np.zeros((3, 3)), np.zeros((3, 3, J.m1.shape[1]))
-    for row, (a, b) in enumerate(ROWS):
-        J0[a, b] = J0[b, a] = J.m0[row, 0]
-        J1[a, b] = J1[b, a] = J.m1[row, :, 0]
-    return J0, J1
 
 
 def _checks(modal: Modal, integrals: ShapeIntegrals) -> Iterator[str]:
@@ -227,14 +220,14 @@ class SidObject:
         raise InputError(f"expected the object {name} in {self.name}", "none")
 
     def number(self, key: str) -> float:
-        """The value of a key."""
+        """Return the value of a key; raises `InputError` where there is none, or no number."""
         if key not in self.keys:
             raise InputError(f"{self.name}: expected the key {key}", "none")
         return number_of(self.keys[key], f"{self.name}: {key}")
 
 
-def parse(text: str) -> tuple[str, SidObject]:
-    """The first line, and the object `part` as a tree. Raises `InputError` where objects do not nest."""
+def _parse(text: str) -> tuple[str, SidObject]:
+    """The first line, and what follows as a tree."""
     head, *lines = text.splitlines() or [""]
     top = SidObject("file")
     stack = [top]
@@ -258,15 +251,7 @@ def parse(text: str) -> tuple[str, SidObject]:
 
 
 class Modal:
-    """The object `modal`, whose matrices are read by name.
-
-    Attributes:
-        root: the object.
-        modes: their number.
-        nodes: the objects of its frame.
-        mode_is_last: whether M1 is (row, column, mode) in place of (row, mode, column): mdCM has one column, so that a
-            third index above 1 is that of a mode.
-    """
+    """The object `modal` as `root`, with so many `modes` and the objects `nodes`; its matrices are read by name."""
 
     def __init__(self, root: SidObject) -> None:
         self.root, self.modes = root, int(root["refmod"].number("nelastq"))
@@ -274,6 +259,7 @@ class Modal:
             raise InputError("refmod: nelastq: expected at least one mode", self.modes)
         thirds = (index[2] for order, index, _ in _entries(root["mdCM"]) if order and len(index) == 3)
         self.nodes = [node for node in root["frame"].inside if node.name == "node"]
+        # M1 is (row, column, mode), not (row, mode, column): mdCM has one column, so that a third index is of a mode.
         self.mode_is_last = any(third > 0 for third in thirds)
 
     def __getitem__(self, key: str | tuple[Any, ...]) -> Taylor:
@@ -281,7 +267,7 @@ class Modal:
         return self.taylor(self.root[name], *sizes)
 
     def taylor(self, matrix: SidObject, *sizes: tuple[int, int]) -> Taylor:
-        """The matrix of an object, which has one of these numbers of rows and columns; any where none is given."""
+        """Return the matrix of an object, which has one of the `sizes` (rows, columns) if there are any."""
         nrow, ncol = (int(matrix.number(key)) for key in ("nrow", "ncol"))
         is_possible = nrow > 0 and ncol > 0 and nrow * ncol * (self.modes + 1) <= MOST
         if not is_possible or (sizes and (nrow, ncol) not in sizes):
@@ -309,7 +295,7 @@ class Modal:
 def _entries(matrix: SidObject) -> Iterator[tuple[int, tuple[int, ...], float]]:
     """Order, indices from 0, value."""
     for key, value in matrix.keys.items():
-        if match := ENTRY.fullmatch(key):
+        if match := re.fullmatch(r"m([01])\s*\(([\s\d,]+)\)", key):
             try:
                 index = tuple(int(part) - 1 for part in match[2].split(","))
             except ValueError:
@@ -317,7 +303,7 @@ def _entries(matrix: SidObject) -> Iterator[tuple[int, tuple[int, ...], float]]:
             yield int(match[1]), index, number_of(value, f"{matrix.name}: {key}")
 
 
-def lines_of(
+def _lines_of(
     name: str, m0: Array, m1: Array | None = None, indent: int = 11, structure: int | None = None
 ) -> Iterator[str]:
     """The object `name` with M0 (rows, columns), and M1 (rows, modes, columns) where it is of first order."""
@@ -332,10 +318,9 @@ def lines_of(
     for order, term in enumerate(terms) if structure != IDENTITY else ():
         for index in zip(*np.nonzero(term), strict=True):
             at = ",".join(f"{k + 1:2d}" for k in index)
-            yield f"{blank}     {f'm{order}({at})':<22}= {fortran(term[index])}"
+            yield f"{blank}     {f'm{order}({at})':<22}= {_fortran(term[index])}"
     yield f"{blank}end {name}"
 
 
-def fortran(value: float) -> str:
-    """A number with all its digits, as Fortran writes it."""
+def _fortran(value: float) -> str:
     return f"{value: .16E}".replace("E", "D")

@@ -10,19 +10,47 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.linalg import matrix_balance
 
 from ...actuation.control.linear_model import LinearModel, StateSpace
+from ...actuation.control.signals import ORDERS
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.version import VERSION
+from ...mbs.joints.joints import JOINT_TYPES, FreeJoint
 from ...results.file import Results
-from .description import PLATFORMS, SOURCE, Unit, guid_of, identifier_of, model_description, zipped
-from .forward_model import joint_units, linear_variables
+from .description import (
+    PLATFORMS,
+    Variable,
+    add,
+    finished,
+    guid_of,
+    identifier_of,
+    motor,
+    new_root,
+    numbered,
+    voltage,
+    zipped,
+)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Names, variables and model of an FMU."""
+
+    identifier: str  # of C, in the name of the binary
+    name: str  # for people, with `description`
+    description: str
+    guid: str  # of the model's numbers; the binary has the same
+    model: StateSpace
+    # states, inputs, outputs: in the order of the rows and columns of `model`
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
 
 
 def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
@@ -35,19 +63,19 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     if len(models) > 1:
         remarks.append(f"the controllers at {models[0].time:g} s; --format c has all of their schedule")
     source = (Path(__file__).parent / "c" / SOURCE).read_text(encoding="utf-8")
-    files = {SOURCE: source, HEADER: _header(unit, models[:1])}
-    compiled = binary(unit, files)
-    content = {"modelDescription.xml": model_description(unit, f"ffrobot {VERSION}")}
+    files = {SOURCE: source, "model.h": _header(unit, models[:1])}
+    content = {"modelDescription.xml": _model_description(unit)}
     content |= {f"sources/{file}": text.encode() for file, text in files.items()}
+    compiled = _binary(unit, files)
     if isinstance(compiled, str):
         remarks.append(f"sources only, no binary: {compiled}")
     else:
-        content[compiled[0]] = compiled[1]
+        content |= compiled
     return zipped(content), _what(name, unit), tuple(remarks), name
 
 
 def c_table(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...], str]:
-    """Return a C header with the matrices, of all instants of a schedule; arguments as of `linear_fmu`."""
+    """Return a C header with the matrices, of all instants of a schedule; else as `linear_fmu`."""
     unit, models, remarks, name = _unit(path, analysis)
     return _header(unit, models), _what(name, unit), tuple(remarks), name
 
@@ -65,12 +93,19 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, list[StateSpace], lis
                 f'"{name}" of kind "forward": export the scene, SCENE.toml, for an FMU of that motion',
             )
         models, scene = results.state_spaces(name), results.scene
-    if len(models) != 1 and not models[0].step:
+    model = models[0]
+    if len(models) != 1 and not model.step:
         raise InputError(
             f"{path}: {name}: expected a linear model of one instant", f"{len(models)}; solve with one in `times`"
         )
-    _check(path, name, models[0])
-    model = models[0]
+    if not (model.input_names and model.output_names):
+        raise InputError(
+            f"{path}: {name}: expected a model with inputs and outputs for an FMU",
+            f"{len(model.input_names)} inputs and {len(model.output_names)} outputs; motors, patches and loads at"
+            " points are inputs",
+        )
+    if not all(np.all(np.isfinite(getattr(model, key))) for key in "ABCD"):
+        raise InputError(f"{path}: {name}: expected finite matrices A, B, C, D", "others")
     if not len(model.A):  # C has no arrays without numbers
         B, C = np.zeros((1, model.B.shape[1])), np.zeros((len(model.C), 1))
         model = replace(model, A=np.zeros((1, 1)), B=B, C=C, state_names=("state/1",))
@@ -82,7 +117,7 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, list[StateSpace], lis
 
 
 def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, str]) -> Unit:
-    """Names and variables of the FMU of a model; `units` of the joints' coordinates."""
+    """Names and variables of the FMU of a model; `units` of the joints' coordinates, see `joint_units`."""
     states, inputs, outputs = linear_variables(model, units)
     return Unit(
         identifier=identifier_of(scene, analysis),
@@ -92,7 +127,7 @@ def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, 
             if isinstance(model, LinearModel)
             else "controllers and observer at the start, from readings to commands, both off the reference"
         ),
-        guid=guid_of(numbers([model]), (*states, *inputs, *outputs)),
+        guid=guid_of(_numbers([model]), (*states, *inputs, *outputs)),
         model=model,
         states=states,
         inputs=inputs,
@@ -100,23 +135,134 @@ def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, 
     )
 
 
-def _check(path: Path, analysis: str, model: StateSpace) -> None:
-    if not (model.input_names and model.output_names):
-        raise InputError(
-            f"{path}: {analysis}: expected a model with inputs and outputs for an FMU",
-            f"{len(model.input_names)} inputs and {len(model.output_names)} outputs; motors, patches and loads at"
-            " points are inputs",
-        )
-    if not all(np.all(np.isfinite(getattr(model, key))) for key in "ABCD"):
-        raise InputError(f"{path}: {analysis}: expected finite matrices A, B, C, D", "others")
+RATE = "rate of "
 
 
-HEADER = "model.h"
-COMPILERS = ("cc", "gcc", "clang")
+def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
+    """Unit ("rad" or "m") of each coordinate of the joints of a scene, by its name as of `numbered`."""
+    units = dict[str, str]()
+    for joint in scene.get("joint", ()):
+        record = JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
+        of_joint = record.units or record.guess_units
+        units |= {numbered(joint["name"], k, len(of_joint)): unit for k, unit in enumerate(of_joint, 1)}
+    return units
 
 
-def numbers(models: Sequence[StateSpace]) -> str:
-    """Return the matrices as C source, those of several models one below the other, and a scale that balances A."""
+def linear_variables(
+    model: StateSpace, units: Mapping[str, str]
+) -> tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]]:
+    """States, inputs and outputs; `units` of the joints' coordinates, see `joint_units`.
+
+    FMI wants names once: a motor is "joint/NAME/moment", as in results, since "joint/NAME" is an output, "state "
+    stands before a state whose name an output has, too, and "measured " before patches that are sensors.
+    """
+    seen, driven = model.output_names, model.input_names
+    if model.step:  # a controller reads, and commands
+        seen, driven = driven, seen
+    readings = tuple(
+        Variable(f"measured {name}" if name.startswith("pzt/") else name, *_coordinate(name, units)) for name in seen
+    )
+    acting, states = tuple(_input(name, units) for name in driven), []
+    for name in model.state_names:
+        unit, about = _coordinate(name.removeprefix(RATE), units)
+        if name.startswith(RATE):
+            unit, about = f"{unit}/s", f"rate of the {about}"
+        states.append(Variable(f"state {name}" if name in model.output_names else name, unit, about))
+    return (tuple(states), readings, acting) if model.step else (tuple(states), acting, readings)
+
+
+def _input(name: str, units: Mapping[str, str]) -> Variable:
+    kind, _, rest = name.partition("/")
+    if kind == "joint":
+        return motor(rest, units[rest])
+    place, _, last = rest.rpartition("/")
+    if kind == "pzt":
+        return voltage(place, int(last))
+    return Variable(name, "N", f"force on {place} along {last}")
+
+
+def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
+    """Unit of a state or output, and a few words on it."""
+    stem, _, measure = name.rpartition("/")
+    if measure in ORDERS and "/" in stem:  # of a sensor
+        unit, what = _coordinate(stem, units)
+        return {"rate": f"{unit}/s", "gyro": "rad/s"}.get(measure, f"{unit}/s2"), f"{measure} of the {what}"
+    kind, _, rest = name.partition("/")
+    place, _, last = rest.rpartition("/")
+    if kind == "state":  # of a controller
+        return "1", f"state {rest}"
+    if kind == "strain":
+        return "1", f"strain at {rest}"
+    if kind == "pzt":
+        return "V", f"voltage that patch {last} of {place} measures"
+    if kind == "modal":
+        return "kg0.5.m", f"modal coordinate {last} of {place}"
+    if kind == "point":
+        return "m", f"place of {place} along {last}"
+    if kind == "frame" and place:  # in the plane
+        return "rad" if last == "angle" else "m", f"{last} of the frame of {place}"
+    if kind == "frame":  # in space
+        body, _, number = rest.rpartition(" ")
+        return FreeJoint.guess_units[int(number) - 1], f"coordinate {number} of the frame of {body}"
+    of = "coordinate of the motor of" if kind == "motor" else "coordinate of joint"
+    return units[rest], f"{of} {rest}"
+
+
+VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts as one
+
+
+def _model_description(unit: Unit) -> bytes:
+    """Value references are 0, 1, … of states, derivatives, inputs, outputs."""
+    abilities = {
+        "modelIdentifier": unit.identifier,
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    }
+    model, f, u = unit.model, len(unit.states), len(unit.inputs)
+    stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
+    kinds = {
+        "ModelExchange": abilities | {"completedIntegratorStepNotNeeded": "true"},
+        "CoSimulation": abilities | stepping,
+    }
+    derivatives = tuple(
+        Variable(f"der({each.name})", f"{each.unit}2" if each.unit.endswith("/s") else f"{each.unit}/s", "")
+        for each in unit.states
+    )
+    groups = {"states": unit.states, "derivatives": derivatives, "inputs": unit.inputs, "outputs": unit.outputs}
+    references = list(range(2 * f + u + len(unit.outputs)))
+    if model.step:
+        kinds = {"CoSimulation": abilities}
+        del groups["derivatives"], references[f : 2 * f]
+    first = sum(len(group) for group in groups.values()) - len(unit.outputs) + 1
+    # FMI counts variables from 1; columns of [A B] and [C D] are states, then inputs.
+    columns = np.array([*range(1, f + 1), *range(first - u, first)])
+
+    def unknowns(first: int, *blocks: Array) -> dict[int, list[int]]:
+        return {first + k: columns[row != 0].tolist() for k, row in enumerate(np.hstack(blocks))}
+
+    outputs = unknowns(first, model.C, model.D)
+    rates = {} if model.step else unknowns(f + 1, model.A, model.B)
+    structure = {"Outputs": outputs} | ({"Derivatives": rates} if rates else {}) | {"InitialUnknowns": rates | outputs}
+    root = new_root(unit.name, unit.guid, unit.description)
+    for kind, attributes in kinds.items():
+        add(add(add(root, kind, attributes), "SourceFiles"), "File", {"name": SOURCE})
+    return finished(root, groups, _experiment(model), references, structure)
+
+
+def _experiment(model: StateSpace) -> dict[str, str]:
+    """Ten periods of the slowest vibration in a thousand steps; a second where there is none, or of samples."""
+    if model.step:
+        return {"startTime": "0", "stopTime": "1", "stepSize": repr(model.step)}
+    poles = np.linalg.eigvals(model.A)
+    angular = np.abs(poles.imag)
+    vibrations = angular[angular > VIBRATION * np.abs(poles).max()]
+    stop = float(f"{10 * 2 * np.pi / vibrations.min():.1g}") if len(vibrations) else 1.0
+    return {"startTime": "0", "stopTime": f"{stop:g}", "stepSize": f"{stop / 1000:g}"}
+
+
+def _numbers(models: Sequence[StateSpace]) -> str:
+    """The matrices as C source, those of several models one below the other, and a scale that balances A."""
     _, (scale, _) = matrix_balance(models[0].A, permute=False, separate=True)
     arrays = {key: np.vstack([getattr(of, key) for of in models]) for key in "ABCD"} | {"SCALE": scale[None, :]}
     return "\n".join(_array(name, values) for name, values in arrays.items())
@@ -126,16 +272,15 @@ def _header(unit: Unit, models: Sequence[StateSpace]) -> str:
     sizes = {"N_X": unit.states, "N_U": unit.inputs, "N_Y": unit.outputs}
     lines = [f"/* {_comment(unit.name)}: {_comment(unit.description)} */", f'#define GUID "{unit.guid}"']
     lines += [f"#define {name} {len(variables)}" for name, variables in sizes.items()]
-    lines += [f"#define SAMPLE_TIME {unit.model.step!r} /* s; x(k+1) = A x + B u, y = C x + D u */"] * bool(
-        unit.model.step
-    )
+    if unit.model.step:
+        lines.append(f"#define SAMPLE_TIME {unit.model.step!r} /* s; x(k+1) = A x + B u, y = C x + D u */")
     for title, variables in zip(("States", "Inputs", "Outputs"), sizes.values(), strict=True):
         names = "\n".join(f"     {_comment(each.name)} ({each.unit})" for each in variables)
         lines += ["", f"/* {title}:\n{names} */"]
     if len(models) > 1:
         lines += ["", f"/* Each of A to D {len(models)} times, for TIME (s); straight lines between */"]
         lines += [f"#define N_TIME {len(models)}", _array("TIME", np.array([[of.time for of in models]]))]
-    return "\n".join([*lines, "", numbers(models), ""])
+    return "\n".join([*lines, "", _numbers(models), ""])
 
 
 def _comment(text: str) -> str:
@@ -147,10 +292,14 @@ def _array(name: str, values: Array) -> str:
     return f"static const double {name}[] = {{\n{rows}}};\n"
 
 
-def binary(unit: Unit, files: Mapping[str, str]) -> tuple[str, bytes] | str:
-    """Compile the FMU's library for this platform: its path within the FMU and content, or the reason for none.
+SOURCE = "linear.c"
+COMPILERS = ("cc", "gcc", "clang")
 
-    It is compiled by the environment's CC, else by the first of `COMPILERS` on the path.
+
+def _binary(unit: Unit, files: Mapping[str, str]) -> dict[str, bytes] | str:
+    """The library for this platform by its path in the FMU, compiled by the environment's CC, else one of `COMPILERS`.
+
+    The reason where there is none.
     """
     place = PLATFORMS.get((sys.platform, platform.machine()))
     if place is None:
@@ -171,4 +320,4 @@ def binary(unit: Unit, files: Mapping[str, str]) -> tuple[str, bytes] | str:
         if done.returncode:
             reason = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()[-1]
             return f"{shlex.join(compiler)} failed: {reason}"
-        return f"binaries/{folder}/{output}", (Path(temporary) / output).read_bytes()
+        return {f"binaries/{folder}/{output}": (Path(temporary) / output).read_bytes()}

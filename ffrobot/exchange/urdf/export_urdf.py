@@ -56,11 +56,10 @@ STEPS: Mapping[str, tuple[Step, ...]] = {
 """By the type of joint in scenes, from the first side to the second."""
 
 
-def steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array]]:
+def _steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array]]:
     """The steps from the inner side, each with its axis (3,) in the axes of the outer side where coordinates are zero.
 
-    Coordinates are those of the scene: where the second side carries the first, `backwards`, steps come in the other
-    order, about axes the other way.
+    Where the second side carries the first, `backwards`, steps come in the other order, about axes the other way.
     """
     steps, sign = STEPS[joint.type], -1.0 if backwards else 1.0
     triad = sign * joint.triads()[0 if backwards else 1]
@@ -68,17 +67,22 @@ def steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array
     return [(step, triad[:, step.axis]) for step in (reversed(steps) if backwards else steps)]
 
 
-def conversion_losses(
-    scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree, size: float
-) -> Iterator[str]:
-    """List losses, a line each; `size` of the robot (m) replaces ranges that URDF needs and the scene lacks."""
+def _losses(scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree, size: float) -> Iterator[str]:
+    """A line for each; `size` of the robot (m) replaces ranges that URDF needs and the scene lacks."""
     if flexible := [name for name, body in loaded.items() if body.modal is not None]:
         yield f"{quoted(flexible)}: rigid in the URDF, undeformed"
     if scene.payload:
         yield "payloads are part of the <inertial> of their links"
     if tree.loops:
         yield f"{quoted(joint.name for joint in tree.loops)}: left out: URDF has trees only, loops are open there"
-    yield from _of_types(tree)
+    for node in tree.nodes:
+        joint, count = node.joint, len(STEPS[node.joint.type])
+        if count > 1:
+            what = f"{joint.label}: {count} joints instead of a {joint.type} one, with links without mass between"
+            angles = "; angles about x, y, z instead of its orientation" if joint.type == "spherical" else ""
+            yield f"{what}: for viewers, `ffrobot import` rejects them{angles}"
+        elif node.backwards and joint.type in ("planar", "free"):
+            yield f"{joint.label}: its coordinates there are those of its first side on its second"
     yield from _of_keys(tree, size)
     if list(scene.gravity) != GRAVITY:
         yield f"gravity {list(scene.gravity)} left out: `ffrobot import` takes {GRAVITY}"
@@ -91,17 +95,6 @@ def conversion_losses(
     }
     if left := [name for name, entries in tables.items() if entries]:
         yield f"left out: {', '.join(left)}"
-
-
-def _of_types(tree: KinematicTree) -> Iterator[str]:
-    for node in tree.nodes:
-        joint, count = node.joint, len(STEPS[node.joint.type])
-        if count > 1:
-            what = f"{joint.label}: {count} joints instead of a {joint.type} one, with links without mass between"
-            angles = "; angles about x, y, z instead of its orientation" if joint.type == "spherical" else ""
-            yield f"{what}: for viewers, `ffrobot import` rejects them{angles}"
-        elif node.backwards and joint.type in ("planar", "free"):
-            yield f"{joint.label}: its coordinates there are those of its first side on its second"
 
 
 def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
@@ -138,7 +131,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
     counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(urdf.tree.loops)} joints of {scene.name}"
     ElementTree.indent(urdf.root)
     text = '<?xml version="1.0"?>\n' + ElementTree.tostring(urdf.root, encoding="unicode") + "\n"
-    return text, counts, tuple(conversion_losses(scene, loaded, urdf.tree, urdf.size))
+    return text, counts, tuple(_losses(scene, loaded, urdf.tree, urdf.size))
 
 
 class UrdfOfScene:
@@ -202,11 +195,13 @@ class UrdfOfScene:
         """The steps of a joint one after the other, with links without mass in between."""
         joint, (xyz, rpy) = node.joint, self._origin(node)
         parent = GROUND if node.inner.body < 0 else self.tree.nodes[node.inner.body].body.name
-        steps = steps_outward(joint, node.backwards)
+        steps = _steps_outward(joint, node.backwards)
         own = node.body.points[node.outer.point].triad if node.outer.point else np.eye(3)
+        is_named = joint in self._scene.joint  # a body without any joint gets one
         for number, (step, axis) in enumerate(steps, 1):
-            name = self._joint_names[f"{joint.name}.{step.label}"] if step.label else self._name(node)
-            child = node.body.name
+            name, child = joint.name if is_named else self._joint_names[f"{node.body.name}.free"], node.body.name
+            if step.label:
+                name = self._joint_names[f"{joint.name}.{step.label}"]
             if number < len(steps):
                 child = self._link_names[f"{name}.link"]
                 _add(self.root, "link", name=child)
@@ -232,10 +227,6 @@ class UrdfOfScene:
         _add(element, "parent", link=parent)
         _add(element, "child", link=child)
         return element
-
-    def _name(self, node: Node) -> str:
-        """That of the scene; a body without any joint gets one."""
-        return node.joint.name if node.joint in self._scene.joint else self._joint_names[f"{node.body.name}.free"]
 
     def _origin(self, node: Node) -> tuple[Array, Sequence[float]]:
         """Place and angles of the child's link in the parent's where the coordinates are zero."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, did_you_mean
+from ...common.rotations import unit
 from ...common.tables import shown
 from ...common.toml_files import load_toml
 from ...fe_models.link_file import read_link
@@ -25,7 +26,6 @@ from ...mesh.inspection import inspect_part
 from .robot import Names, Place, Robot, UrdfJoint
 
 ON_AXIS = 1e-6  # of the length: how far a joint may be off the axis of a beam
-SAME_LENGTH = 1e-6  # relative
 SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of swing
 
 
@@ -60,7 +60,13 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     place = Place(np.zeros(3), axes.T)
     length = _set_length(geometry, tip, name, source, remarks)
     keys["name"] = str(keys.get("name", stem))
-    part = _place_part(geometry, axes, source, remarks)
+    part = None
+    if isinstance(file := geometry.get("file"), str):
+        part = (source.parent / file).resolve()
+        geometry["file"] = str(part)
+        if not {"origin", "x_axis", "y_axis"} & set(geometry):
+            geometry["x_axis"], geometry["y_axis"] = axes[:, 0].tolist(), axes[:, 1].tolist()
+            remarks.append(f"{file} is taken to be drawn in the axes of the URDF's link")
     point_of = _interfaces(keys, beyond, tip, place, length, f"{source}: link {shown(name)}")
     if part is not None:
         remarks += _in_bores(keys, part, _axes_of_joints(robot, name, point_of, place), length)
@@ -75,15 +81,14 @@ def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:
     """(3, 3) axes of the link file, columns, in those of the URDF's link; these themselves where no joint is beyond."""
     if tip is None or not any(tip.origin.xyz):
         return np.eye(3)
-    x = np.array(tip.origin.xyz) / np.linalg.norm(tip.origin.xyz)
+    x = unit(np.array(tip.origin.xyz))
     carrying = next((joint.axis for joint in robot.joints.values() if joint.child == name), (0.0, 0.0, 1.0))
-    for candidate in (carrying, tip.origin.place.C @ np.array(tip.axis), np.eye(3)[np.abs(x).argmin()]):
-        unit = np.array(candidate) / np.linalg.norm(candidate)
-        across = unit - (unit @ x) * x
+    for along in (np.array(carrying), tip.origin.place.C @ np.array(tip.axis), np.eye(3)[np.abs(x).argmin()]):
+        across = unit(along) - (unit(along) @ x) * x
         if np.linalg.norm(across) > SQUARE:
-            z = across / np.linalg.norm(across)
-            return np.stack([x, np.cross(z, x), z], axis=1)
-    raise AssertionError("a coordinate axis is always square enough")
+            break
+    z = unit(across)
+    return np.stack([x, np.cross(z, x), z], axis=1)
 
 
 def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, source: Path, remarks: list[str]) -> float:
@@ -99,7 +104,7 @@ def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, sour
     if given is None:
         geometry["length"] = wanted
         remarks.append(f'length {wanted:.9g} m, the distance to joint "{shown(tip.name)}"')
-    elif not isinstance(given, int | float) or abs(given - wanted) > SAME_LENGTH * wanted:
+    elif not isinstance(given, int | float) or abs(given - wanted) > 1e-6 * wanted:  # relative
         raise InputError(
             f'{source}: geometry.length: expected {wanted:.9g} m, the distance to joint "{shown(tip.name)}", or no'
             " such key",
@@ -108,22 +113,10 @@ def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, sour
     return wanted
 
 
-def _place_part(geometry: dict[str, Any], axes: Array, source: Path, remarks: list[str]) -> Path | None:
-    """Where the file of a solid is, if there is one; its axes are the URDF link's unless the link file says."""
-    if not isinstance(file := geometry.get("file"), str):
-        return None
-    part = (source.parent / file).resolve()
-    geometry["file"] = str(part)
-    if not {"origin", "x_axis", "y_axis"} & set(geometry):
-        geometry["x_axis"], geometry["y_axis"] = axes[:, 0].tolist(), axes[:, 1].tolist()
-        remarks.append(f"{file} is taken to be drawn in the axes of the URDF's link")
-    return part
-
-
 def _interfaces(
     keys: dict[str, Any], beyond: list[UrdfJoint], tip: UrdfJoint | None, place: Place, length: float, label: str
 ) -> dict[str, str]:
-    """Write an interface for each joint beyond that is at neither end; those that the file has stay as they are."""
+    """Write an interface for each joint beyond that is at neither end and not in the file; returns all by joint."""
     tables = list(keys.get("interface", ()))
     taken = [str(table.get("name")) for table in tables if isinstance(table, dict)]
     names, point_of = Names(("root", "tip")), dict[str, str]()
@@ -135,9 +128,18 @@ def _interfaces(
             point_of[joint.name] = "root"
         else:
             point_of[joint.name] = point = names[joint.name]
-            if point not in taken:
-                position = _position(keys, x, length, f'{label}: joint "{joint.name}"')
-                tables.append({"name": point, "position": position})
+            if point in taken:
+                continue
+            position: float | list[float] = as_list(x)  # of a solid, whose nearest face is taken
+            if keys["geometry"].get("kind", "beam") != "solid":
+                position, off = float(x[0]), float(np.linalg.norm(x[1:]))
+                if off > ON_AXIS * length or not 0 < x[0] < length:
+                    raise InputError(
+                        f'{label}: joint "{joint.name}": expected a joint on the line between the ends of the beam',
+                        f"it {off:.4g} m off, at {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in"
+                        " the URDF",
+                    )
+            tables.append({"name": point, "position": position})
     if tables:
         keys["interface"] = tables
     return point_of
@@ -165,26 +167,11 @@ def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, JointAxis],
         if "normal" in table or "group" in table or table.get("name") in ("root", "tip")
     }
     wanted = {name: joint for name, joint in joints.items() if name not in own}
-    if not wanted:
-        return []
-    bores = list(bores_at(keys["geometry"], part, wanted, length))
+    bores = list(_bores_at(keys["geometry"], part, wanted, length)) if wanted else []
     if bores:
         matched = {table["name"]: table for table, _ in bores}
         keys["interface"] = [*matched.values(), *(table for table in tables if table.get("name") not in matched)]
     return [remark for _, remark in bores]
-
-
-def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> float | list[float]:
-    """Of a beam the distance from the root, of a solid the point, whose nearest face is taken."""
-    if keys["geometry"].get("kind", "beam") == "solid":
-        return as_list(x)
-    off = float(np.linalg.norm(x[1:]))
-    if off > ON_AXIS * length or not 0 < x[0] < length:
-        raise InputError(
-            f"{label}: expected a joint on the line between the ends of the beam",
-            f"it {off:.4g} m off, at {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in the URDF",
-        )
-    return float(x[0])
 
 
 PARALLEL = 1e-4  # 1 − cosine between the axes of a bore and of its joint
@@ -194,35 +181,29 @@ CENTERED = 1e-6  # of the length: how far the center of the bore is from the joi
 
 @dataclass(frozen=True, eq=False)
 class JointAxis:
-    """A joint of the link: its `name`, `point` (3,) m and `direction` (3,) in axes of the link file."""
+    """A joint of the link: its `name`, `point` (3,), m, and `direction` (3,) in axes of the link file."""
 
     name: str
     point: Array
     direction: Array
 
 
-def bores_at(
+def _bores_at(
     geometry: Mapping[str, Any], part: Path, joints: Mapping[str, JointAxis], length: float
 ) -> Iterator[tuple[dict[str, Any], str]]:
     """A table `interface` and a remark for each of `joints`, by the interface's name, that a bore of `part` is around.
 
     `geometry` says how the part stands in the link's axes. Of several bores the one nearest to the joint is taken.
-
-    Raises:
-        InputError: the part cannot be read.
     """
-    unit = geometry.get("unit", "m")
-    faces = inspect_part(part, unit).faces
-    x = np.array(geometry.get("x_axis", (1.0, 0.0, 0.0)), dtype=float)
-    y = np.array(geometry.get("y_axis", (0.0, 1.0, 0.0)), dtype=float)
-    z = np.cross(x, y) / np.linalg.norm(np.cross(x, y))
-    x /= np.linalg.norm(x)
+    meters = geometry.get("unit", "m")
+    faces = inspect_part(part, meters).faces
+    x = unit(np.array(geometry.get("x_axis", (1.0, 0.0, 0.0)), dtype=float))
+    z = unit(np.cross(x, geometry.get("y_axis", (0.0, 1.0, 0.0))))
     C = np.stack([x, np.cross(z, x), z])
-    origin = METRES[unit] * np.array(geometry.get("origin", (0.0, 0.0, 0.0)))
+    origin = METRES[meters] * np.array(geometry.get("origin", (0.0, 0.0, 0.0)))
     bores = [(face, C @ (face.center - origin), C @ face.direction) for face in faces if face.kind == "bore"]
     for interface, joint in joints.items():
-        axis = joint.direction / np.linalg.norm(joint.direction)
-        around = []
+        axis, around = unit(joint.direction), []
         for face, center, direction in bores:
             off = joint.point - center
             across = float(np.linalg.norm(off - (off @ direction) * direction))

@@ -17,11 +17,9 @@ from ...common.toml_files import toml_text
 from ...fe_models.link import cached_modal_body
 from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import from_modal_body
-from .bodies import is_possible, mechanism
 from .flexible import ImportedLink, flexible_link
-from .read import lines_of, read_urdf
-from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of
-from .scene import SceneOfRobot
+from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of, lines_of, read_urdf
+from .scene import SceneOfRobot, is_possible, mechanism
 from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
 
 SAME = 1e-9  # relative: less is round-off
@@ -34,14 +32,11 @@ def _in_place_of(
 
     Its `point` is without its body. It is what the URDF has beyond the flexible link: mass m − m', first moment
     mc − m'c', and the inertia about the frame less that of the link, taken to the center of the rest; axes of the link
-    file, which will be in `folder`, which need not be there yet.
-
-    Raises:
-        InputError: the flexible link has more mass than that of the URDF; what stage 1 raises.
+    file.
     """
     geometry = dict(link.keys["geometry"])
     if isinstance(file := geometry.get("file"), str):
-        geometry["file"] = str((folder / file).resolve())
+        geometry["file"] = str((folder / file).resolve())  # the folder need not be there yet
     table = LinkTable({**link.keys, "geometry": geometry}, folder / link.file_name)
     body = from_modal_body(link.name, cached_modal_body(table).body)
     inertial = robot.links[link.name].inertial
@@ -89,10 +84,10 @@ TURNS = 4 * np.pi  # rad: limits of joints that turn are within; a full turn in 
 def _remarks_on_scale(robot: Robot) -> Iterator[str]:
     ways = {joint.name: float(np.linalg.norm(joint.origin.xyz)) for joint in robot.joints.values()}
     reach = sum(ways.values())
-    if ways and max(ways.values()) > LONGEST:
-        name = max(ways, key=lambda key: ways[key])
+    longest, name = max(((way, name) for name, way in ways.items()), default=(0.0, ""))
+    if longest > LONGEST:
         yield (
-            f'joint "{shown(name)}" is {ways[name]:g} m from that of its parent: URDF is in meters; is this file in'
+            f'joint "{shown(name)}" is {longest:g} m from that of its parent: URDF is in meters; is this file in'
             " millimeters?"
         )
     for joint in robot.joints.values():
@@ -144,7 +139,6 @@ class Imported:
 
     robot: Robot  # as read
     scene: Mapping[str, Any]  # keys of the scene file
-    flexible: tuple[ImportedLink, ...]  # links from link files
     remarks: tuple[str, ...]  # on what is left out, renamed or odd, a line each
     masses: tuple[MeshMass, ...]  # what meshes say
     files: tuple[Path, ...]  # all that were written
@@ -167,7 +161,7 @@ def import_urdf(
         folder: DIR.
         flexible: link files by link.
         force: replace files that are there.
-        fix_inertia: see `bodies.mechanism`.
+        fix_inertia: see `mechanism`.
         filling: fills the shapes of links without mass; None leaves them massless.
         keep_rest: what a link of the URDF weighs beyond its flexible link becomes a payload on that one.
 
@@ -180,9 +174,16 @@ def import_urdf(
         if filling is not None:
             robot, remarks = with_masses(robot, urdf, filling)
         remarks += without_mass(robot)
-        stems = Names([Path(SCENE).stem])
+        stems = Names(["scene"])
         links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
-        scene = _scene(urdf, robot, links, folder, fix_inertia=fix_inertia)
+        shapes = (shape for link in robot.links.values() for shape in link.visual)
+        paths = {shape.filename: mesh_path(shape.filename, urdf) for shape in shapes if isinstance(shape, MeshFile)}
+        meshes = {name: os.path.relpath(path, folder.resolve()) for name, path in paths.items() if path is not None}
+        with lines_of(urdf):
+            bodies = mechanism(robot, {name: link.place for name, link in links.items()}, fix_inertia=fix_inertia)
+            scene = SceneOfRobot(robot, bodies, links, meshes)
+            if beyond := list(beyond_limits(dict(scene.keys))):
+                raise InputError("\n".join(beyond))
         masses, about_meshes = mesh_masses(robot, urdf)
         remarks += scene.remarks
         for link in links.values():
@@ -197,21 +198,7 @@ def import_urdf(
             head = _comment(f'Link "{link.name}" of {urdf.name}: {axes}.')
             files[link.file_name] = f"{head}\n\n{toml_text(link.keys)}"
         written = _write(folder, files, force=force)
-        return Imported(robot, keys, tuple(links.values()), tuple(remarks), tuple(masses), written)
-
-
-def _scene(
-    urdf: Path, robot: Robot, links: Mapping[str, ImportedLink], folder: Path, *, fix_inertia: bool
-) -> SceneOfRobot:
-    shapes = (shape for link in robot.links.values() for shape in link.visual)
-    paths = {shape.filename: mesh_path(shape.filename, urdf) for shape in shapes if isinstance(shape, MeshFile)}
-    meshes = {name: os.path.relpath(path, folder.resolve()) for name, path in paths.items() if path is not None}
-    with lines_of(urdf):
-        places = {name: link.place for name, link in links.items()}
-        scene = SceneOfRobot(robot, mechanism(robot, places, fix_inertia=fix_inertia), links, meshes)
-        if beyond := list(beyond_limits(dict(scene.keys))):
-            raise InputError("\n".join(beyond))
-        return scene
+        return Imported(robot, keys, tuple(remarks), tuple(masses), written)
 
 
 def _compared(
@@ -233,13 +220,10 @@ def _compared(
 
 
 def _scene_text(urdf: Path, keys: Mapping[str, Any], remarks: list[str]) -> str:
-    head = [
-        f"From {urdf.name} by `ffrobot import`. Each link is rigid, as its <inertial> says, unless it names a file.",
-        *(f"* {remark}" for remark in remarks),
-    ]
+    head = f"From {urdf.name} by `ffrobot import`. Each link is rigid, as its <inertial> says, unless it names a file."
+    lines = "\n".join(map(_comment, [head, *(f"* {remark}" for remark in remarks)]))
     joint = next((entry["name"] for entry in keys["joint"] if entry["type"] in ("revolute", "prismatic")), "JOINT")
-    tail = TO_BE_APPENDED.format(joint=joint)
-    return "\n".join(map(_comment, head)) + "\n\n" + toml_text(keys) + "\n" + tail
+    return f"{lines}\n\n{toml_text(keys)}\n{TO_BE_APPENDED.format(joint=joint)}"
 
 
 def _comment(text: str) -> str:
@@ -249,9 +233,9 @@ def _comment(text: str) -> str:
 
 def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:
     check_folder(folder)
-    if folder.suffix.lower() == Path(SCENE).suffix and not folder.exists():
-        instead = f"-o {folder.with_suffix('')}"
-        raise InputError(f"{folder}: output: expected a folder for {SCENE}", f"the name of a file: {instead}")
+    if folder.suffix.lower() == ".toml" and not folder.exists():
+        other = f"the name of a file: -o {folder.with_suffix('')}"
+        raise InputError(f"{folder}: output: expected a folder for {SCENE}", other)
     paths = {folder / name: text.encode() for name, text in files.items()}
     if there := [path for path, text in paths.items() if path.exists() and not (force or holds(path, text))]:
         raise InputError(

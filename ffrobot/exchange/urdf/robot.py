@@ -1,24 +1,36 @@
-"""What a URDF says of a robot (wiki.ros.org/urdf/XML), as read: nothing merged, nothing left out. SI units."""
+"""What a URDF says of a robot (wiki.ros.org/urdf/XML), and how it is read: nothing merged, nothing left out. SI units.
+
+Messages name file, element, what was expected and found.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+import re
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import chain, count
+from pathlib import Path
 from typing import Literal
+from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.errors import InputError, check_known, quoted
 from ...common.keys import LONGEST_NAME
-from ...common.rotations import of_rpy, point_inertia
+from ...common.rotations import of_quaternion, of_rpy, point_inertia, rpy_of
+from ...common.tables import LARGEST, shown
+from ...common.toml_files import read_bytes
 from ...mbs.model.body import Body
 
 Numbers3 = tuple[float, float, float]
 
 
 def three(values: Iterable[float]) -> Numbers3:
-    """Three numbers of Python's own."""
+    """Return three values as Python floats."""
     x, y, z = map(float, values)
     return x, y, z
 
@@ -36,7 +48,7 @@ class Origin:
 
     @property
     def place(self) -> Place:
-        """The pose with its rotation matrix."""
+        """Return the pose with its rotation matrix."""
         return Place(np.array(self.xyz), of_rpy(*self.rpy))
 
 
@@ -48,7 +60,7 @@ class Place:
     C: Array
 
     def __matmul__(self, inner: Place) -> Place:
-        """A frame in this one, in coordinates of the other."""
+        """Return the frame `inner`, which is in this one, in the other."""
         return Place(self.d + self.C @ inner.d, self.C @ inner.C)
 
 
@@ -83,10 +95,7 @@ MASSLESS = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def inertial_of(body: Body, anchor: Array) -> Inertial:
-    """Return mass properties of the undeformed body with attached masses, in the link's frame at `anchor` (3,), m.
-
-    J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
-    """
+    """Return mass properties of the undeformed body with attached masses, in the link's frame at `anchor` (3,), m."""
     center = body.first_moment / body.mass
     J: Array = body.inertia - point_inertia(body.mass, center)
     return Inertial(body.mass, center - anchor, (J + J.T) / 2)
@@ -156,10 +165,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class Robot:
-    """Links and joints by name, in the order of the file; `root` is the link that no joint carries.
-
-    `remarks` are on what is odd in the file, and on what is not read of it.
-    """
+    """Links and joints by name in the order of the file, the `root` that no joint carries, remarks on the file."""
 
     name: str
     links: Mapping[str, UrdfLink]
@@ -186,12 +192,360 @@ class Names:
         if original not in self._of:
             name = "".join(c if c.isprintable() else "_" for c in original.translate(FORBIDDEN)).strip() or "_"
             name = name[: LONGEST_NAME - 4] if len(name) > LONGEST_NAME else name
-            candidates = chain([name], (f"{name}_{number}" for number in count(2)))
-            self._of[original] = next(candidate for candidate in candidates if candidate not in self._taken)
-            self._taken.add(self._of[original])
+            free, number = name, 1
+            while free in self._taken:
+                free, number = f"{name}_{number + 1}", number + 1
+            self._of[original] = free
+            self._taken.add(free)
         return self._of[original]
 
     @property
     def changed(self) -> dict[str, str]:
         """The new name of each original that could not stay."""
         return {original: name for original, name in self._of.items() if original != name}
+
+
+Element = ElementTree.Element
+
+_ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding=["']([\w.-]+)["']""")
+ONCE = {"inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"}
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+READ: Mapping[str, Container[str]] = {
+    "robot": {"name", "version"},
+    "link": {"name"},
+    "joint": {"name", "type"},
+    "inertial": (),
+    "mass": {"value"},
+    "inertia": ENTRIES,
+    "origin": {"xyz", "rpy", "quat_xyzw"},
+    "parent": {"link"},
+    "child": {"link"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity"},
+    "dynamics": {"damping", "friction"},
+    "mimic": {"joint", "multiplier", "offset"},
+}
+"""Attributes that are read, by element; of elements that are not here the import leaves out all."""
+SHAPES = ("visual", "collision", "material")  # for the eye, or read as far as masses and pictures need them
+
+
+def read_urdf(path: Path) -> Robot:
+    """The robot in the URDF file at `path`.
+
+    Raises:
+        InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
+    """
+    with lines_of(path):
+        root = _root_element(read_bytes(path, "URDF file"))
+        links = [_link(each) for each in root.findall("link")]
+        joints = [_joint(each) for each in root.findall("joint")]
+        for kind, names in (("link", [link.name for link in links]), ("joint", [joint.name for joint in joints])):
+            if again := next((name for name, count in Counter(names).items() if count > 1), None):
+                raise InputError(f"expected one <{kind}> of each name", f'several of the name "{shown(again)}"')
+        by_name = {joint.name: joint for joint in joints}
+        _check_mimics(by_name)
+        base = _root_of([link.name for link in links], joints)
+        odd = (*_turned(root), *_repeated(root), *_not_read(root))
+        return Robot(root.get("name", "").strip() or base, {link.name: link for link in links}, by_name, base, odd)
+
+
+@contextmanager
+def lines_of(path: Path) -> Iterator[None]:
+    """Have each line of an `InputError` begin with the file, unless it does already."""
+    try:
+        yield
+    except InputError as error:
+        if str(error).startswith(f"{path}:"):
+            raise
+        raise InputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from None
+
+
+def _root_element(content: bytes) -> Element:
+    declared = _ENCODING.match(content)  # not in UTF-16, which expat knows
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate("utf-8" if declared else None)
+    # Prefixes stay as they are: published files use some (drake:, gazebo:) that they do not declare.
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
+    try:
+        if declared:
+            content = content.decode(declared[1].decode()).encode()  # expat knows none of several bytes a character
+        parser.Parse(content, True)
+        root = builder.close()
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        is_xml = content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"<", b"\xff\xfe", b"\xfe\xff"))
+        what = f"XML that is not well-formed: {error}" if is_xml else "a file that is no XML"
+        raise InputError("expected a URDF file", what) from None
+    prefixes = {key.partition(":")[2] for key, value in root.items() if "ros.org/wiki/xacro" in value} | {"xacro"}
+    if xacro := next((each.tag for each in root.iter() if each.tag.partition(":")[0] in prefixes), None):
+        raise InputError(
+            "expected a URDF file",
+            f"<{shown(xacro)}>: run `xacro FILE.xacro > ROBOT.urdf` first, in an environment with ROS or with PyPI's"
+            " xacro",
+        )
+    if root.tag != "robot":
+        of = " of another program: convert it to URDF first" if root.tag in ("mujoco", "sdf") else ""
+        raise InputError("expected a URDF file, whose root is <robot>", f"<{shown(root.tag)}>{of}")
+    return root
+
+
+def _turned(root: Element) -> Iterable[str]:
+    """Remarks on angles of more than a turn, which are degrees as a rule."""
+    for each in (*root.findall("link"), *root.findall("joint")):
+        turned = each.find("inertial") if each.tag == "link" else each
+        rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned, each.tag).rpy
+        if max(map(abs, rpy)) > 2 * math.pi:
+            angles = " ".join(f"{angle:g}" for angle in rpy)
+            yield f'{each.tag} "{shown(_name(each))}": rpy {angles} is more than a turn: URDF has rad, not degrees'
+
+
+def _repeated(root: Element) -> Iterable[str]:
+    """Remarks on elements that count once and stand there several times: urdfdom takes the first, too."""
+    for each in (*root.findall("link"), *root.findall("joint")):
+        for part in (each, *each.findall("inertial")):
+            inside = "" if part is each else " in <inertial>"
+            for tag, count in Counter(child.tag for child in part if child.tag in ONCE).items():
+                if count > 1:
+                    label = f'{each.tag} "{shown(_name(each))}"'
+                    yield f"{label}: {count} <{tag}>{inside}: the first counts, the others do not"
+
+
+def _not_read(root: Element) -> Iterator[str]:
+    """Remarks on elements and attributes that have no place in a scene; on alike ones of several links one remark."""
+    known = {child.get("name", "") for child in root if child.tag in ("link", "joint")}
+    beside = [child for child in root if child.tag not in (*READ, *SHAPES)]
+    for tag, count in Counter(child.tag for child in beside).items():
+        inside = [each for child in beside if child.tag == tag for each in child.iter()]
+        named = (each.get(key, "") for each in inside for key in ("reference", "name"))
+        about = dict.fromkeys(name for name in named if name in known)
+        extra = ": a joint describes its motor by rotor_inertia and gear_ratio" if tag == "transmission" else ""
+        yield f"{count} <{shown(tag)}> left out{f', of {_listed(about)}' if about else ''}{extra}"
+    alike = dict[tuple[str, ...], dict[str, str]]()
+    for each in (root, *root.findall("link"), *root.findall("joint")):
+        for kind, text in _left_of(each):
+            alike.setdefault((each.tag, *kind), {})[_name(each) if each is not root else ""] = text
+    for (tag, *_), of in alike.items():
+        (first, text), *more = of.items()
+        likewise = f"; likewise of {_listed(name for name, _ in more)}" if more else ""
+        yield f"{text} of {tag} {quoted([shown(first)]) if first else ''} left out{likewise}".replace("  ", " ")
+
+
+def _listed(names: Iterable[str]) -> str:
+    first, more = (names := list(map(shown, names)))[:6], len(names) - 6
+    return quoted(first) + (f" and {more} more" if more > 0 else "")
+
+
+def _left_of(element: Element) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is not read of an element and of those inside it: of which kind, and as it stands there."""
+    # The other product of inertia of two counts only where it has another value.
+    twin = {key: element.get(f"i{key[2]}{key[1]}") for key in ("iyx", "izx", "izy") if element.tag == "inertia"}
+    left = {key: value for key, value in element.items() if key not in READ[element.tag]}
+    left = {key: value for key, value in left.items() if not key.startswith("xmlns") and value != twin.get(key)}
+    if left:
+        words = " ".join(f'{shown(key)}="{shown(value)}"' for key, value in left.items())
+        yield (element.tag, *left), f"<{element.tag} {words}>"
+    for child in element if element.tag != "robot" else ():
+        if child.tag in READ:
+            yield from _left_of(child)
+        elif child.tag not in SHAPES:
+            yield (child.tag,), f"<{shown(child.tag)}>"
+        for shape in child.iterfind("geometry/*") if child.tag in SHAPES else ():
+            if shape.tag not in ("mesh", *SIZES):
+                yield (child.tag, shape.tag), f"<{shown(shape.tag)}> in <{child.tag}>"
+
+
+SIZES: Mapping[Shape, Mapping[str, int]] = {
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+}
+"""Attributes of shapes with so many numbers each."""
+
+
+def _name(element: Element) -> str:
+    if not (name := element.get("name", "")):
+        raise InputError(f"<{element.tag}>: expected the attribute name", "none")
+    return name
+
+
+def _link(element: Element) -> UrdfLink:
+    name = _name(element)
+    label, part = f'link "{shown(name)}"', element.find("inertial")
+    inertial = None if part is None else _inertial(part, f"{label}: <inertial>")
+    return UrdfLink(name, inertial, *(tuple(_shapes(element, kind, label)) for kind in ("visual", "collision")))
+
+
+def _inertial(element: Element, label: str) -> Inertial:
+    of_mass, inertia = element.find("mass"), element.find("inertia")
+    if of_mass is None:
+        raise InputError(f'{label}: expected <mass value="…"/>', "none")
+    mass = _number(of_mass, "value", f"{label}: <mass>")
+    if inertia is None:
+        raise InputError(f"{label}: expected <inertia>", "none")
+    values = {key: _number(inertia, key, f"{label}: <inertia>") for key in ENTRIES}
+    J = np.array([[values["i" + "".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
+    if mass < 0:
+        raise InputError(f"{label}: <mass>: expected a mass not below 0", f"{mass:g}")
+    origin = _origin(element, label)
+    C = of_rpy(*origin.rpy)
+    return Inertial(mass, np.array(origin.xyz), C @ J @ C.T if any(origin.rpy) else J)
+
+
+def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primitive]:
+    for element in link.findall(kind):
+        where = f"{label}: <{kind}>"
+        for geometry in element.iterfind("geometry/*"):
+            if geometry.tag == "mesh" and (filename := geometry.get("filename")):
+                scale = three(_numbers(geometry, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>"))
+                yield MeshFile(filename, scale, _origin(element, where))
+            for shape, counts in SIZES.items():
+                if geometry.tag == shape:
+                    sizes = (size for key, count in counts.items() for size in _sizes(geometry, key, count))
+                    yield Primitive(shape, tuple(sizes), _origin(element, where))
+
+
+def _sizes(shape: Element, key: str, count: int) -> tuple[float, ...]:
+    """Sizes, m; NaN where there are none: a shape that only viewers need may be wrong."""
+    try:
+        sizes = tuple(map(float, shape.get(key, "").split()))
+    except ValueError:
+        sizes = ()
+    return sizes if len(sizes) == count and min(sizes) >= 0 else (math.nan,) * count
+
+
+def _joint(element: Element) -> UrdfJoint:
+    name = _name(element)
+    label = f'joint "{shown(name)}"'
+    kind = element.get("type", "")
+    check_known(kind, TYPES, f"{label}: type: expected one of {quoted(TYPES)}")
+    axis = element.find("axis")
+    along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>"))
+    if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
+        raise InputError(f"{label}: <axis>: expected a direction", "0 0 0")
+    return UrdfJoint(
+        name=name,
+        type=kind,
+        parent=_end(element, "parent", label),
+        child=_end(element, "child", label),
+        origin=_origin(element, label),
+        axis=along,
+        limits=_attributes(element, "limit", label),
+        dynamics=_attributes(element, "dynamics", label),
+        mimic=_mimic(element.find("mimic"), f"{label}: <mimic>"),
+    )
+
+
+def _end(joint: Element, kind: str, label: str) -> str:
+    end = joint.find(kind)
+    if end is None or not (name := end.get("link", "")):
+        raise InputError(f'{label}: expected <{kind} link="…"/>', "none")
+    return name
+
+
+def _mimic(element: Element | None, label: str) -> Mimic | None:
+    if element is None:
+        return None
+    if not (name := element.get("joint", "")):
+        raise InputError(f"{label}: expected the attribute joint", "none")
+    return Mimic(name, _number(element, "multiplier", label, 1.0), _number(element, "offset", label, 0.0))
+
+
+def _attributes(joint: Element, tag: str, label: str) -> dict[str, float]:
+    element = joint.find(tag)
+    if element is None:
+        return {}
+    return {key: _number(element, key, f"{label}: <{tag}>") for key in element.attrib if key in READ[tag]}
+
+
+def _origin(element: Element, label: str) -> Origin:
+    origin = element.find("origin")
+    if origin is None:
+        return Origin()
+    where = f"{label}: <origin>"
+    xyz = three(_numbers(origin, "xyz", (0.0, 0.0, 0.0), where))
+    if origin.get("quat_xyzw") is None:
+        return Origin(xyz, three(_numbers(origin, "rpy", (0.0, 0.0, 0.0), where)))
+    if origin.get("rpy") is not None:  # URDF 1.1 has it or a quaternion, scalar last
+        raise InputError(f"{where}: expected rpy or quat_xyzw", "both")
+    *vector, scalar = _numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0), where)
+    e = np.array([scalar, *vector])
+    size = float(np.linalg.norm(e))
+    if abs(size - 1.0) > 0.1:  # less is few digits
+        raise InputError(f"{where}: quat_xyzw: expected a quaternion of length 1", f"length {size:g}")
+    return Origin(xyz, three(rpy_of(of_quaternion(e / size))))
+
+
+def _number(element: Element, key: str, label: str, default: float | None = None) -> float:
+    text = element.get(key)
+    if text is None:
+        if default is None:
+            raise InputError(f"{label}: expected the attribute {key}", "none")
+        return default
+    return _finite(text, f"{label}: {key}")
+
+
+def _numbers(element: Element, key: str, default: tuple[float, ...], label: str) -> tuple[float, ...]:
+    """As many as `default` has, which stands for a missing attribute."""
+    text = element.get(key)
+    if text is None:
+        return default
+    parts = text.split()
+    if len(parts) != len(default):
+        raise InputError(f"{label}: {key}: expected {len(default)} numbers", f'"{shown(text)}"')
+    return tuple(_finite(part, f"{label}: {key}") for part in parts)
+
+
+def _finite(text: str, label: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{label}: expected a finite number", f'"{shown(text)}"')
+    if abs(value) > LARGEST:
+        raise InputError(f"{label}: expected a number between -{LARGEST:g} and {LARGEST:g}", f"{value:g}")
+    return value
+
+
+def _root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
+    """The one link that no joint carries, where all links form one tree."""
+    if not links:
+        raise InputError("expected at least one <link>", "none")
+    carried = dict[str, str]()
+    for joint in joints:
+        label = f'joint "{shown(joint.name)}"'
+        for kind, name in (("parent", joint.parent), ("child", joint.child)):
+            check_known(name, links, f"{label}: <{kind}>: expected a link of the file")
+        if joint.child in carried:
+            raise InputError(
+                f'{label}: expected one joint that carries link "{shown(joint.child)}"',
+                f'a second one, "{shown(carried[joint.child])}" being the first: URDF has trees only; close the loop'
+                " in the scene",
+            )
+        carried[joint.child] = joint.name
+    roots = [name for name in links if name not in carried]
+    if not roots:
+        raise InputError("expected one link that no joint carries", "none: the joints form a circle")
+    if len(roots) > 1:
+        raise InputError(
+            "expected one link that no joint carries", f"{len(roots)}: {quoted(roots)}; join them by fixed joints"
+        )
+    reached = roots.copy()
+    for link in reached:  # which grows
+        reached += [joint.child for joint in joints if joint.parent == link]
+    if left := [name for name in links if name not in reached]:  # with a parent each
+        raise InputError(f'expected all links to be carried by "{shown(roots[0])}"', f"a circle of {quoted(left)}")
+    return roots[0]
+
+
+def _check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
+    for joint in joints.values():
+        label, chain = f'joint "{shown(joint.name)}": <mimic>', [joint.name]
+        while (follows := joints[chain[-1]].mimic) is not None:
+            check_known(follows.joint, joints, f"{label}: expected a joint of the file")
+            if follows.joint in chain:
+                raise InputError(
+                    f"{label}: expected a joint that moves freely at the end of the chain",
+                    f"a circle: {' → '.join([*chain, follows.joint])}",
+                )
+            chain.append(follows.joint)

@@ -1,20 +1,190 @@
-"""The keys of a scene in space for a robot read from a URDF."""
+"""From a URDF to a scene in space: links that fixed joints hold together are one body, the root stands still."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from ...common.errors import quoted
+from ...common.arrays import Array, as_rows
+from ...common.errors import InputError, quoted
 from ...common.rotations import rpy_of
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
-from .bodies import Mechanism, MergedLinks
+from ...mbs.scene.bodies import ROUND_OFF, check_inertia
 from .flexible import ImportedLink
-from .robot import HERE, MeshFile, Names, Origin, Primitive, Robot, UrdfJoint, three
+from .robot import HERE, MASSLESS, Inertial, MeshFile, Names, Origin, Place, Primitive, Robot, UrdfJoint, three
+
+
+@dataclass(eq=False)
+class MergedLinks:
+    """Links that move as one: `top` carries the others; the body has its axes, unless it is flexible."""
+
+    top: str  # name of the link
+    stands_still: bool = False  # whether it is the ground
+    flexible: bool = False  # whether a link file says what it is; then it has no other member
+    members: dict[str, Place] = field(default_factory=dict)  # links, and where they stand in the body's axes
+    inertial: Inertial = MASSLESS  # of all of them
+
+    def add(self, robot: Robot, link: str, place: Place) -> None:
+        """Merge a link into the body, in whose axes it stands at `place`."""
+        self.members[link] = place
+        if (inertial := robot.links[link].inertial) is not None:
+            self.inertial = self.inertial + inertial.seen_from(place)
+
+    @property
+    def weighs(self) -> bool:
+        """Whether it has mass."""
+        return self.flexible or self.inertial.mass > 0
+
+    @property
+    def label(self) -> str:
+        """Name of the top link, with those fixed to it, for messages."""
+        fixed = [name for name in self.members if name != self.top]
+        return f'link "{shown(self.top)}"' + (f" with {quoted(fixed)} fixed to it" if fixed else "")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Bodies in the order in which joints carry them, and these joints, each from one body to the next.
+
+    `body_of` has the body of each link; `remarks` say what was left out.
+    """
+
+    bodies: tuple[MergedLinks, ...]
+    joints: tuple[UrdfJoint, ...]
+    body_of: Mapping[str, MergedLinks]
+    remarks: tuple[str, ...]
+
+
+def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool = False) -> Mechanism:
+    """The bodies of a robot.
+
+    `flexible` has the links that shall be flexible, and where their URDF frame stands in the axes of the link file. By
+    `fix_inertia` principal moments that no body has are changed, as little as can be: see `least_change`.
+
+    Raises:
+        InputError: a body that moves has no mass but carries others, or an inertia that no body has.
+    """
+    ground = MergedLinks(robot.root, stands_still=True)
+    bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, MergedLinks]()
+    if robot.root in flexible:
+        joints.append(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))  # the parent is no link
+        bodies.append(_start(robot, robot.root, flexible, body_of))
+    else:
+        ground.add(robot, robot.root, HERE)
+        body_of[robot.root] = ground
+    outward = robot.joints_of(robot.root)
+    for joint in outward:  # which grows
+        outward += robot.joints_of(joint.child)
+        parent = body_of[joint.parent]
+        if joint.type == "fixed" and not parent.flexible and joint.child not in flexible:
+            parent.add(robot, joint.child, parent.members[joint.parent] @ joint.origin.place)
+            body_of[joint.child] = parent
+        else:
+            joints.append(joint)
+            bodies.append(_start(robot, joint.child, flexible, body_of))
+    kept, carried, remarks = _with_mass(bodies, joints, body_of)
+    if not kept:
+        if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
+            raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}"', "none")
+        raise InputError(
+            "expected links with mass",
+            "no <inertial> with one in the whole file: it was made for viewers. Add <inertial> to its links, from CAD"
+            " or a data sheet, take a description of the robot for dynamics, or estimate masses by --density",
+        )
+    remarks += _fixed(kept) if fix_inertia else []
+    _check_inertias(kept)
+    return Mechanism(tuple(kept), tuple(carried), body_of, tuple(remarks))
+
+
+def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, MergedLinks]) -> MergedLinks:
+    body = MergedLinks(link, flexible=link in flexible)
+    body.add(robot, link, flexible.get(link, HERE))
+    body_of[link] = body
+    return body
+
+
+def _with_mass(
+    bodies: list[MergedLinks], joints: list[UrdfJoint], body_of: Mapping[str, MergedLinks]
+) -> tuple[list[MergedLinks], list[UrdfJoint], list[str]]:
+    """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
+    below = {body for body in bodies if body.weighs}
+    for joint in reversed(joints):
+        if joint.parent in body_of and body_of[joint.child] in below:
+            below.add(body_of[joint.parent])
+    kept = [body for body in bodies if not body.stands_still and body in below]
+    bare = [body for body in kept if not body.weighs]
+    if bare:
+        raise InputError(
+            "\n".join(
+                f"{body.label}: expected a mass of a body that moves and carries others, found none: give it an"
+                " <inertial>, make the joint that carries it fixed, or estimate masses by --density"
+                for body in bare
+            )
+        )
+    remarks = [
+        f'joint "{shown(joint.name)}" and link "{shown(joint.child)}" left out: nothing there has mass'
+        for joint in joints
+        if body_of[joint.child] not in below
+    ]
+    return kept, [joint for joint in joints if body_of[joint.child] in below], remarks
+
+
+def least_change(inertia: Array) -> Array:
+    """Return the inertia (3, 3), kg·m², nearest to `inertia` by Frobenius, of which no principal moment is too large.
+
+    Principal axes stay. With d = J₃ − J₁ − J₂ > 0 it is the projection on the plane J₃ = J₁ + J₂: J₁ + d/3, J₂ + d/3,
+    J₃ − d/3. Moments that are not positive stay so, unless d/3 makes them.
+    """
+    moments, axes = np.linalg.eigh((inertia + inertia.T) / 2)
+    excess = max(moments[2] - moments[0] - moments[1], 0.0)
+    if excess == 0.0:
+        return inertia
+    fixed: Array = (axes * (moments + excess / 3 * np.array([1.0, 1.0, -1.0]))) @ axes.T
+    return (fixed + fixed.T) / 2
+
+
+def _fixed(bodies: list[MergedLinks]) -> list[str]:
+    remarks = []
+    for body in bodies:
+        before = body.inertial.inertia
+        if body.flexible or (after := least_change(before)) is before or is_possible(before):
+            continue
+        body.inertial = replace(body.inertial, inertia=after)
+        then, now = (", ".join(f"{moment:.6g}" for moment in np.linalg.eigvalsh(J)) for J in (before, after))
+        share = np.linalg.norm(after - before) / np.linalg.norm(before)
+        remarks.append(
+            f"{body.label}: principal moments of inertia {then} kg m², which no body has, are now {now}: changed by"
+            f" {100 * share:.2g} %, the least that makes them possible"
+        )
+    return remarks
+
+
+def is_possible(inertia: Array) -> bool:
+    """Tell whether no principal moment of an inertia (3, 3), kg·m², exceeds the sum of the others beyond round-off."""
+    moments = np.linalg.eigvalsh(inertia)
+    return bool(moments[2] <= moments[0] + moments[1] + ROUND_OFF * np.abs(inertia).max())
+
+
+def _check_inertias(bodies: list[MergedLinks]) -> None:
+    errors = []
+    for body in bodies:
+        if body.flexible:
+            continue
+        try:
+            xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
+            check_inertia((xx, yy, zz))
+        except ValueError as error:
+            least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
+            is_mended = not is_possible(body.inertial.inertia) and least >= -ROUND_OFF * largest
+            way = ": --fix-inertia makes the least change" if is_mended else ""
+            errors.append(f"{body.label}: <inertia>: {error}{way}")
+    if errors:
+        raise InputError("\n".join(errors))
+
 
 GRAVITY = [0.0, 0.0, -9.81]
 SCENE_TYPE = {
@@ -31,12 +201,14 @@ ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
 
 
 class SceneOfRobot:
-    """Scene made from a URDF: `keys` of the file, and `remarks` on what it could not keep."""
+    """Scene made from a URDF: `keys` of the file, and `remarks` on what it could not keep.
+
+    `meshes` are files from the folder of the scene on, by the names that the URDF has for them.
+    """
 
     def __init__(
         self, robot: Robot, mechanism: Mechanism, flexible: Mapping[str, ImportedLink], meshes: Mapping[str, str]
     ) -> None:
-        """`meshes` are files from the folder of the scene on, by the names that the URDF has for them."""
         self.robot, self.mechanism, self.flexible, self.meshes = robot, mechanism, flexible, meshes
         self.remarks = [*robot.remarks, *mechanism.remarks]
         self.bodies, self.joints = Names((GROUND,)), Names()
@@ -49,19 +221,15 @@ class SceneOfRobot:
             "body": [self._body(body) for body in mechanism.bodies],
             "joint": joints,
         }
-        if tools := list(self._tool_records()):
+        if tools := [self._tool(body, link) for body in mechanism.bodies for link in self._tools(body)]:
             self.keys["tool"] = tools
-        self._remark_on_ground()
+        still = [name for name, body in mechanism.body_of.items() if body.stands_still]
+        if still:
+            mass = sum(inertial.mass for name in still if (inertial := robot.links[name].inertial) is not None)
+            said = "are fixed to the ground and are" if len(still) > 1 else "is fixed to the ground and is"
+            self.remarks.append(f"{quoted(map(shown, still))} (mass {mass:g} kg) {said} no body of the scene")
         changed = self.bodies.changed | self.joints.changed
         self.remarks += [f'"{shown(old)}" is called "{new}" in the scene' for old, new in changed.items()]
-
-    def _remark_on_ground(self) -> None:
-        still = [name for name, body in self.mechanism.body_of.items() if body.stands_still]
-        mass = sum(inertial.mass for name in still if (inertial := self.robot.links[name].inertial) is not None)
-        if still:
-            names = quoted(map(shown, still))
-            said = "are fixed to the ground and are" if len(still) > 1 else "is fixed to the ground and is"
-            self.remarks.append(f"{names} (mass {mass:g} kg) {said} no body of the scene")
 
     def _body(self, body: MergedLinks) -> dict[str, Any]:
         name = self.bodies[body.top]
@@ -75,14 +243,12 @@ class SceneOfRobot:
         for link, place in body.members.items():  # frames of tools and sensors keep their names
             if link != body.top and link not in self._tools(body):
                 points[self._frame(body, link)] = _numbers(place.d)
-        inertial = body.inertial
-        J = (inertial.inertia + inertial.inertia.T) / 2  # symmetric to the last digit
+        J = (body.inertial.inertia + body.inertial.inertia.T) / 2  # symmetric to the last digit
         is_principal = not np.any(J - np.diag(np.diag(J)))
-        inertia = _numbers(np.diag(J)) if is_principal else [_numbers(row) for row in J]
         rigid = {
-            "mass": inertial.mass,
-            "center": _numbers(inertial.center),
-            "inertia": inertia,
+            "mass": body.inertial.mass,
+            "center": _numbers(body.inertial.center),
+            "inertia": _numbers(np.diag(J)) if is_principal else [_numbers(row) for row in J],
             "points": points,
         }
         if visuals := list(self._visuals(body)):
@@ -103,12 +269,10 @@ class SceneOfRobot:
     def _frame(self, body: MergedLinks, link: str) -> str:
         return self.points[body.top][f"link {link}" if link in self.robot.joints else link]
 
-    def _tool_records(self) -> Iterator[dict[str, Any]]:
-        for body in self.mechanism.bodies:
-            for link in self._tools(body):
-                place, keys = body.members[link], {"name": self._frame(body, link)}
-                keys |= {"point": f"{self.bodies[body.top]}.{ORIGIN}"}
-                yield {**keys, "at": _numbers(place.d), "rpy": rpy_of(place.C)}
+    def _tool(self, body: MergedLinks, link: str) -> dict[str, Any]:
+        place, name = body.members[link], self._frame(body, link)
+        point = f"{self.bodies[body.top]}.{ORIGIN}"
+        return {"name": name, "point": point, "at": _numbers(place.d), "rpy": rpy_of(place.C)}
 
     def _visuals(self, body: MergedLinks) -> Iterator[dict[str, Any]]:
         """Shapes of all its links, in the body's axes; meshes as far as their files are there."""
@@ -135,11 +299,12 @@ class SceneOfRobot:
         parent, child = self.mechanism.body_of.get(joint.parent), self.mechanism.body_of[joint.child]
         place = joint.origin.place if parent is None else parent.members[joint.parent] @ joint.origin.place
         keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE[joint.type]}
-        on_ground = parent is None or parent.stands_still
-        first = GROUND if parent is None or on_ground else f"{self.bodies[parent.top]}.{self._point(parent, joint)}"
-        second = "root" if child.flexible else ORIGIN
-        keys["between"] = [first, f"{self.bodies[child.top]}.{second}"]
-        if on_ground and np.any(place.d):
+        keys["between"] = [GROUND, f"{self.bodies[child.top]}.{'root' if child.flexible else ORIGIN}"]
+        if parent is not None and not parent.stands_still:
+            name, top = joint.name, parent.top
+            point = self.flexible[top].point_of[name] if parent.flexible else self.points[top][name]
+            keys["between"][0] = f"{self.bodies[top]}.{point}"
+        elif np.any(place.d):
             keys["at"] = _numbers(place.d)
         if joint.type in WITH_AXIS:
             keys["axis"] = _numbers(place.C @ np.array(joint.axis))
@@ -150,11 +315,6 @@ class SceneOfRobot:
             keys["rpy"] = rpy
         self._remark_on_mimic(joint)
         return keys | self._limits(joint) | self._friction(joint)
-
-    def _point(self, body: MergedLinks, joint: UrdfJoint) -> str:
-        if body.flexible:
-            return self.flexible[body.top].point_of[joint.name]
-        return self.points[body.top][joint.name]
 
     def _limits(self, joint: UrdfJoint) -> dict[str, Any]:
         keys: dict[str, Any] = {}

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from itertools import pairwise
 from operator import add
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from ...common.rotations import rpy_of, smallest_turn
 from ...common.tables import shown
 from ...fe_models.modal_body import ModalBody
 from ...mesh.skins import loaded_skin
-from .robot import Inertial, MeshFile, Origin, Primitive, Robot, UrdfLink, three
+from .robot import MASSLESS, Inertial, MeshFile, Origin, Primitive, Robot, UrdfLink, three
 
 if TYPE_CHECKING:
     import trimesh
@@ -41,7 +42,7 @@ class MeshMass:
 
 
 def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
-    """Compare meshes with <inertial> for all links that have both; also return remarks, a line each."""
+    """Compare meshes with <inertial> for all links that have both; second, remarks, a line each."""
     try:
         import trimesh
     except ModuleNotFoundError:
@@ -55,12 +56,19 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
             missing += absent
             continue
         try:
-            parts = [_loaded(mesh, urdf) for mesh in meshes]
+            mesh = trimesh.util.concatenate([_loaded(mesh, urdf) for mesh in meshes])
         except InputError as error:
             logger.warning("mesh of %s", link.name, exc_info=error)
             remarks.append(f'link "{shown(link.name)}": {error}')
             continue
-        masses.append(_mass_of(link.name, trimesh.util.concatenate(parts), link.inertial))
+        mass, tiny = link.inertial.mass, np.finfo(float).tiny
+        if (volume := abs(float(mesh.volume))) < tiny:
+            masses.append(MeshMass(link.name, 0.0, np.inf, np.nan, np.nan, False))
+            continue
+        unit = mesh.moment_inertia / mesh.volume  # per unit of mass
+        ratio = float(np.trace(unit) * mass / max(np.trace(link.inertial.inertia), tiny))
+        distance = float(np.linalg.norm(mesh.center_mass - link.inertial.center))
+        masses.append(MeshMass(link.name, volume, mass / volume, ratio, distance, _is_closed(mesh)))
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         remarks.append(f"mesh not found: {shown(missing[0])}{more}; masses are those of <inertial> in any case")
@@ -87,16 +95,6 @@ def _loaded(mesh: MeshFile, urdf: Path) -> trimesh.Trimesh:
     return loaded_skin(path, mesh.scale, place.d, place.C)
 
 
-def _mass_of(name: str, mesh: trimesh.Trimesh, inertial: Inertial) -> MeshMass:
-    volume = abs(float(mesh.volume))
-    if volume < np.finfo(float).tiny:
-        return MeshMass(name, 0.0, np.inf, np.nan, np.nan, False)
-    unit = mesh.moment_inertia / mesh.volume  # per unit of mass
-    ratio = float(np.trace(unit) * inertial.mass / max(np.trace(inertial.inertia), np.finfo(float).tiny))
-    distance = float(np.linalg.norm(mesh.center_mass - inertial.center))
-    return MeshMass(name, volume, inertial.mass / volume, ratio, distance, _is_closed(mesh))
-
-
 def _is_closed(mesh: trimesh.Trimesh) -> bool:
     """Whether the facets enclose a volume, all with the same side out: otherwise their integrals are wrong."""
     return bool(mesh.is_watertight and mesh.is_winding_consistent)
@@ -107,9 +105,9 @@ ALIKE = 1e-9  # sections whose sizes differ by less, relative, are one shape
 
 
 def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
-    """The undeformed beam by the outer sizes of its sections, a shape for each length over which they are the same.
+    """Yield the undeformed beam by the outer sizes of its sections, a shape for each length with the same ones.
 
-    `anchor` (3,) is where the link's frame is, in axes of the body. Round where the outline has more than four corners.
+    `anchor` (3,), m, is where the link's frame is, in axes of the body. Round are outlines of more than four corners.
     """
     stations = body.stations
     height = stations.height
@@ -118,17 +116,13 @@ def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
     last = len(height) - 1  # sizes hold from a station to the next
     sizes = np.stack([height, width], axis=1)[:last]
     changes = np.any(np.abs(np.diff(sizes, axis=0)) > ALIKE * sizes.max(), axis=1)
-    first = 0
-    for end in [*(np.flatnonzero(changes) + 1), last]:
+    for first, end in pairwise([0, *(np.flatnonzero(changes) + 1), last]):
         a, b = stations.position[first], stations.position[end]
-        length, center = float(np.linalg.norm(b - a)), (a + b) / 2 - anchor
+        length, center = float(np.linalg.norm(b - a)), three((a + b) / 2 - anchor)
         if is_round:
-            yield Primitive(
-                "cylinder", (float(sizes[first].max()) / 2, length), Origin(three(center), (0.0, np.pi / 2, 0.0))
-            )
+            yield Primitive("cylinder", (float(sizes[first].max()) / 2, length), Origin(center, (0.0, np.pi / 2, 0.0)))
         else:
-            yield Primitive("box", (length, float(height[first]), float(width[first])), Origin(three(center)))
-        first = end
+            yield Primitive("box", (length, float(height[first]), float(width[first])), Origin(center))
 
 
 def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
@@ -187,12 +181,17 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
             filling.radius is not None and any(mesh_path(each.filename, urdf) is None for each in meshes)
         ):
             continue
-        label = f'link "{shown(link.name)}": <{kind}>'
-        parts = [_of_shape(shape, urdf, filling.density, label) for shape in shapes]
-        what = f"its <{kind}> filled {with_density}"
-        if any(is_hull for _, is_hull in parts):
-            what += ", convex hulls of meshes that are open or have facets inside out"
-        return reduce(add, (part for part, _ in parts)), what
+        label, parts, hulls = f'link "{shown(link.name)}": <{kind}>', list[Inertial](), ""
+        for shape in shapes:
+            if isinstance(shape, Primitive):
+                name, part = f"a {shape.shape}", _of_primitive(shape, filling.density)
+            else:
+                name, (part, is_hull) = shown(shape.filename), _of_mesh(shape, urdf, filling.density, label)
+                hulls = ", convex hulls of meshes that are open or have facets inside out" if is_hull else hulls
+            if not (np.isfinite(part.mass) and part.mass > 0):
+                raise InputError(f"{label}: expected a shape with a volume", f"{name} without one")
+            parts.append(part)
+        return reduce(add, parts), f"its <{kind}> filled {with_density}{hulls}"
     beyond = max(robot.joints_of(link.name), key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
     if filling.radius is None or beyond is None or not any(beyond.origin.xyz):
         return None, ""
@@ -201,19 +200,8 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
     return _of_primitive(rod, filling.density), what
 
 
-def _of_shape(shape: MeshFile | Primitive, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
-    """Of a filled shape in axes of the link, and whether it is a convex hull."""
-    if isinstance(shape, Primitive):
-        name, inertial, is_hull = f"a {shape.shape}", _of_primitive(shape, density), False
-    else:
-        name, (inertial, is_hull) = shown(shape.filename), _of_mesh(shape, urdf, density, label)
-    if not (np.isfinite(inertial.mass) and inertial.mass > 0):
-        raise InputError(f"{label}: expected a shape with a volume", f"{name} without one")
-    return inertial, is_hull
-
-
 def _of_primitive(shape: Primitive, density: float) -> Inertial:
-    """Solid box, cylinder, capsule or sphere: the textbook's moments about the center.
+    """Solid box, cylinder, capsule or sphere.
 
     The half spheres of a capsule have their centers 3/8 of the radius beyond the ends of its cylinder.
     """
@@ -237,6 +225,7 @@ def _of_primitive(shape: Primitive, density: float) -> Inertial:
 
 
 def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
+    """Inertial of a filled mesh in axes of the link, and whether it is that of its convex hull."""
     if mesh_path(shape.filename, urdf) is None:
         raise InputError(
             f"{label}: expected its mesh next to the URDF",
@@ -252,7 +241,7 @@ def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[I
     try:
         solid = mesh if is_closed else mesh.convex_hull
     except (RuntimeError, ValueError):  # Qhull's, of points in one plane or without numbers
-        return Inertial(0.0, np.zeros(3), np.zeros((3, 3))), True
+        return MASSLESS, True
     mass = density * float(solid.volume)
     sign = np.sign(mass)  # of a mesh whose faces look inward
     return Inertial(sign * mass, np.array(solid.center_mass), sign * density * solid.moment_inertia), not is_closed

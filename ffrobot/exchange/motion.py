@@ -1,23 +1,197 @@
-"""Motions of joints that other programs planned or recorded, as a table of waypoints."""
+"""Motions of joints: those of results for other programs, and those that other programs planned or recorded."""
 
 from __future__ import annotations
 
 import json
 import math
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array, Integers, as_list, as_rows
-from ...common.errors import InputError, blaming_file, quoted
-from ...common.libraries import extras, scipy
-from ...common.tables import LARGEST, as_csv, shown
-from ...common.toml_files import read_text
-from ...mbs.fields.waypoints import Recorded, Waypoints
-from .robot_motion import NANO, TRAJECTORY
+from ..common.arrays import Array, Integers, as_list, as_rows
+from ..common.errors import InputError, blaming_file, check_known, quoted
+from ..common.libraries import extras, scipy
+from ..common.tables import LARGEST, as_csv, shown
+from ..common.toml_files import read_text
+from ..mbs.fields.waypoints import Recorded, Waypoints
+from ..results.file import Results
+
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+NANO = 1_000_000_000
+OF_MOTOR = ("motor_coordinate", "motor_rate", "motor_moment")
+"""Datasets of a joint whose gear is compliant."""
+Side = Literal["motor", "joint"]
+"""Of a compliant gear."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """One coordinate of a joint over T outputs."""
+
+    name: str  # of the joint; "NAME[k]" of coordinate k where it has several
+    coordinate: Array  # (T,) rad, or m along a way
+    rate: Array  # (T,) rad/s or m/s
+    moment: Array | None  # (T,) N·m or N, at the joint, behind a gear; None of a joint without motor
+    # of a compliant gear, `motor_coordinate`, `motor_rate` and `motor_moment` (T,) as in results; else none
+    motor: Mapping[str, Array] = field(default_factory=dict)
+
+    def on(self, side: Side) -> tuple[Array, Array]:
+        """Return coordinate and rate (T,) on a side of the gear, rad and rad/s, or m and m/s; of a stiff one alike."""
+        if side == "motor" and self.motor:
+            return self.motor["motor_coordinate"], self.motor["motor_rate"]
+        return self.coordinate, self.rate
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotions:
+    """Joints of an analysis with their coordinates at `time` (T,), s; `remarks` on restrictions.
+
+    `side`: of compliant gears, whose positions a JointTrajectory has.
+    """
+
+    analysis: str
+    time: Array
+    joints: tuple[JointMotion, ...]
+    remarks: tuple[str, ...]
+    side: Side = "motor"
+
+
+def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> JointMotions:
+    """Read joint motions from the results file at `path`; default: the first analysis with moving joints.
+
+    Raises:
+        InputError: there is no such analysis, or none of its joints moves.
+    """
+    with Results(path) as results:
+        known = [name for name in results.analyses if any(_moving(results, name))]
+        if analysis is not None:
+            check_known(analysis, names := results.analyses, f"{path}: --analysis: expected one of {quoted(names)}")
+        if not known or analysis not in (None, *known):
+            raise InputError(f"{path}: expected an analysis with joints that move", f"none in {analysis or 'it'}")
+        name = analysis or known[0]
+        joints = tuple(part for joint in _moving(results, name) for part in _parts(results, name, joint))
+        time, status = results.time(name), results.attributes(name)["status"]
+    remarks = () if status == "completed" else (f"{name} ended at t = {time[-1]:g} s: {status}",)
+    return JointMotions(name, time, joints, remarks, side)
+
+
+def _moving(results: Results, analysis: str) -> Iterator[str]:
+    names = [str(entry["name"]) for entry in results.scene.get("joint", ())]
+    return (name for name in names if results.has(f"{analysis}/joints/{name}/coordinate"))
+
+
+def _parts(results: Results, analysis: str, joint: str) -> Iterator[JointMotion]:
+    group = f"{analysis}/joints/{joint}"
+    coordinate, rate = (results.data(f"{group}/{key}").T for key in ("coordinate", "rate"))
+    has_motor = results.has(f"{group}/moment")
+    moment = results.data(f"{group}/moment").T if has_motor else [None] * len(coordinate)
+    motor = {key: results[f"{group}/{key}"] for key in OF_MOTOR if results.has(f"{group}/{key}")}
+    for k, values in enumerate(zip(coordinate, rate, moment, strict=True)):
+        yield JointMotion(joint if len(coordinate) == 1 else f"{joint}[{k}]", *values, motor)
+
+
+def csv_text(motion: JointMotions) -> str:
+    """Return a CSV table: `time`, NAME.coordinate, NAME.rate and, with a motor, NAME.moment of joints; SI units.
+
+    Of joints with compliant gears also NAME.motor_coordinate, NAME.motor_rate, NAME.motor_moment.
+    """
+    columns = {"time": motion.time}
+    for joint in motion.joints:
+        columns |= {f"{joint.name}.coordinate": joint.coordinate, f"{joint.name}.rate": joint.rate}
+        if joint.moment is not None:
+            columns[f"{joint.name}.moment"] = joint.moment
+        columns |= {f"{joint.name}.{key}": values for key, values in joint.motor.items()}
+    return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))])
+
+
+def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return a ROS JointTrajectory of one side of compliant gears, and remarks on what it leaves out.
+
+    Accelerations stay empty: results have none of joints. Where no joint has a motor, all are taken, without effort.
+    """
+    moments = {joint.name: joint.moment for joint in motion.joints if joint.moment is not None}
+    left = [joint.name for joint in motion.joints if joint.moment is None] if moments else []
+    joints = [joint for joint in motion.joints if joint.name not in left]
+    remarks = list(motion.remarks)
+    if left:
+        remarks.append(f"joints without motor left out: {', '.join(left)}")
+    if not moments:
+        remarks.append("no joint has a motor: effort is left empty")
+    begin = min(float(motion.time[0]), 0.0)
+    if begin < 0.0:
+        remarks.append(f"time_from_start 0 is t = {begin:g} s, when motors begin: the path does {-begin:g} s later")
+    if geared := [joint.name for joint in joints if joint.motor]:
+        of, other = "behind compliant gears", "motor"
+        if motion.side == "motor":
+            of, other = "those of motors, before compliant gears", "joint"
+        remarks.append(f"positions of {quoted(geared)} are {of}: --side {other} takes the other side")
+    positions, velocities = (
+        np.stack(columns, axis=1) for columns in zip(*(joint.on(motion.side) for joint in joints), strict=True)
+    )
+    efforts = np.stack(list(moments.values()), axis=1) if moments else np.zeros((len(motion.time), 0))
+    points = [
+        {
+            "positions": position,
+            "velocities": velocity,
+            "accelerations": [],
+            "effort": effort,
+            "time_from_start": dict(zip(("sec", "nanosec"), divmod(round((time - begin) * NANO), NANO), strict=True)),
+        }
+        for position, velocity, effort, time in zip(
+            as_rows(positions), as_rows(velocities), as_rows(efforts), as_list(motion.time), strict=True
+        )
+    ]
+    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    return {"header": header, "joint_names": [joint.name for joint in joints], "points": points}, tuple(remarks)
+
+
+def joint_trajectory_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
+    """Return the message of `joint_trajectory` as JSON, a line for each point; and its remarks."""
+    message, remarks = joint_trajectory(motion)
+    points = ",\n".join(json.dumps(point) for point in message.pop("points"))
+    head = json.dumps(message, ensure_ascii=False)
+    return f'{head[:-1]}, "points": [\n{points}\n]}}\n', remarks
+
+
+BAG = "joint_trajectory"  # name of the topic, and of the files in it
+VERSION = 8  # of the metadata: what ROS 2 Iron and later write, and Humble reads
+
+
+def joint_trajectory_bag(motion: JointMotions) -> tuple[Mapping[str, bytes], tuple[str, ...]]:
+    """Return files of a ROS 2 bag by name, SQLite storage, with the message at time zero; and remarks.
+
+    Raises:
+        SolveError: `rosbags` is not installed.
+    """
+    with extras():
+        from rosbags.rosbag2 import Writer
+        from rosbags.typesys import Stores, get_typestore
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    message, remarks = joint_trajectory(motion)
+    with tempfile.TemporaryDirectory(prefix="ffrobot-bag-") as temporary:
+        folder = Path(temporary) / BAG
+        with Writer(folder, version=VERSION) as writer:
+            connection = writer.add_connection(f"/{BAG}", TRAJECTORY, typestore=types)
+            writer.write(connection, 0, types.serialize_cdr(_ros(message, types.types), TRAJECTORY))
+        return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}, remarks
+
+
+def _ros(message: Mapping[str, Any], types: Mapping[str, Any]) -> Any:
+    """The message as an object of ROS's class, which is made at run time."""
+    stamp = types["builtin_interfaces/msg/Time"](**message["header"]["stamp"])
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id=message["header"]["frame_id"])
+    points = []
+    for point in message["points"]:
+        since = types["builtin_interfaces/msg/Duration"](**point["time_from_start"])
+        arrays = {key: np.array(values, dtype=float) for key, values in point.items() if key != "time_from_start"}
+        points.append(types[f"{TRAJECTORY}Point"](**arrays, time_from_start=since))
+    return types[TRAJECTORY](header=header, joint_names=message["joint_names"], points=points)
+
 
 STATES = "sensor_msgs/msg/JointState"
 TEXTS = (".json", ".yaml", ".yml")
@@ -28,14 +202,14 @@ NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 
 
 def read_motion(path: Path) -> Waypoints:
-    """The motion in a file with a JointTrajectory, or in a bag of ROS: see `read_record`."""
+    """Read waypoints (rad or m, over s) from a file with a JointTrajectory, or a bag of ROS: see `read_record`."""
     return _named(path, lambda path: read_record(path).waypoints())
 
 
 def read_record(path: Path) -> Recorded:
-    """The rows in a JSON or YAML file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
+    """Read times (T,), s, and positions (T, joints), rad or m, with remarks on what was left out.
 
-    Columns are joints, rad or m; `remarks` say what was left out.
+    They are in a JSON or YAML file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
 
     Raises:
         InputError: it has none, or numbers that are no motion; names the file.
@@ -54,14 +228,17 @@ def _named(path: Path, read: Callable[[Path], T]) -> T:
 
 
 def path_text(motion: Waypoints) -> str:
-    """A CSV table: columns t and the joints' names, with all digits."""
+    """Return a CSV table of a motion: columns t (s) and the joints' names (rad or m), with all digits."""
     rows = ([time, *row] for time, row in zip(as_list(motion.times), as_rows(motion.values), strict=True))
     return as_csv([["t", *motion.columns], *rows])
 
 
 def _from_text(path: Path) -> Recorded:
     text = read_text(path, "file of a motion")
-    message = _from_json(text) if path.suffix.lower() == ".json" else _from_yaml(text)
+    try:
+        message = json.loads(text) if path.suffix.lower() == ".json" else _from_yaml(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError("expected JSON", error) from None
     segments = list(_segments(message))
     if not segments:
         raise InputError('expected a JointTrajectory with "joint_names" and "points"', "none")
@@ -79,13 +256,6 @@ def _from_text(path: Path) -> Recorded:
     return _record(joints, rows, rates, *joined)
 
 
-def _from_json(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError("expected JSON", error) from None
-
-
 def _from_yaml(text: str) -> Any:
     """All documents of it, as `ros2 topic echo` writes one for each message."""
     with extras():
@@ -94,8 +264,7 @@ def _from_yaml(text: str) -> Any:
     try:
         return list(YAML(typ="safe", pure=True).load_all(text))
     except (YAMLError, ValueError, RecursionError) as error:
-        reason = shown(" ".join(str(error).split()))
-        raise InputError("expected YAML", reason) from None
+        raise InputError("expected YAML", shown(" ".join(str(error).split()))) from None
 
 
 def _segments(message: Any) -> Iterator[Mapping[str, Any]]:
@@ -157,18 +326,6 @@ def _seconds(duration: Any, k: int) -> float:
     return _number(duration.removesuffix("s") if isinstance(duration, str) else duration, where)
 
 
-def _moving_at_ends(joints: Sequence[str], velocities: Array) -> Iterator[str]:
-    """Of motions that begin or end elsewhere than at rest, by the velocities (T, joints) of all points."""
-    rates = np.abs(velocities)
-    for k, end in ((0, "first"), (-1, "last")) if len(rates) else ():
-        moving = [name for name, rate in zip(joints, rates[k], strict=True) if rate > MOVING * rates.max()]
-        if moving:
-            yield (
-                f"{quoted(moving)} at the {end} point: velocities of up to {rates[k].max():.3g} left out: waypoints"
-                " begin and end at rest, so that accelerations there are larger than those of the motion"
-            )
-
-
 def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any], *remarks: str) -> Recorded:
     """`velocities`: of all points, or of none."""
     if not joints or len(set(joints)) < len(joints):
@@ -179,9 +336,15 @@ def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any
         rates = np.array(velocities, dtype=float).reshape(values.shape)
     except (TypeError, ValueError, OverflowError):
         rates = None
-    if rates is None or not np.isfinite(rates).all():
-        return Recorded(joints, times, values, "point {}".format, remarks)
-    remarks = (*remarks, *_moving_at_ends(joints, rates))
+    if rates is not None and not np.isfinite(rates).all():
+        rates = None
+    sizes = np.abs(values[:0] if rates is None else rates)
+    for k, end in ((0, "first"), (-1, "last")) if len(sizes) else ():
+        if moving := [name for name, size in zip(joints, sizes[k], strict=True) if size > MOVING * sizes.max()]:
+            remarks += (
+                f"{quoted(moving)} at the {end} point: velocities of up to {sizes[k].max():.3g} left out: waypoints"
+                " begin and end at rest, so that accelerations there are larger than those of the motion",
+            )
     return Recorded(joints, times, values, "point {}".format, remarks, rates)
 
 
@@ -202,22 +365,20 @@ def _from_bag(path: Path) -> Recorded:
 
 def _of_bag(bag: Any) -> Recorded:
     """The first JointTrajectory of the topic that has most; without one, the JointStates of all topics."""
-    topics = {
-        kind: sorted((one for one in bag.connections if one.msgtype == kind), key=lambda one: -int(one.msgcount))
-        for kind in (TRAJECTORY, STATES)
-    }
-    if not any(topics.values()):
-        raise InputError(f"expected messages {TRAJECTORY} or {STATES}", "none of them")
+    connections = sorted(bag.connections, key=lambda one: -int(one.msgcount))
+    plans, states = ([one for one in connections if one.msgtype == kind] for kind in (TRAJECTORY, STATES))
 
     def messages(topic: Any) -> Iterator[tuple[int, Any]]:
         return ((at, bag.deserialize(raw, topic.msgtype)) for _, at, raw in bag.messages(connections=[topic]))
 
-    first, *others = topics[TRAJECTORY] or [None]
-    if first is None:
-        return _states({topic.topic: messages(topic) for topic in topics[STATES]})
+    if not plans:
+        if not states:
+            raise InputError(f"expected messages {TRAJECTORY} or {STATES}", "none of them")
+        return _states({topic.topic: messages(topic) for topic in states})
+    first, *others = plans
     (_, plan), *later = messages(first)
     left = [f"{len(later)} later messages on {first.topic} left out"] if later else []
-    left += [f"{topic.topic} left out: {topic.msgcount} messages" for topic in (*others, *topics[STATES])]
+    left += [f"{topic.topic} left out: {topic.msgcount} messages" for topic in (*others, *states)]
     rows = []
     for k, point in enumerate(plan.points):
         keys = {"positions": point.positions.tolist(), "time_from_start": vars(point.time_from_start)}
