@@ -24,7 +24,7 @@ from ..results.file import Results
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 NANO = 1_000_000_000
 OF_MOTOR = ("motor_coordinate", "motor_rate", "motor_moment")
-"""Datasets of a joint whose gear is compliant."""
+"""Datasets of a joint with a gear."""
 Side = Literal["motor", "joint"]
 """Of a compliant gear."""
 
@@ -37,12 +37,12 @@ class JointMotion:
     coordinate: Array  # (T,) rad, or m along a way
     rate: Array  # (T,) rad/s or m/s
     moment: Array | None  # (T,) N·m or N, at the joint, behind a gear; None of a joint without motor
-    # of a compliant gear, `motor_coordinate`, `motor_rate` and `motor_moment` (T,) as in results; else none
+    # `motor_coordinate`, `motor_rate` of a compliant gear, `motor_moment` of one with a rotor (T,), as in results
     motor: Mapping[str, Array] = field(default_factory=dict)
 
     def on(self, side: Side) -> tuple[Array, Array]:
         """Return coordinate and rate (T,) on a side of the gear, rad and rad/s, or m and m/s; of a stiff one alike."""
-        if side == "motor" and self.motor:
+        if side == "motor" and "motor_coordinate" in self.motor:
             return self.motor["motor_coordinate"], self.motor["motor_rate"]
         return self.coordinate, self.rate
 
@@ -125,7 +125,7 @@ def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, .
     begin = min(float(motion.time[0]), 0.0)
     if begin < 0.0:
         remarks.append(f"time_from_start 0 is t = {begin:g} s, when motors begin: the path does {-begin:g} s later")
-    if geared := [joint.name for joint in joints if joint.motor]:
+    if geared := [joint.name for joint in joints if "motor_coordinate" in joint.motor]:
         of, other = "behind compliant gears", "motor"
         if motion.side == "motor":
             of, other = "those of motors, before compliant gears", "joint"

@@ -87,13 +87,18 @@ def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
 
 @pytest.fixture(scope="module")
 def geared(tmp_path_factory, ffrobot):
-    """Results of an arm that sags behind a compliant gear, whose motor follows a path."""
+    """Results of an arm that sags behind a compliant gear, whose motor follows a path, with a rigid gear beyond."""
     scene = tmp_path_factory.mktemp("geared") / "scene.toml"
     scene.write_text(
         """name = "geared"
 gravity = [0.0, -9.81]
-body = [{ name = "a", rigid = { mass = 2.0, inertia = 0.1, center = [0.4, 0.0], points = { root = [0.0, 0.0] } } }]
-trajectory = [{ name = "t", motor = "hub", via = [0.0, 0.5], duration = 0.4 }]
+body = [
+  { name = "a", rigid = { mass = 2, inertia = 0.1, center = [0.4, 0.0], points = { root = [0, 0], tip = [0.8, 0] } } },
+  { name = "b", rigid = { mass = 0.1, inertia = 1e-3, center = [0.1, 0.0], points = { root = [0, 0] } } },
+]
+trajectory = [
+  { name = "t", motor = "hub", via = [0.0, 0.5], duration = 0.4 }, { name = "e", joint = "elbow", value = "t**3" },
+]
 initial = { state = "static" }
 analysis = [{ name = "run", kind = "pcid", end = 0.5, output_step = 0.05 }]
 [[joint]]
@@ -104,6 +109,12 @@ gear_ratio = 50.0
 rotor_inertia = 1e-5
 stiffness = 2e3
 damping = 2.0
+[[joint]]
+name = "elbow"
+type = "revolute"
+between = ["a.tip", "b.root"]
+gear_ratio = 30.0
+rotor_inertia = 1e-5
 """
     )
     ffrobot.ok("solve", scene)
@@ -114,6 +125,7 @@ def test_the_side_of_a_compliant_gear_is_chosen(geared, ffrobot, tmp_path):
     """The path itself on the side of the motor, unless the other one is asked for; a table has both."""
     with h5py.File(geared) as file:
         target, joint = file["run/trajectories/t/target"][()], {k: v[()] for k, v in file["run/joints/hub"].items()}
+        elbow = file["run/joints/elbow/coordinate"][()]
     assert target.shape == joint["coordinate"].shape
     np.testing.assert_allclose(joint["motor_coordinate"], target, atol=1e-9)
     assert np.abs(joint["coordinate"] - target).min() > 1e-3
@@ -123,6 +135,8 @@ def test_the_side_of_a_compliant_gear_is_chosen(geared, ffrobot, tmp_path):
         points = json.loads(path.read_text())["points"]
         for key, of in (("positions", f"{prefix}coordinate"), ("velocities", f"{prefix}rate"), ("effort", "moment")):
             np.testing.assert_array_equal([point[key][0] for point in points], joint[of])
+        np.testing.assert_array_equal([point["positions"][1] for point in points], elbow)
+        assert 'positions of "hub" are' in done.stdout
         assert f"--side {'joint' if prefix else 'motor'} takes the other side" in " ".join(done.stdout.split())
     ffrobot.ok("export", geared, "--format", "csv", "-o", tmp_path / "out.csv")
     found = table(tmp_path / "out.csv")
