@@ -125,9 +125,9 @@ def plot_results(
     check_texts(formats, "plot_results: formats")
     check_texts(only, "plot_results: only")
     with extras(), _files(results) as (path,):
-        from .pictures.figures.plot import plot_results
+        from .pictures.figures.plot import plot_file
 
-        return plot_results(path, Path(folder), formats, only)
+        return plot_file(path, Path(folder), formats, only)
 
 
 def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path: AnyPath) -> None:

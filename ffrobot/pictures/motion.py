@@ -35,24 +35,24 @@ class MovingBody:
     points: Array  # (k, 3) where they are in the frame, undeformed, in m
     deflection: Array  # (T, k, 3) their Φ p, in the frame, in m
     sections: Array  # (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none
-    shift: Array  # (T, 3) m, how much a unit of s moves the body as a whole, so that joints stay shut; global axes
+    shift: Array  # (T, 3) by which a unit of s moves the body as a whole, so that joints stay shut, in m; global axes
 
     @property
     def axes(self) -> Array:
-        """A (T, 3, 3), columns the axes of the frame."""
+        """Return A (T, 3, 3), columns the axes of the frame, in global axes."""
         return of_quaternion(self.orientation)
 
     def turned(self, vectors: Array) -> Array:
-        """A times vectors (T, …, 3) of the frame: in global axes."""
+        """Return vectors (T, …, 3) of the frame, of any unit, in global axes: A times these."""
         return np.einsum("tij,t...j->t...i", self.axes, vectors)
 
     def placed(self, places: Array) -> Array:
-        """R + A x of places x (T, k, 3) in the frame, m: in global axes."""
+        """Return R + A x (T, k, 3) of places x (T, k, 3) in the frame, m: in global axes."""
         return self.position[:, None] + self.turned(places)
 
     @property
     def global_points(self) -> Array:
-        """Positions of the points (T, k, 3), m, global axes."""
+        """Return positions of the points (T, k, 3), m, global axes."""
         return self.placed(self.points + self.deflection)
 
     def exaggerated(self, s: float) -> Array:
@@ -65,7 +65,7 @@ class MovingBody:
 
 
 def moving_bodies(results: Results, analysis: str, frames: Indices) -> list[MovingBody]:
-    """All bodies at the outputs `frames`, each after the one that carries it."""
+    """Return all bodies at the outputs `frames` (T,), each after the one that carries it."""
     joints = results.scene.get("joint", [])
     edges = [Edge(tuple(joint["between"]), int(not joint_type(joint).locates)) for joint in joints]
     names = [body["name"] for body in results.scene["body"]]
@@ -116,9 +116,9 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
 
 
 def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
-    """Return axes (T, 3, 3), columns, of the section on a `side` of a joint, "BODY.POINT"; global ones for the ground.
+    """Return the axes (T, 3, 3), columns, of a section "BODY.POINT"; of the frame in files without them.
 
-    Those of the frame where sections are not known.
+    Those of the ground, over so many outputs T, are the global ones.
     """
     for body in bodies:
         if side in body.point_names:
@@ -138,13 +138,11 @@ def largest_deflection(bodies: Iterable[MovingBody]) -> float:
 
 
 def visible_exaggeration(size: float, deflection: float) -> float:
-    """The largest of 1, 2, 5, 10, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m.
+    """Return the largest of 1, 2, 5, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m.
 
     1 where not even 1000 times the deflection would be seen, as of rigid robots.
     """
-    steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
-    if steps[-1] * deflection < INVISIBLE * size:
-        return 1.0
+    steps = [] if 1000.0 * deflection < INVISIBLE * size else [2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)
 
 
@@ -153,7 +151,7 @@ PLACES = ("x", "y", "z")  # components of trajectories that are places
 
 @dataclass(frozen=True)
 class PointTarget:
-    """Prescribed position of a point: `columns` (0, 1, 2 for x, y, z) and their values `wanted` (T, m), m."""
+    """Prescribed position of a point: its `columns`, of x, y, z, and their values `wanted` (T, columns), m."""
 
     trajectory: str
     point: str
@@ -162,14 +160,14 @@ class PointTarget:
 
     @property
     def places(self) -> Array:
-        """Prescribed positions (T, 3), m; zero in components that are not prescribed."""
+        """Return prescribed positions (T, 3), m, global axes; zero in components that are not prescribed."""
         places = np.zeros((len(self.wanted), 3))
         places[:, self.columns] = self.wanted
         return places
 
 
 def targets(results: Results, analysis: str) -> list[PointTarget]:
-    """The target of every trajectory of a point, over the first outputs of the analysis.
+    """Return the target of every trajectory of a point, over the first outputs of the analysis.
 
     A forward analysis does not hold trajectories: its targets are those of the analysis its actuation comes from.
     """
@@ -200,17 +198,28 @@ class Marker:
     directions: Array  # (T, k, 3) unit vectors in global axes
 
     def exaggerated(self, s: float) -> Array:
-        """Return the position (T, 3), m, with deflections times s."""
+        """Return the position (T, 3), m, global axes, with deflections times s."""
         return self.position + (s - 1.0) * self.exaggeration
 
 
 def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody]) -> list[Marker]:
-    """Every joint at its second side, with the axes that it has: one, two of universal joints, none of others."""
-    return [_joint(keys, bodies) for keys in scene.get("joint", [])]
+    """Return every joint at its second side, with its axes: one, two of universal joints, none of others."""
+    markers = []
+    for keys in scene.get("joint", []):
+        first, second = keys["between"]
+        position, exaggeration = _place(second if second != GROUND else first, bodies)
+        directions = [
+            section_axes(bodies, of, len(position)) @ in_3d(np.array(keys[key]) / np.linalg.norm(keys[key]))
+            for key, of in (("axis", first), ("second_axis", second))
+            if key in keys
+        ]
+        axes = np.stack(directions, 1) if directions else np.zeros((len(position), 0, 3))
+        markers.append(Marker(keys["name"], position, exaggeration, axes))
+    return markers
 
 
 def tool_marker(point: str, bodies: Sequence[MovingBody]) -> Marker:
-    """The section "BODY.POINT" with its axes x, y, z, without them in planar scenes."""
+    """Return the section "BODY.POINT" with its axes x, y, z, without them in planar scenes."""
     position, exaggeration = _place(point, bodies)
     T, is_known = len(position), any(body.sections.size for body in bodies)
     axes = section_axes(bodies, point, T).swapaxes(1, 2) if is_known else np.zeros((T, 0, 3))
@@ -222,25 +231,13 @@ def tool_markers(targets: Iterable[PointTarget], bodies: Sequence[MovingBody]) -
     return [tool_marker(point, bodies) for point in dict.fromkeys(target.point for target in targets)]
 
 
-def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody]) -> Marker:
-    first, second = keys["between"]
-    position, exaggeration = _place(second if second != GROUND else first, bodies)
-    T = len(position)
-    directions = [
-        section_axes(bodies, of, T) @ in_3d(np.array(keys[key]) / np.linalg.norm(keys[key]))
-        for key, of in (("axis", first), ("second_axis", second))
-        if key in keys
-    ]
-    return Marker(keys["name"], position, exaggeration, np.stack(directions, 1) if directions else np.zeros((T, 0, 3)))
-
-
 def _place(side: str, bodies: Sequence[MovingBody]) -> tuple[Array, Array]:
     body = next(body for body in bodies if side in body.point_names)
     return body.global_points[:, body.point_names.index(side)], body.global_deflection(side) + body.shift
 
 
 def ground_places(scenes: Iterable[Mapping[str, Any]]) -> Array:
-    """Return positions (g, 3), m, of joints on the ground in any of the scenes, each once."""
+    """Return positions (g, 3), m, global axes, of joints on the ground in any of the scenes, each once."""
     joints = [joint for scene in scenes for joint in scene.get("joint", []) if GROUND in joint["between"]]
     places = [in_3d(np.array(joint.get("at", (0.0, 0.0)), dtype=float)) for joint in joints]
     return np.array(list(dict.fromkeys(map(tuple, places)))).reshape(-1, 3)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..common.arrays import Array, Indices, Integers, as_floats
+from ..common.arrays import Array, Indices, Integers
 from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.rotations import of_rpy, smallest_turn
@@ -37,17 +37,14 @@ class DrawnMode(NamedTuple):
 
 
 def drawn_mode(shape: Array, length: float) -> DrawnMode:
-    """A mode (p, 3) of a body of `length` scaled to the same largest displacement as every other; zero stays zero."""
+    """Return a mode (p, 3) of a body of `length` (m) with the same largest displacement as any other, but of zero."""
     size = np.linalg.norm(shape, axis=1)
     largest = float(size.max()) or 1.0
     return DrawnMode(AMPLITUDE * length / largest * shape, size / largest)
 
 
 def body_surface(body: ModalBody) -> PictureMesh:
-    """The surface of a solid as its file has it; of a beam, the section swept along the axis.
-
-    Where a beam's file does not know the section (older ones), its axis.
-    """
+    """Return the surface of a solid as its file has it; of a beam the section swept along the axis, else its axis."""
     return body.mesh if body.stations.outline is None or body.mesh.cells.shape[1] > 2 else _swept(body)
 
 
@@ -84,12 +81,12 @@ LAYERS = 4  # clusters that remain at least over each of the three dimensions of
 
 
 def triangles_of(cells: Integers) -> Integers:
-    """Return triangles (t, 3); quadrilaterals are split in two."""
+    """Return triangles (t, 3) of cells (c, 3) or (c, 4); quadrilaterals are split in two."""
     return cells if cells.shape[1] == 3 else np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
 
 
 def coarsened(points: Array, triangles: Integers, limit: int) -> tuple[Indices, Integers]:
-    """Reduce a surface: return indices of kept points (p, 3), m, and at most `limit` triangles on them.
+    """Reduce a surface of points (p, 3), m: return indices (k,) of those kept and at most `limit` triangles (t, 3).
 
     Points in the same box of a grid become the one nearest to their mean (vertex clustering: Rossignac & Borrel, 1993),
     so that the points that remain keep their exact displacements. Boxes are as small as the limit allows, and across a
@@ -124,14 +121,16 @@ def _clustered(points: Array, triangles: Integers, size: Array) -> tuple[Indices
     return kept, mapped[apart][np.sort(first)]
 
 
-def visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array, Integers] | None:
+def _visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array, Integers] | None:
     """Points (p, 3), m, body axes, and triangles (t, 3) of a visual shape; None, with a line in `notes`, if hidden."""
     body = next(entry for entry in results.scene["body"] if entry["name"] == name)
     entries = body.get("rigid", {}).get("visual", ())
     if not entries:
         return None
     try:
-        skins = [_skin(entry, results.path.parent) for entry in entries]
+        from trimesh.util import concatenate
+
+        skin = concatenate([_skin(entry, results.path.parent) for entry in entries])
     except ModuleNotFoundError:
         notes.append("bodies are drawn without their meshes, which need trimesh: pip install trimesh pycollada")
         return None
@@ -139,9 +138,7 @@ def visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array
         logger.warning("mesh of %s", name, exc_info=error)
         notes.append(f"{name} is drawn without its mesh: {shown(str(error))}")
         return None
-    first = np.cumsum([0, *(len(skin.vertices) for skin in skins[:-1])])
-    points = as_floats(np.concatenate([skin.vertices for skin in skins]))
-    return points, np.concatenate([skin.faces + start for skin, start in zip(skins, first, strict=True)])
+    return np.array(skin.vertices), np.array(skin.faces)
 
 
 def _skin(entry: Mapping[str, Any], folder: Path) -> trimesh.Trimesh:
@@ -153,7 +150,6 @@ def _skin(entry: Mapping[str, Any], folder: Path) -> trimesh.Trimesh:
 
 
 SIDES = 8  # of bars that stand for lines
-BAR = 0.008  # of the robot's size: their radius
 OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
 
 
@@ -169,7 +165,7 @@ class Shape:
 
     @property
     def deflection(self) -> Array:
-        """A Φ p (T, p, 3), m, global axes."""
+        """Return the deflection A Φ p of all points (T, p, 3), m, global axes."""
         return self.body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
 
     def placed(self, s: float = 1.0) -> Array:
@@ -180,11 +176,11 @@ class Shape:
 
 
 def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
-    """The surface of a flexible body, the visual shapes of a rigid one; else lines between points.
+    """Return the surface of a flexible body, the visual shapes of a rigid one; else lines between points.
 
     `notes` say which files are not found.
     """
-    if body.modal is None and (visual := visual_surface(results, body.name, notes)) is not None:
+    if body.modal is None and (visual := _visual_surface(results, body.name, notes)) is not None:
         points, triangles = visual
         return Shape(body, points, np.zeros((*points.shape, 0)), np.zeros((len(body.position), 0)), triangles)
     link = _modal_body(results, body, notes)
@@ -195,8 +191,8 @@ def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
 
 
 def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, notes: list[str]) -> Shape:
-    """The surface of a body in at most `limit` triangles, its lines as bars for a robot of `size` (m)."""
-    shape = thickened(surface_shape(results, body, notes), BAR * size)
+    """Return the surface of a body in at most `limit` triangles, its lines as bars for a robot of `size` (m)."""
+    shape = thickened(surface_shape(results, body, notes), 0.008 * size)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), limit)
     return replace(shape, points=shape.points[kept], shapes=shape.shapes[kept], cells=triangles)
 
@@ -212,15 +208,20 @@ def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
 
 
 def point_shape(body: MovingBody) -> Shape:
-    """Lines between the points of a body, as short as they all connect; a single point is itself."""
+    """Return lines between the points of a body, of the least length that connects all; a single point is itself."""
     k = len(body.points)
     shapes = np.eye(3 * k).reshape(k, 3, 3 * k)
-    cells = shortest_tree(body.points) if k > 1 else np.zeros((k, 1), dtype=np.int64)
+    cells = np.zeros((k, 1), dtype=np.int64)
+    if k > 1:
+        distance = np.linalg.norm(body.points[:, None] - body.points, axis=2)
+        # 0 would be no edge: points may be one
+        tree = scipy.sparse.csgraph.minimum_spanning_tree(1.0 + distance / max(distance.max(), 1e-300))
+        cells = np.array(tree.nonzero(), dtype=np.int64).T
     return Shape(body, body.points, shapes, body.deflection.reshape(len(body.position), 3 * k), cells)
 
 
 def thickened(shape: Shape, radius: float) -> Shape:
-    """Lines as bars of `radius` (m) with `SIDES` sides, in triangles; single points as octahedra."""
+    """Return lines as bars of `radius` (m) with `SIDES` sides, in triangles; single points as octahedra."""
     if shape.cells.shape[1] > 2:
         return shape
     if shape.cells.shape[1] == 1:
@@ -239,15 +240,6 @@ def thickened(shape: Shape, radius: float) -> Shape:
         shapes=shape.shapes[np.repeat(shape.cells.ravel(), SIDES)],
         cells=np.concatenate([bar + 2 * SIDES * k for k in range(len(shape.cells))]),
     )
-
-
-def shortest_tree(points: Array) -> Integers:
-    """Return the edges (p − 1, 2) of the shortest tree that connects points (p, 3), m."""
-    distance = np.linalg.norm(points[:, None] - points, axis=2)
-    tree = scipy.sparse.csgraph.minimum_spanning_tree(
-        1.0 + distance / max(distance.max(), 1e-300)
-    )  # 0 would be no edge: points may be one
-    return np.array(tree.nonzero(), dtype=np.int64).T
 
 
 def _modal_body(results: Results, body: MovingBody, notes: list[str]) -> ModalBody | None:

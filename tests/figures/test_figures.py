@@ -9,7 +9,7 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.joint import MotorLimits
-from ffrobot.pictures.figures.plot import draw_time_history, plot_results
+from ffrobot.pictures.figures.plot import draw_time_history, plot_file
 from ffrobot.pictures.figures.shared import Curve, FigureRecord, curve_points, limit_curves, read_points
 from ffrobot.pictures.figures.style import new_axes
 from ffrobot.pictures.motion import visible_exaggeration
@@ -35,7 +35,7 @@ def figures_beside(results, text):
 
 
 def test_standard_figures_are_png_and_pdf(results, tmp_path):
-    written = plot_results(results, tmp_path / "figures")
+    written = plot_file(results, tmp_path / "figures")
     assert {path.suffix for path in written} == {".png", ".pdf"}
     assert all(path.stat().st_size > 1000 for path in written)
     assert stems(written) == {"configurations_inverse", "path_slider", "deflection_rod.mid", "force_slider"}
@@ -43,12 +43,12 @@ def test_standard_figures_are_png_and_pdf(results, tmp_path):
 
 def test_formats_are_those_asked_for(results, tmp_path):
     figures_beside(results, '[[figure]]\nname = "a"\ncurves = [{ data = "inverse/joints/O/reaction", label = "" }]')
-    first, second = (plot_results(results, tmp_path / name, ["svg", "png"]) for name in ("first", "second"))
+    first, second = (plot_file(results, tmp_path / name, ["svg", "png"]) for name in ("first", "second"))
     assert [path.name for path in first] == ["a.svg", "a.png"]
     assert "<svg" in first[0].read_text(encoding="utf-8")
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
     with pytest.raises(InputError, match='format: expected one or several of png, pdf, svg, found "png,eps"'):
-        plot_results(results, tmp_path / "third", ["png", "eps"])
+        plot_file(results, tmp_path / "third", ["png", "eps"])
     assert not (tmp_path / "third").exists()
 
 
@@ -56,7 +56,7 @@ def test_figure_file_decides_what_is_drawn(results, tmp_path):
     case = CASES / "slider_crank"
     for name in ("figures.toml", "reference.csv"):
         shutil.copy(case / name, tmp_path)
-    written = plot_results(results, tmp_path / "figures")
+    written = plot_file(results, tmp_path / "figures")
     assert stems(written) == {"fig02_mechanism", "fig03_actuator_force", "fig04_slider_motion", "fig05_rod_midpoint"}
 
 
@@ -78,16 +78,16 @@ def test_figure_file_decides_what_is_drawn(results, tmp_path):
 def test_wrong_figure_files_are_refused(results, tmp_path, text, complaint):
     figures_beside(results, f'[[figure]]\nname = "a"\n{text}\n')
     with pytest.raises(InputError) as error:
-        plot_results(results, tmp_path / "figures")
+        plot_file(results, tmp_path / "figures")
     assert complaint in str(error.value)
     assert not (tmp_path / "figures").exists()
 
 
 def test_only_the_figures_asked_for(results, tmp_path):
-    written = plot_results(results, tmp_path / "some", ["png"], ["reaction_*", "path_slider"])
+    written = plot_file(results, tmp_path / "some", ["png"], ["reaction_*", "path_slider"])
     assert stems(written) == {"path_slider", *(f"reaction_{joint}" for joint in ("O", "A", "B", "guide"))}
     with pytest.raises(InputError, match=r'--only: expected the name of a figure.*found "reactoin_A" \(did you mean'):
-        plot_results(results, tmp_path / "none", ["png"], ["reactoin_A"])
+        plot_file(results, tmp_path / "none", ["png"], ["reactoin_A"])
     assert not (tmp_path / "none").exists()
 
 

@@ -8,7 +8,7 @@ from PIL import Image
 
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.configurations import draw_configurations
-from ffrobot.pictures.figures.plot import draw, plot_results
+from ffrobot.pictures.figures.plot import draw, plot_file
 from ffrobot.pictures.figures.shared import FigureRecord
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.figures.style import SceneAxes
@@ -47,7 +47,7 @@ def test_standard_figures(arm, crank):
 def test_every_standard_figure_is_drawn(arm_3r, tmp_path):
     results = tmp_path / "scene.results.h5"  # without figures.toml beside it
     results.write_bytes((arm_3r.folder / "scene.results.h5").read_bytes())
-    paths = plot_results(results, tmp_path / "figures", ["png"], ["*"])
+    paths = plot_file(results, tmp_path / "figures", ["png"], ["*"])
     with Results(results) as opened:
         assert [path.stem for path in paths] == [record.name for record in standard_figures(opened)]
     for path in paths:

@@ -86,7 +86,6 @@ def test_movie_of_uneven_outputs_keeps_time():
     outputs = movie_outputs(time, 0.44)
     assert len(outputs) == 11  # 25 a second
     np.testing.assert_array_equal(outputs, [0, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4])
-    np.testing.assert_array_equal(movie_outputs(np.array([0.3]), 8.0), [0])
 
 
 def test_what_is_refused(results, two_link, tmp_path, monkeypatch):

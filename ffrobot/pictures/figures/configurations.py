@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,18 +14,18 @@ from ...results.file import Results
 from ..motion import ground_places, largest_deflection, moving_bodies, size_of, visible_exaggeration
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
-from .shared import Curve, FigureRecord
+from .shared import FigureRecord
 from .style import SIZE, SceneAxes, legend, line_style, new_axes, shades
 
 SIZE_3D = (2 * SIZE[0], 1.6 * SIZE[1])  # inches
-GREY = "#8b95a3"
 
 
 def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
-    """Draw the bodies of an analysis at the outputs nearest to `figure.times`, and the curves of `figure` as paths.
+    """Draw the bodies of an analysis at the outputs nearest to `figure.times`, with paths.
 
-    Without curves, the paths of the points that have trajectories or tools. Deflections are to scale in planar scenes,
-    else as large as can be seen, unless the figure says otherwise. Postures between the first and the last are lines.
+    These are the curves of `figure`, else those of the points that have trajectories or tools. Deflections are to scale
+    in planar scenes, else as large as can be seen, unless the figure says otherwise. Postures between the first and the
+    last are lines.
     """
     assert figure.analysis is not None
     outputs = results.time(figure.analysis)
@@ -37,12 +37,12 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     places = np.concatenate([body.global_points for body in bodies], axis=1)
     picture, views = _new(results, figure.title + exaggerated, places)
     lines, surfaces = ([shape(results, body, []) for body in bodies] for shape in (line_shape, surface_shape))
-    paths, ground, colors = _paths(figure, results), ground_places([results.scene]), shades(len(frames))
+    paths, ground, colors = list(_paths(figure, results)), ground_places([results.scene]), shades(len(frames))
     for axes in views:
         for label, path, style in paths:
             axes.plot(path, label=label, **style)
         if len(ground):  # else the robot floats
-            axes.plot(ground, "^", color=GREY, markersize=6, label="ground")
+            axes.plot(ground, "^", color="#8b95a3", markersize=6, label="ground")
         for k, color in enumerate(colors):
             has_surface = axes is views[0] and k in (0, len(frames) - 1)
             for shape in surfaces if has_surface else lines:
@@ -57,7 +57,7 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
 
 def draw_path(figure: FigureRecord, results: Results) -> Figure:
     """Draw every dataset of `figure`, (x, y) or (x, y, z), as a path."""
-    curves = _curves(figure, results)
+    curves = list(_paths(figure, results))
     picture, views = _new(results, figure.title, np.concatenate([path for _, path, _ in curves]))
     for axes in views:
         for label, path, style in curves:
@@ -90,58 +90,39 @@ def _new(results: Results, title: str, points: Array) -> tuple[Figure, list[Scen
     return picture, views
 
 
-Path = tuple[str | None, Array, dict[str, object]]
-"""Its label, its places (T, 3), m, and how the line looks."""
-
-
-def _paths(figure: FigureRecord, results: Results) -> list[Path]:
-    """Those of the figure, else those of the points that have trajectories or tools, to scale."""
-    if figure.curves:
-        return _curves(figure, results)
+def _paths(figure: FigureRecord, results: Results) -> Iterator[tuple[str | None, Array, dict[str, object]]]:
+    """Labels, places (T, 3), m, and looks of the curves, else of the points that have trajectories or tools."""
+    names = ["xyz"[axis] for axis in results.space.translations]
+    for k, curve in enumerate(figure.curves):
+        values = results.data(curve.data)
+        if values.shape[1] != len(names):
+            raise InputError(
+                f'{results.path}: figure "{figure.name}": expected {"two" if len(names) == 2 else "three"} columns'
+                f' ({", ".join(names)}) in "{curve.data}"',
+                values.shape[1],
+            )
+        yield curve.label, in_3d(values), line_style(k, len(values))
     marked = [*results.scene.get("trajectory", []), *results.scene.get("tool", [])]
-    points = [entry["point"] for entry in marked if "point" in entry]
+    points = dict.fromkeys(entry["point"] for entry in marked if "point" in entry)
     style: dict[str, object] = {"color": COLORS[1], "linestyle": "--", "linewidth": 0.8}
-    return [
-        ("path" if number == 0 else None, in_3d(results[f"{figure.analysis}/points/{point}/position"]), style)
-        for number, point in enumerate(dict.fromkeys(points))
-    ]
+    for number, point in enumerate(points if not figure.curves else ()):
+        yield "path" if number == 0 else None, in_3d(results[f"{figure.analysis}/points/{point}/position"]), style
 
 
-def _curves(figure: FigureRecord, results: Results) -> list[Path]:
-    return [
-        (curve.label, path := _path(results, figure, curve), line_style(k, len(path)))
-        for k, curve in enumerate(figure.curves)
-    ]
-
-
-def _path(results: Results, figure: FigureRecord, curve: Curve) -> Array:
-    """(T, 3) of the dataset of a curve, which has as many columns as the scene has axes."""
-    values, names = results.data(curve.data), ["xyz"[axis] for axis in results.space.translations]
-    if values.shape[1] != len(names):
-        raise InputError(
-            f'{results.path}: figure "{figure.name}": expected {"two" if len(names) == 2 else "three"} columns'
-            f' ({", ".join(names)}) in "{curve.data}"',
-            values.shape[1],
-        )
-    return in_3d(values)
-
-
-POINTS = 4000  # of a frequency response
 DECADE_BELOW, MODES_SHOWN = 10.0, 8  # range: from a tenth of the lowest frequency to beyond the eighth
 SHAPES, COLUMNS = 6, 3  # modes that are drawn at most, and beside each other
 AMPLITUDE = 0.12  # of the robot's size: the largest displacement as drawn
-GHOST = "#9a9a9a"
 
 
 def draw_bode(figure: FigureRecord, results: Results) -> Figure:
-    """Magnitude (SI units of output over input) and phase of `figure.transfers` over the frequency, at one time."""
+    """Draw magnitude (SI units of output over input) and phase of `figure.transfers` over the frequency."""
     assert figure.analysis is not None
     k = _nearest(results, figure)
     model = results.linear(figure.analysis)[k]
     frequency = results[f"{figure.analysis}/linear/frequency"][k]
     flexible = frequency[frequency > 0.0]
     first, last = (flexible[0], flexible[min(MODES_SHOWN, len(flexible)) - 1]) if len(flexible) else (1.0, 1.0)
-    hertz = np.geomspace(first / DECADE_BELOW, 1.3 * last, POINTS)
+    hertz = np.geomspace(first / DECADE_BELOW, 1.3 * last, 4000)
     picture = Figure(figsize=(2 * SIZE[0], 1.5 * SIZE[1]), layout="constrained")
     magnitude, phase = picture.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     magnitude.set_title(figure.title, loc="left")
@@ -161,7 +142,7 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
 
 
 def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
-    """The lowest modes of the robot that vibrate, over its configuration (gray), in both directions."""
+    """Draw the lowest modes of the robot that vibrate, over its configuration (gray), in both directions."""
     assert figure.analysis is not None
     k = _nearest(results, figure)
     frequency = results[f"{figure.analysis}/linear/frequency"][k]
@@ -171,24 +152,20 @@ def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
     if not len(shown):
         picture.suptitle("no mode vibrates")
     shapes = [line_shape(results, body, []) for body in moving_bodies(results, figure.analysis, np.array([k]))]
-    for place, mode in enumerate(shown, 1):
-        axes = SceneAxes(picture.add_subplot(rows, COLUMNS, place), PLANE if results.space.is_plane else SPACE)
-        axes.axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
-        group = f"{figure.analysis}/linear/modes"
-        _draw_mode(axes, shapes, [_way(results, group, shape, k, int(mode)) for shape in shapes])
-        axes.finish(label_size=6)
-    return picture
-
-
-def _draw_mode(axes: SceneAxes, shapes: Sequence[Shape], ways: Sequence[Array]) -> None:
     places = [shape.placed()[0] for shape in shapes]
     size = np.ptp(np.vstack(places), axis=0).max()
-    largest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)
-    scale = AMPLITUDE * size / max(largest, 1e-300)
-    for at, shape, way in zip(places, shapes, ways, strict=True):
-        axes.body(at, shape.cells, GHOST, 0.8)
-        for sign, color in zip((1.0, -1.0), shades(3)[:2], strict=True):
-            axes.body(at + sign * scale * way, shape.cells, color, 1.2)
+    for number, mode in enumerate(shown, 1):
+        axes = SceneAxes(picture.add_subplot(rows, COLUMNS, number), PLANE if results.space.is_plane else SPACE)
+        axes.axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
+        group = f"{figure.analysis}/linear/modes"
+        ways = [_way(results, group, shape, k, int(mode)) for shape in shapes]
+        scale = AMPLITUDE * size / max(np.linalg.norm(np.vstack(ways), axis=1).max(), 1e-300)
+        for at, shape, way in zip(places, shapes, ways, strict=True):
+            axes.body(at, shape.cells, "#9a9a9a", 0.8)
+            for sign, color in zip((1.0, -1.0), shades(3)[:2], strict=True):
+                axes.body(at + sign * scale * way, shape.cells, color, 1.2)
+        axes.finish(label_size=6)
+    return picture
 
 
 def _way(results: Results, group: str, shape: Shape, k: int, mode: int) -> Array:

@@ -33,24 +33,20 @@ from ..shapes import coarse_surface
 from .style import directions, lit, literal, normals, projected, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
-MAX_TRIANGLES = 3000  # of a body
-MARGIN = 0.06  # of the size of what is seen
-DIRECTIONS = 0.07  # of the robot's size: length of the arrows along x, y, z
 FACE, AXIS, GROUND, WANTED = "#8fb8d4", "#30465c", "#8b95a3", "black"
 TAKEN = COLORS[3]  # no color of a tool
 
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
     """Write a movie drawn by matplotlib; arguments and notes as in `make_movie`."""
+
+    def frames(
+        results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
+    ) -> Iterator[Frame]:
+        return map(_Picture(results, analysis, outputs, scale, notes).at, range(len(outputs)))
+
     with style():
-        return make_movie(results_path, path, options, _frames)
-
-
-def _frames(
-    results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
-) -> Iterator[Frame]:
-    picture = _Picture(results, analysis, outputs, scale, notes)
-    yield from map(picture.at, range(len(outputs)))
+        return make_movie(results_path, path, options, frames)
 
 
 def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], outputs: int) -> Array:
@@ -66,8 +62,8 @@ class _Picture:
     """Axes on which a scene is painted anew for every frame, over a background that is drawn once.
 
     Over T outputs, as far exaggerated as it is drawn, m, global axes: `points` (T, p, 3) of the surfaces of all bodies
-    with `triangles` (t, 3) on these, `joints` (T, j, 3), the ends of their `axes` (T, a, 2, 3) and of the axes x, y, z
-    of sections that follow paths, `tools` (T, 3 k, 2, 3); where each point with a path is in truth, `places` (T, 3).
+    with `triangles` (t, 3) on these, `joints` (T, j, 3), the ends of `axes_of_joints` (T, a, 2, 3) and of the axes of
+    sections that follow paths, `tools` (T, 3 k, 2, 3); where each point with a path is in truth, `places` (T, 3).
     """
 
     def __init__(
@@ -81,7 +77,7 @@ class _Picture:
             scale = visible_exaggeration(self.size, largest_deflection(bodies))
         points, triangles, count = [], [], 0
         for body in bodies:
-            shape = coarse_surface(results, body, self.size, MAX_TRIANGLES, notes)
+            shape = coarse_surface(results, body, self.size, 3000, notes)
             points.append(shape.placed(scale))
             triangles.append(shape.cells + count)
             count += len(shape.points)
@@ -119,14 +115,14 @@ class _Picture:
         for places in (self.points, self.axes_of_joints, self.tools):
             self.axes.update_datalim(projected(places, self.view).reshape(-1, 2))
         self.axes.set_aspect("equal", adjustable="datalim")
-        self.axes.margins(MARGIN)
+        self.axes.margins(0.06)  # of the size of what is seen
         self.axes.autoscale_view()
         if self.is_plane:
             self.axes.set_xlabel("x (m)")
             self.axes.set_ylabel("y (m)")
         else:
             self.axes.set_axis_off()
-            directions(self.axes, DIRECTIONS * self.size, self.view)
+            directions(self.axes, 0.07 * self.size, self.view)
 
     def at(self, k: int) -> Frame:
         """The frame of output k: what faces away is left out, far triangles are painted first, near ones hide them."""

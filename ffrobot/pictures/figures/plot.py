@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import fnmatch
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from io import BytesIO
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -56,7 +56,7 @@ FACE, GHOST = "#cfdce8", "#9a9a9a"
 
 
 def draw_mesh(body: ModalBody) -> Figure:
-    """The mesh with its interfaces, and of a solid a close-up of the end at the root."""
+    """Draw the mesh with its interfaces, and of a solid a close-up of the end at the root."""
     points, cells = body.mesh.points, body.mesh.cells
     edges = body.mesh.edges if body.mesh.edges is not None else np.sort(sides(cells), axis=1)
     views = [(cells, f"{body.name}: mesh")]
@@ -80,7 +80,7 @@ def draw_mesh(body: ModalBody) -> Figure:
 
 
 def draw_part(part: Inspection, listed: int) -> Figure:
-    """The boundary of a part seen from two sides, its faces in colors; the first `listed` ones have their numbers."""
+    """Draw the boundary of a part from two sides, its faces in colors; the first `listed` ones have their numbers."""
     figure = Figure(figsize=(WIDTH, 2 * SOLID_HEIGHT), layout="constrained")
     palette = np.array([matplotlib.colors.to_rgb(color) for color in COLORS])
     colors = palette[part.face_of % len(palette)]
@@ -100,10 +100,9 @@ def draw_part(part: Inspection, listed: int) -> Figure:
 
 
 def draw_modes(body: ModalBody) -> Figure:
-    """The lowest modes, each scaled to the same largest displacement, whose size is the color."""
+    """Draw the lowest modes, each scaled to the same largest displacement, whose size is the color."""
     mesh = body_surface(body)
-    points, cells = mesh.points, mesh.cells
-    count = min(body.mode_count, MODES)
+    points, cells, count = mesh.points, mesh.cells, min(body.mode_count, MODES)
     rows = -(-count // COLUMNS)
     figure = Figure(figsize=(WIDTH, 1.9 * rows), layout="constrained")
     outline = projected(points, LINK)[_outline(points, cells, LINK.viewer)]
@@ -181,20 +180,16 @@ def _outline(points: Array, cells: Integers, viewer: Array) -> Integers:
     inner = np.zeros(len(edges), dtype=bool)
     inner[paired[smooth]] = inner[paired[smooth] + 1] = True
     # A fold is listed by both of its cells; once is enough.
-    return np.asarray(np.unique(edges[~inner], axis=0), dtype=np.int64)
+    return np.unique(edges[~inner], axis=0)
 
 
 MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
 NEAR = 1e-3  # of a limit: how close values are that are at it
-SHADE = 0.25  # opacity
 NAMED = 6  # columns: of more, the legend has the first and the last
 
 
 def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> None:
-    """Draw every curve of `figure` over time; a dataset with several columns as one shade for each.
-
-    The times at which a value is at a limit are shaded.
-    """
+    """Draw every curve of `figure` over time, several columns in one shade each; times with a value at a limit gray."""
     for k, curve in enumerate(figure.curves):
         if curve.file is not None:
             time, values = read_points(curve.file, curve.data)
@@ -213,16 +208,17 @@ def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> Non
 def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, results: Results) -> None:
     time, values = curve_points(results, curve, figure.scale)
     axes.margins(x=0)
-    count, at_limit = values.shape[1], is_at_limit(values, figure.limits)
+    count, at_limit = values.shape[1], _is_at_limit(values, figure.limits)
     if count > MANY and at_limit.mean() > OFTEN:  # the last line would hide the others
         _draw_map(axes, time, values, curve.label, figure)
         return
     if len(time) > 1 and at_limit.any():
         label = None if axes.collections else "at a limit"
-        look: dict[str, Any] = {"color": LIMIT, "alpha": SHADE, "linewidth": 0, "label": label}
+        look: dict[str, Any] = {"color": LIMIT, "alpha": 0.25, "linewidth": 0, "label": label}
         axes.fill_between(time, 0.0, 1.0, where=at_limit.any(axis=1), transform=axes.get_xaxis_transform(), **look)
     if count == 1:
-        _plot(axes, figure, k, time, values[:, 0])
+        look = line_style(k, len(time), alone=len(figure.curves) == 1)
+        axes.plot(time, values[:, 0], label=curve.label, **look)
         return
     for column, color in enumerate(shades(count)):
         label = f"{curve.label} {column + 1}" if count <= NAMED or column in (0, count - 1) else None
@@ -230,11 +226,11 @@ def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, result
         axes.plot(time, values[:, column], color=color, linestyle=dashes, linewidth=0.7, label=label)
 
 
-def is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
-    """Return (T, n) whether values are at one of the limits; values beyond all limits are at none."""
+def _is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
+    """(T, n) whether values are at one of the limits; of values beyond all limits none is."""
     near = np.isclose(values[..., None], limits or np.inf, rtol=NEAR, atol=0.0)
     is_within = np.abs(values).max(initial=0.0) <= (1.0 + NEAR) * np.abs(limits).max(initial=0.0)
-    return np.asarray(near.any(axis=-1) & is_within)
+    return near.any(axis=-1) & is_within
 
 
 def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: FigureRecord) -> None:
@@ -252,14 +248,11 @@ def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: Figure
     axes.figure.colorbar(picture, ax=axes, label=figure.y_label)
 
 
-def _plot(axes: Axes, figure: FigureRecord, k: int, x: Array, y: Array) -> None:
-    axes.plot(x, y, label=figure.curves[k].label, **line_style(k, len(x), alone=len(figure.curves) == 1))
-
-
 def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
     for k, curve in enumerate(figure.curves):
         speed, values = curve_points(results, curve, figure.scale)
-        _plot(axes, figure, k, speed, values[:, 0])
+        look = line_style(k, len(speed), alone=len(figure.curves) == 1)
+        axes.plot(speed, values[:, 0], label=curve.label, **look)
     if len(limits := motor_limits(results, figure)):
         axes.plot(*limits.T, color=LIMIT, linestyle="--", label="limits")
     axes.set_xlabel(figure.x_label)
@@ -267,7 +260,7 @@ def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> No
     legend(axes)
 
 
-def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
+def _draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     """Reach of a single patch along the link by mode; below, the patches found and those spread evenly."""
     group = f"{figure.analysis}/placement"
     if not results.has(group):
@@ -289,7 +282,7 @@ def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     legend(axes)
 
 
-DRAW = {"time": draw_time_history, "placement": draw_placement, "torque-speed": _draw_torque_speed}
+DRAW = {"time": draw_time_history, "placement": _draw_placement, "torque-speed": _draw_torque_speed}
 DRAW_WHOLE = {  # with axes of their own
     "path": draw_path,
     "configurations": draw_configurations,
@@ -307,77 +300,35 @@ FORMATS = ("png", "pdf")  # unless asked for otherwise
 
 
 def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()) -> list[Path]:
-    """Draw the figures of a results file or of a modal body file, whichever it is, into `folder`: see the two."""
-    plot = plot_modal_body if is_modal_body_file(path) else plot_results
-    return plot(path, folder, formats, only)
-
-
-def plot_modal_body(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()) -> list[Path]:
-    """Draw mesh and lowest modes of a modal body file into `folder`, which is made when absent; see `plot_results`.
-
-    Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the file
-    cannot be read, or for another format.
-    """
-    check_folder(folder)
-    _check_formats(formats)
-    body = read_modal_body(path)
-    written: list[Path] = []
-    with style():
-        for name, draw_it in chosen({"mesh": draw_mesh, "modes": draw_modes}, only).items():
-            written += write_figure(literal(draw_it(body)), folder, name, formats)
-    return written
-
-
-def plot_results(
-    results_path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()
-) -> list[Path]:
-    """Draw the figures of a results file into `folder`, which is made when absent.
+    """Draw the figures of a results file, or mesh and modes of a modal body file, into `folder`; returns the files.
 
     A file `figures.toml` beside the results says which figures and how; without one, the main ones of the standard
-    figures are drawn. `only` are names of those that are wanted, or patterns such as "moment_*", or "*" for all.
-    Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the results
-    or `figures.toml` cannot be read, or name what is not there, or for another format.
+    figures are drawn. `only` are names of those that are wanted, or patterns such as "moment_*", or "*" for all. Each
+    figure is written in all `formats`: "png", "pdf", "svg".
+
+    Raises:
+        InputError: a file cannot be read or names what is not there; no such format or figure.
     """
     check_folder(folder)
-    _check_formats(formats)
-    figure_file = results_path.parent / "figures.toml"
-    written: list[Path] = []
-    with Results(results_path) as results, style():
-        if figure_file.is_file():
-            for record in _records(load_figures(figure_file).figure, only):
-                label = f'{figure_file}: figure "{record.name}"'
-                with of_file(label), _formulas(label):
-                    written += write_figure(draw(record, results), folder, record.name, formats)
-        else:
-            for record in _records((standard_figures if only else main_figures)(results), only):
-                written += write_figure(literal(draw(record, results)), folder, record.name, formats)
+    if not formats or not set(formats) <= set(METADATA):
+        raise InputError(f"format: expected one or several of {', '.join(METADATA)}", f'"{",".join(formats)}"')
+    figure_file, written = path.parent / "figures.toml", list[Path]()
+    if is_modal_body_file(path):
+        body, drawings = read_modal_body(path), {"mesh": draw_mesh, "modes": draw_modes}
+        with style():
+            for name in _chosen(drawings, only):
+                written += write_figure(literal(drawings[name](body)), folder, name, formats)
+        return written
+    with Results(path) as results, style():
+        is_own, standard = figure_file.is_file(), standard_figures if only else main_figures
+        records = load_figures(figure_file).figure if is_own else standard(results)
+        names = _chosen(dict.fromkeys(record.name for record in records), only)
+        for record in (each for each in records if each.name in names):
+            label = f'{figure_file if is_own else path}: figure "{record.name}"'
+            with of_file(label), _formulas(label) if is_own else nullcontext():
+                picture = draw(record, results)
+                written += write_figure(picture if is_own else literal(picture), folder, record.name, formats)
     return written
-
-
-T = TypeVar("T")
-
-
-def _records(figures: Sequence[FigureRecord], only: Sequence[str]) -> list[FigureRecord]:
-    names = chosen(dict.fromkeys(figure.name for figure in figures), only)
-    return [figure for figure in figures if figure.name in names]
-
-
-def chosen(figures: Mapping[str, T], only: Sequence[str]) -> dict[str, T]:
-    """The figures whose name is one of `only`, or like one; all without.
-
-    Raises `InputError` for a pattern that none is like.
-    """
-    for pattern in only:
-        if not any(fnmatch.fnmatchcase(name, pattern) for name in figures):
-            raise InputError(
-                f"--only: expected the name of a figure, or a pattern that fits one ({quoted(figures)})",
-                f'"{pattern}"{did_you_mean(pattern, figures)}',
-            )
-    return {
-        name: figure
-        for name, figure in figures.items()
-        if not only or any(fnmatch.fnmatchcase(name, pattern) for pattern in only)
-    }
 
 
 @contextmanager
@@ -387,6 +338,17 @@ def _formulas(label: str) -> Iterator[None]:
         yield
     except ValueError as error:
         raise InputError(f"{label}: {str(error).strip().splitlines()[0]}") from None
+
+
+def _chosen(names: Collection[str], only: Sequence[str]) -> list[str]:
+    """Those that are, or are like, one of `only`; all without."""
+    for pattern in only:
+        if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
+            raise InputError(
+                f"--only: expected the name of a figure, or a pattern that fits one ({quoted(names)})",
+                f'"{pattern}"{did_you_mean(pattern, names)}',
+            )
+    return [name for name in names if not only or any(fnmatch.fnmatchcase(name, pattern) for pattern in only)]
 
 
 def draw(record: FigureRecord, results: Results) -> Figure:
@@ -403,13 +365,8 @@ def draw(record: FigureRecord, results: Results) -> Figure:
     return picture
 
 
-def _check_formats(formats: Sequence[str]) -> None:
-    if not formats or not set(formats) <= set(METADATA):
-        raise InputError(f"format: expected one or several of {', '.join(METADATA)}", f'"{",".join(formats)}"')
-
-
 def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Write a picture in all formats."""
+    """Write a picture as DIR/NAME.FORMAT in all formats; returns the files."""
     paths = [folder / f"{name}.{extension}" for extension in formats]
     for path, extension in zip(paths, formats, strict=True):
         write_atomically(path, image_of(picture, extension), "figure", make_folder=True)

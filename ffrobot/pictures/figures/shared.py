@@ -21,9 +21,6 @@ from ...mbs.joints.joint import MotorLimits
 from ...results.file import Results
 from ...results.joints import joint_coordinates
 
-FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-
-
 Range = tuple[float, float]
 
 
@@ -99,7 +96,7 @@ class FigureRecord(Record):
     @field_validator("name")
     @classmethod
     def _file_name(cls, value: str) -> str:
-        if not FILE_NAME.fullmatch(value):
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", value):
             raise ValueError(f'expected a name of letters, digits, "_", "-" and ".", found "{value}"')
         return value
 
@@ -139,14 +136,14 @@ def curves_of(results: Results, dataset: str, column: str = "", *, magnitude: bo
 
 
 def members(results: Results, group: str) -> list[str]:
-    """Names in a group of any analysis, each once, in the order of the scene."""
+    """Return the names in a group of any analysis, each once, in the order of the scene."""
     order = [keys["name"] for table in ("body", "joint") for keys in results.scene.get(table, [])]
     names = dict.fromkeys(name for a in results.analyses for name in results.names(f"{a}/{group}"))
     return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def bending_points(results: Results, analysis: str | None = None) -> list[str]:
-    """Points whose deflection is visible next to that of the others, in one analysis or in any."""
+    """Return the points whose deflection is visible next to that of the others, in one analysis or in any."""
     largest: dict[str, float] = {}
     for each in results.analyses if analysis is None else [analysis]:
         for point in results.names(f"{each}/points"):
@@ -162,18 +159,15 @@ def both_ways(limit: float | list[float]) -> tuple[float, ...]:
 
 
 def file_name(*parts: str) -> str:
-    """A file name: everything but letters, digits, `.` and `-` becomes `_`.
-
-    Names that lose other characters end in digits of a hash, so that different names differ.
-    """
+    """Return a file name: everything but letters, digits, `.` and `-` becomes `_`, with digits of a hash for others."""
     joined = "_".join(parts)
-    plain = "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)
-    lost = any(c != p and c not in " /_" for c, p in zip(joined, plain, strict=True))
-    return f"{plain}-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if lost else plain
+    plain = re.sub(r"[^A-Za-z0-9.-]", "_", joined)
+    mark = f"-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if re.search(r"[^\w /.-]", joined, re.A) else ""
+    return plain + mark
 
 
 def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
-    """Return abscissa (T,), time (s) or the curve's `x`, and `scale` times its values (T, columns)."""
+    """Return abscissa (T,), time (s) or the curve's `x`, and `scale` times its values (T, columns), else as stored."""
     values = results.data(curve.data)
     if curve.magnitude:
         values = np.linalg.norm(values, axis=1)[:, None]
@@ -186,7 +180,7 @@ def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, A
 
 
 def read_points(path: Path, column: str) -> tuple[Array, Array]:
-    """Times and values of one column of a CSV file whose first column is the time; lines with # are comments."""
+    """Read times (T,), s, and values (T,), as they are, of a column of a CSV file whose first column is the time."""
     header, rows = read_csv(path, "table of points")
     if column not in header:
         raise InputError(f'{path}: expected the column "{column}"', quoted(map(shown, header)))
@@ -201,13 +195,11 @@ POINTS = 60  # of that curve
 
 
 def motor_limits(results: Results, figure: FigureRecord) -> Array:
-    """Return the limit curves (n, 2) of the motor of a torque-speed diagram; see `limit_curves`.
-
-    Of several coordinates of a joint each has its limits: those of the one that the first curve is of, "…/moment[1]".
-    """
+    """Return the limits (n, 2) of a motor, speeds and moments in the units of the diagram; see `limit_curves`."""
     assert figure.joint is not None
     points = [curve_points(results, curve, figure.scale) for curve in figure.curves]
     speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
+    # Each coordinate of a joint has its limits: those of the one that the first curve is of, "…/moment[1]".
     number = int(figure.curves[0].data.partition("[")[2].rstrip("]") or 0)
     limits = [coordinate.limits for coordinate in joint_coordinates(results.scene, figure.joint)]
     return limit_curves(limits[number] if number < len(limits) else MotorLimits(), speed, moment)
@@ -216,8 +208,7 @@ def motor_limits(results: Results, figure: FigureRecord) -> Array:
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
     """Return the bounds |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max: (n, 2) speeds and moments, NaN between pieces.
 
-    In all four quadrants; where no limit ends a curve, it goes as far as the data, `speed` and `moment` at most, ask
-    for. Empty without limits.
+    Units are those of `speed` and `moment`, the largest of the data, as far as which curves go that no limit ends.
     """
     power = limits.power if np.isfinite(limits.power) else 0.0  # without that limit nothing asks for more than the data
     speed_end = limits.speed if np.isfinite(limits.speed) else MARGIN * max(speed, power / limits.moment, 1e-300)

@@ -12,27 +12,22 @@ from ...results.file import Results
 from ...results.joints import Coordinate, joint_coordinates
 from .shared import Curve, FigureRecord, bending_points, both_ways, curves_of, file_name, members
 
-SNAPSHOTS = 5
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn; of the largest modal coordinates and forces
 SEEN = 5e-3  # of the largest: smaller components of a deflection, differences of a voltage, cannot be seen
 TOGETHER = 2  # runs of which a figure has all components
 AXES = "xyz"
 ABOUT = {"mx": "about x", "my": "about y", "mz": "about z"}
-ENERGIES = ("kinetic", "strain", "gravitational")
 
 
 def main_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """Robot, paths, motors, largest deflections, stresses, voltages, modes and first response of linear models.
-
-    Analyses are drawn over each other.
-    """
+    """Return robot, paths, motors, largest deflections, stresses, voltages, modes, first response of linear models."""
     return _drawn(results, MAIN)
 
 
 def standard_figures(results: Results, runs: int | None = None) -> tuple[FigureRecord, ...]:
-    """The main figures, then angles, modes, forces, reactions, energies, other points and responses.
+    """Return the main figures, then angles, modes, forces, reactions, energies, other points and responses.
 
-    `runs`: that figures of several files have together.
+    `runs`: so many analyses of several files are drawn together.
     """
     main = _drawn(results, MAIN, runs)
     return main + tuple(record for record in _drawn(results, OTHERS, runs) if record not in main)
@@ -49,7 +44,7 @@ def _drawn(results: Results, of: Figures, runs: int | None = None) -> tuple[Figu
 
 
 def _apart(record: FigureRecord, runs: int | None) -> list[FigureRecord]:
-    """A figure for each component, which ends the labels of its curves, where many runs have several."""
+    """A figure for each component, the end of the labels of its curves, where many runs have several."""
     parts: dict[str, list[Curve]] = {}
     for curve in record.curves:
         run, comma, axis = curve.label.rpartition(", ")
@@ -78,7 +73,7 @@ def _configurations(results: Results) -> Iterator[FigureRecord]:
     moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
     for analysis in [*moving, *results.analyses][:1]:
         outputs = results.time(analysis)
-        snapshots = np.linspace(outputs[0], outputs[-1], SNAPSHOTS if len(outputs) > 1 else 1)
+        snapshots = np.linspace(outputs[0], outputs[-1], 5 if len(outputs) > 1 else 1)
         name, title = file_name("configurations", analysis), f"robot postures, {analysis}"
         times = tuple(map(float, snapshots))
         yield FigureRecord(name=name, title=title, kind="configurations", analysis=analysis, times=times)
@@ -140,7 +135,7 @@ def _largest_deflections(results: Results) -> Iterator[FigureRecord]:
         size = max(np.abs(results[curve.data]).max() for curve in curves_of(results, f"points/{point}/deflection"))
         body = point.split(".")[0]
         largest[body] = max(largest.get(body, (0.0, "")), (float(size), point))
-    yield from _deflections(results, [point for _, point in largest.values()])
+    return _deflections(results, [point for _, point in largest.values()])
 
 
 def _deflections(results: Results, points: Iterable[str] | None = None) -> Iterator[FigureRecord]:
@@ -187,9 +182,9 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
                 continue
             components = _components(results, group)
             for k, component in enumerate(components):
-                several = f", {ABOUT.get(component, component)}" if len(components) > 1 else ""
+                axis = f", {ABOUT.get(component, component)}" if len(components) > 1 else ""
                 is_force = component in AXES if "point" in trajectory else slides
-                (forces if is_force else moments).append(Curve(data=f"{group}/force[{k}]", label=analysis + several))
+                (forces if is_force else moments).append(Curve(data=f"{group}/force[{k}]", label=analysis + axis))
         for kind, what, unit, curves in (
             ("force", "force", "N", forces),
             ("path_moment" if "point" in trajectory else "force", "torque", "N·m", moments),
@@ -203,19 +198,16 @@ def _components(results: Results, group: str) -> list[str]:
 
 def _actuators(results: Results) -> Iterator[FigureRecord]:
     """What drives the robot: its motors, or without any the forces along its trajectories."""
-    motors = list(_motors(results))
-    yield from motors or _trajectory_forces(results)
-
-
-def _motors(results: Results) -> Iterator[FigureRecord]:
+    motors = list[FigureRecord]()
     for joint, coordinate in _coordinates(results):
         label = joint + coordinate.label
         limit = coordinate.limits.moment
         driven = curves_of(results, f"joints/{joint}/moment", coordinate.column)
         limits = both_ways(limit) if np.isfinite(limit) else ()
-        yield from _histories(("moment", label), f"motor of joint {label}", driven, _force(coordinate), limits=limits)
+        motors += _histories(("moment", label), f"motor of joint {label}", driven, _force(coordinate), limits=limits)
         if np.isfinite([coordinate.limits.speed, coordinate.limits.power]).any():
-            yield from _torque_speed(results, joint, coordinate)
+            motors += _torque_speed(results, joint, coordinate)
+    yield from motors or _trajectory_forces(results)
 
 
 def _joints(results: Results) -> Iterator[FigureRecord]:
@@ -264,7 +256,7 @@ def _stresses(results: Results) -> Iterator[FigureRecord]:
 
 def _energies(results: Results) -> Iterator[FigureRecord]:
     for analysis in results.analyses:
-        names = ((kind, f"{analysis}/energy/{kind}") for kind in ENERGIES)
+        names = ((kind, f"{analysis}/energy/{kind}") for kind in ("kinetic", "strain", "gravitational"))
         curves = (Curve(data=data, label=kind) for kind, data in names if results.has(data))
         yield from _histories(("energy", analysis), f"energies, {analysis}", curves, "energy (J)")
 
@@ -298,30 +290,29 @@ def _linear(results: Results) -> Iterator[FigureRecord]:
         if results.has(f"{analysis}/linear"):
             name, title = file_name("modes", analysis), f"modes, {analysis}"
             yield FigureRecord(name=name, title=title, kind="modes", analysis=analysis)
-        yield from islice(_responses_of(results, analysis), 1)
+            yield from islice(_responses_of(results, analysis), 1)
 
 
 def _responses(results: Results) -> Iterator[FigureRecord]:
     for analysis in results.analyses:
-        yield from islice(_responses_of(results, analysis), 1, None)
+        if results.has(f"{analysis}/linear"):
+            yield from islice(_responses_of(results, analysis), 1, None)
 
 
 def _responses_of(results: Results, analysis: str) -> Iterator[FigureRecord]:
     """How points and joints respond to each motor and to the first patch of each layout."""
-    if not results.has(f"{analysis}/linear"):
-        return
     attributes = results.attributes(f"{analysis}/linear")
     inputs, outputs = ([str(name) for name in attributes[key]] for key in ("input_names", "output_names"))
     for source in inputs:
         is_first = source.startswith("joint/") or (source.startswith("pzt/") and source.endswith("/1"))
-        seen = [name for name in outputs if name.startswith("point/") or name == source]
+        seen = tuple((source, name) for name in outputs if name.startswith("point/") or name == source)
         if is_first and seen:
             yield FigureRecord(
                 name=file_name("bode", analysis, source.replace("/", "_")),
                 title=f"response to {source}, {analysis}",
                 kind="bode",
                 analysis=analysis,
-                transfers=tuple((source, name) for name in seen),
+                transfers=seen,
                 y_label="magnitude (m, rad per N·m, V)",
             )
 

@@ -16,15 +16,13 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import ScalarFormatter
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array, Integers, as_floats
 from ..projection import COLORS, View
 
 SIZE = (3.5, 2.7)  # inches: one column of a journal page
 
 MARKERS = ("s", "^", "o", "D", "v", "P", "X")
 DASHES = ("-", "--", "-.", ":")
-MARKERS_A_CURVE = 14
-TITLE_CHARACTERS = 52  # in a line
 LEGEND_CHARACTERS = 60  # in a line of a figure as wide as SIZE; 6 stand for the sample of a curve
 ORDERED = "viridis"  # for series with an order: patches along a link, configurations over time
 
@@ -54,7 +52,7 @@ class Ticks(ScalarFormatter):
     """Labels of ticks as plain text: the parser of formulas takes a seventh of the time to draw a figure."""
 
     def get_offset(self) -> str:
-        """The power of ten of all labels, "×10⁻⁵"."""
+        """Return the power of ten of all labels, "×10⁻⁵"."""
         return re.sub(r"1e([−\d]+)$", lambda power: "×10" + power[1].translate(SUPERSCRIPTS), super().get_offset())
 
 
@@ -67,7 +65,7 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
     """An empty figure with its axes."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
-    lines = [title] if "$" in title else textwrap.wrap(title, TITLE_CHARACTERS)  # no line ends within a formula
+    lines = [title] if "$" in title else textwrap.wrap(title, 52)  # no line ends within a formula
     axes.set_title("\n".join(lines), loc="left")
     axes.locator_params(axis="x", nbins=6)
     for axis in (axes.xaxis, axes.yaxis):
@@ -76,13 +74,13 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
 
 
 def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
-    """Return the style of the k-th curve with `points` points: sparse markers and dashes distinguish equal curves.
+    """Return the style of the k-th curve of so many points: sparse markers and dashes distinguish equal curves.
 
     A curve that is `alone` has none: on one that rings they look like samples.
     """
     if alone and points > 1:
         return {"color": COLORS[k % len(COLORS)]}
-    every = max(1, points // MARKERS_A_CURVE)
+    every = max(1, points // 14)  # so many markers
     return {
         "color": COLORS[k % len(COLORS)],
         "linestyle": DASHES[k % len(DASHES)],
@@ -99,7 +97,7 @@ def shades(count: int) -> list[Any]:
 
 
 def literal(figure: Figure) -> Figure:
-    """The figure with `$`, `_`, `^` and backslashes of its titles and labels drawn as they are: names are no formulas.
+    """Return the figure with `$`, `_`, `^` and backslashes of its texts drawn as they are: names are no formulas.
 
     Figures that users describe themselves may have formulas; ticks always have.
     """
@@ -112,10 +110,7 @@ def literal(figure: Figure) -> Figure:
 
 
 def legend(axes: Axes) -> None:
-    """Draw a legend below the axes, in as many columns as fit.
-
-    One curve needs none.
-    """
+    """Draw a legend below the axes, in as many columns as fit; none of a single curve."""
     handles, labels = axes.get_legend_handles_labels()
     figure = axes.get_figure(root=True)
     if figure is not None and len(labels) > 1:
@@ -136,24 +131,24 @@ def projected(points: Array, view: View) -> Array:
 
 
 def normals(points: Array, cells: Integers) -> Array:
-    """Return unit normals (c, 3) of triangles or quadrilaterals; zero for cells without area."""
+    """Return unit normals (c, 3) of triangles or quadrilaterals `cells` (c, v) on points (p, 3); zero without area."""
     first = points[cells[:, 0]]
     areas = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
-    return np.asarray(areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300))
+    return as_floats(areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300))
 
 
 def sides(cells: Integers) -> Integers:
-    """Return the sides (c v, 2) of all cells as pairs of points; shared sides appear twice."""
-    return np.asarray(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), dtype=np.int64)
+    """Return the sides (c v, 2) of all cells (c, v) as pairs of points; shared sides appear twice."""
+    return np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
 
 
 def lit(points: Array, cells: Integers, colors: Array, view: View) -> Array:
-    """Return colors (c, 3) of cells in a light that comes from above the viewer.
+    """Return colors (c, 3), red, green, blue from 0 to 1, of cells in a light from above the viewer.
 
-    Which way the normals of the cells point is unknown, and hidden cells are painted over.
+    Normals of cells may point either way; hidden cells are painted over.
     """
     light = (view.viewer + view.up) / np.linalg.norm(view.viewer + view.up)
-    return np.asarray(colors * (DARKEST + (1.0 - DARKEST) * np.abs(normals(points, cells) @ light))[:, None])
+    return colors * (DARKEST + (1.0 - DARKEST) * np.abs(normals(points, cells) @ light))[:, None]
 
 
 def directions(axes: Axes, size: float, view: View) -> None:
@@ -175,8 +170,6 @@ def directions(axes: Axes, size: float, view: View) -> None:
 
 
 FACING = 1e-3  # component of a unit normal towards the viewer from which on a cell is drawn
-FILL = 0.2  # opacity of bodies: what they cover stays visible
-ARROWS = 0.07  # of what is drawn: length of the arrows along x, y, z
 
 
 class SceneAxes:
@@ -191,12 +184,12 @@ class SceneAxes:
         self.drawn: list[Array] = []
 
     def plot(self, points: Array, *style: str, **options: Any) -> None:
-        """Draw a line through points (n, 3), m, or markers."""
+        """Draw a line through points (n, 3), m, global axes, or markers."""
         self.drawn.append(seen := projected(points, self.view))
         self.axes.plot(*seen.T, *style, **options)
 
     def body(self, points: Array, cells: Integers, color: Any, width: float = 1.5) -> None:
-        """Draw points (p, 3), m, and their cells: lines, or an opaque surface."""
+        """Draw cells (c, v) on points (p, 3), m, global axes: lines (v = 2), or an opaque surface."""
         self.drawn.append(seen := projected(points, self.view))
         if cells.shape[1] == 2:
             self._lines(seen[cells], color, width)
@@ -206,7 +199,7 @@ class SceneAxes:
             count, corners = front.shape
             codes = np.tile([Path.MOVETO, *[Path.LINETO] * (corners - 1), Path.CLOSEPOLY], count)
             covered = Path(seen[np.column_stack([front, front[:, :1]])].reshape(-1, 2), codes)
-            self.axes.add_artist(PathPatch(covered, color=color, alpha=FILL, linewidth=0))
+            self.axes.add_artist(PathPatch(covered, color=color, alpha=0.2, linewidth=0))
             self._lines(seen[_ends(front)], color, 0.5 * width)
 
     def _lines(self, ends: Array, color: Any, width: float) -> None:
@@ -227,10 +220,10 @@ class SceneAxes:
             self.axes.tick_params(labelsize=label_size)
         else:
             self.axes.set_axis_off()
-            directions(self.axes, ARROWS * float(np.ptp(points, axis=0).max()), self.view)
+            directions(self.axes, 0.07 * float(np.ptp(points, axis=0).max()), self.view)
 
 
 def _ends(cells: Integers) -> Integers:
     """(e, 2) the edges that one cell alone has: around what cells cover, and around their openings."""
     edges, number = sides(cells), int(cells.max(initial=0)) + 1
-    return np.asarray(edges[~np.isin(edges @ [number, 1], edges @ [1, number])], dtype=np.int64)
+    return edges[~np.isin(edges @ [number, 1], edges @ [1, number])]

@@ -32,7 +32,7 @@ class AnalysisRun(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Unique name of the run on the page."""
+        """Return the unique name of the run on the page."""
         return f"{self.source}: {self.analysis}" if self.source else self.analysis
 
 
@@ -45,22 +45,18 @@ def labelled(files: Sequence[Results]) -> list[tuple[Results, str]]:
 
 
 def distinct_parts(paths: Sequence[Path]) -> list[str]:
-    """Strip the common start and end of all paths: `c/beam/r.h5`, `c/solid/r.h5` give `beam`, `solid`.
-
-    The same file twice gets numbers.
-    """
+    """Strip the common start and end of all paths: `c/beam/r.h5`, `c/solid/r.h5` give `beam`, `solid`."""
     parts = [Path(abspath(path)).parts for path in paths]  # without ".."
     shortest = min(len(p) for p in parts)
     start = next((k for k in range(shortest) if len({p[k] for p in parts}) > 1), shortest - 1)
     end = next((k for k in range(shortest - start) if len({p[-1 - k] for p in parts}) > 1), 0)
     labels = ["/".join(p[start : len(p) - end]) for p in parts]
-    if len(set(labels)) == len(labels):
-        return labels
-    return [f"{label} ({k + 1})" for k, label in enumerate(labels)]
+    is_unique = len(set(labels)) == len(labels)  # the same file twice gets numbers
+    return labels if is_unique else [f"{label} ({k + 1})" for k, label in enumerate(labels)]
 
 
 def runs(files: Sequence[Results]) -> list[AnalysisRun]:
-    """Every analysis of every file, in order."""
+    """Return every analysis of every file, in order."""
     return [
         AnalysisRun(results, analysis, source) for results, source in labelled(files) for analysis in results.analyses
     ]
@@ -69,6 +65,7 @@ def runs(files: Sequence[Results]) -> list[AnalysisRun]:
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 
 FAR = 10  # times the largest value of a chart: limits beyond it would leave its curves flat
+LIMIT_LINE = {"color": LIMIT, "dash": "dash", "width": 1.5}
 DASHES = ("solid", "dash", "dashdot", "dot")
 # Violet to green (viridis, its dark end brighter: dark pages), for series with an order: patches along a link, modes.
 SHADES = np.array([[165, 90, 200], [65, 115, 175], [33, 145, 140], [94, 201, 98]], dtype=float)
@@ -91,7 +88,7 @@ class Chart:
     top: float = field(default=0.0, init=False)
 
     def add(self, label: str, x: Array, y: Array, **style: Any) -> None:
-        """Add a curve y(x)."""
+        """Add a curve y (n,) over x (n,), in the units of the labels."""
         if "visible" not in style:
             self.top = max(self.top, float(np.nanmax(np.abs(y), initial=0.0)))
         mode = "lines" if len(y) > 1 else "markers"
@@ -106,7 +103,7 @@ class Chart:
         lines = [
             {
                 "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": limit, "y1": limit,
-                "line": _limit_style(), "showlegend": limit == self.limits[0], "name": f"limits {texts}",
+                "line": LIMIT_LINE, "showlegend": limit == self.limits[0], "name": f"limits {texts}",
                 "legendgroup": "limits", "visible": True if abs(limit) < FAR * self.top else "legendonly",
             }
             for limit in self.limits
@@ -132,7 +129,7 @@ def plain(text: str) -> str:
 
 
 def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
-    """Plotly's typed array: base64 of little-endian numbers, row by row; "f4" keeps 7 digits."""
+    """Return values (n,) or (n, m) as Plotly's typed array: base64 of little-endian numbers; "f4" keeps 7 digits."""
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     entry = {"dtype": kind, "bdata": b64encode(array.tobytes()).decode("ascii")}
     if array.ndim == 2:
@@ -140,18 +137,14 @@ def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
     return entry
 
 
-def _limit_style() -> dict[str, Any]:
-    return {"color": LIMIT, "dash": "dash", "width": 1.5}
-
-
 def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
     """Return width, color and dashes of the k-th curve of a chart, such that no curve hides another.
 
     The k-th color unless `color` is that of a run, which then has `part` curves before this one.
     """
-    color = k if color is None else color
-    line = {"color": COLORS[color % len(COLORS)], "dash": DASHES[(color // len(COLORS) + part) % len(DASHES)]}
-    return {"line": line | {"width": max(1.2, 3.6 * 0.75**k)}}
+    turns, number = divmod(k if color is None else color, len(COLORS))
+    dash = DASHES[(turns + part) % len(DASHES)]
+    return {"line": {"color": COLORS[number], "dash": dash, "width": max(1.2, 3.6 * 0.75**k)}}
 
 
 def shades(count: int) -> list[str]:
@@ -162,12 +155,11 @@ def shades(count: int) -> list[str]:
 
 
 def kept_outputs(values: Array) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """Return indices of points to draw, of (T,) values: all, or the smallest and largest of each stretch."""
+    """Return indices (k,) of `values` (T,), of any unit, to draw: all, or the smallest and largest of each stretch."""
     if len(values) <= MAX_POINTS or np.isnan(values).any():
         return np.arange(len(values))
     edges = np.linspace(0, len(values), MAX_POINTS // 2, dtype=np.intp)
-    stretches = [np.arange(a, b) for a, b in pairwise(edges)]
-    extremes = [(s[np.argmin(values[s])], s[np.argmax(values[s])]) for s in stretches]
+    extremes = [(a + np.argmin(values[a:b]), a + np.argmax(values[a:b])) for a, b in pairwise(edges)]
     return np.unique(np.array([0, len(values) - 1, *np.ravel(extremes)], dtype=np.intp))
 
 
@@ -181,9 +173,9 @@ def _coordinates(x: Array, y: Array) -> dict[str, Any]:
 
 
 def history_charts(files: Sequence[Results]) -> list[Chart]:
-    """Path errors, paths, angles, deflections, forces, moments, voltages and energies.
+    """Return path errors, paths, angles, deflections, forces, moments, voltages and energies of all analyses.
 
-    Beside others, a run that diverged waits for a click on its name: they would be flat.
+    Beside others, one that diverged waits for a click on its name: they would be flat.
     """
     charts = _path_errors(files)
     has_errors = bool(charts)
@@ -213,7 +205,7 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
                     line = {"color": color, "width": 1, "dash": DASHES[number % len(DASHES)]}
                     chart.add(f"{label} {k + 1}", x, values[:, k], line=line)
             if record.joint is not None and len(limits := motor_limits(results, record)):
-                chart.add(f"{source}: limits" if source else "limits", *limits.T, line=_limit_style())
+                chart.add(f"{source}: limits" if source else "limits", *limits.T, line=LIMIT_LINE)
     return list(charts.values())
 
 
@@ -281,6 +273,6 @@ def _path_errors(files: Sequence[Results]) -> dict[str, Chart]:
 
 
 def path_error(run: AnalysisRun, target: PointTarget) -> Array:
-    """Distance (T,) in m between a point and its target, in the components that the target has."""
+    """Return the distance (T,), m, between a point and its target, in the components that the target has."""
     reached = run.results.data(f"{run.analysis}/points/{target.point}/position")[:, target.columns]
     return np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, Integers
+from ...common.arrays import Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ..figures.shared import file_name
 from ..motion import (
     Marker,
     MovingBody,
-    PointTarget,
     ground_places,
     joint_markers,
     largest_deflection,
@@ -29,11 +28,8 @@ from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LE
 from ..shapes import AMPLITUDE, body_surface, coarse_surface, coarsened, drawn_mode, triangles_of
 from .charts import AnalysisRun, Chart, encoded, plain, shades
 
-MAX_FRAMES = 2000
 ABOVE = 0.1  # of the mechanism's size: how far before the bodies of a planar scene its joints and paths are drawn
 MAX_TRIANGLES = 4000  # of a body
-PLAYING_SECONDS = 8.0
-SLOWEST = 1e-3  # the slider's end
 
 
 def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
@@ -51,13 +47,7 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = float((high - low).max()) or 1.0
     entries = [
-        {
-            "label": plain(run.label),
-            "color": COLORS[k % len(COLORS)],
-            "visible": k in shown,
-            "time": encoded(run.results.time(run.analysis)[_frames(run)]),
-            **_run_data(run, moved[k], size, notes),
-        }
+        {"color": COLORS[k % len(COLORS)], "visible": k in shown, **_run_data(run, moved[k], size, notes)}
         for k, run in enumerate(runs)
     ]
     end = max(float(runs[k].results.time(runs[k].analysis)[-1]) for k in shown)
@@ -66,7 +56,7 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
     data = {
         "runs": entries,
         "exaggeration": visible_exaggeration(size, largest_deflection(seen)),
-        "speed": max(end / PLAYING_SECONDS, SLOWEST),
+        "speed": max(end / 8.0, 1e-3),  # plays for 8 s; the slider's end
         "range": [[float(low[i] - margin[i]), float(high[i] + margin[i])] for i in range(3)],
         "size": size,
         "is_plane": is_plane,
@@ -82,30 +72,36 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
 
 def _frames(run: AnalysisRun) -> Indices:
     outputs = len(run.results.time(run.analysis))
-    return np.unique(np.linspace(0, outputs - 1, min(outputs, MAX_FRAMES)).astype(np.intp))
+    return np.unique(np.linspace(0, outputs - 1, min(outputs, 2000)).astype(np.intp))
 
 
 def _run_data(run: AnalysisRun, bodies: list[MovingBody], size: float, notes: list[str]) -> dict[str, Any]:
-    wanted = targets(run.results, run.analysis)
+    wanted, frames = targets(run.results, run.analysis), _frames(run)
+    shapes = [coarse_surface(run.results, body, size, MAX_TRIANGLES, notes) for body in bodies]
+    paths = list[dict[str, Any]]()
+    for target in wanted:
+        paths.append({"name": plain(target.point)})
+        if target.columns == run.results.space.translations:
+            paths[-1]["target"] = encoded(target.places[frames[frames < len(target.wanted)]])
     return {
-        "bodies": [_body_data(run, body, size, notes) for body in bodies],
+        "label": plain(run.label),
+        "time": encoded(run.results.time(run.analysis)[frames]),
+        "bodies": [
+            {
+                "name": plain(body.name),
+                "position": encoded(body.position),
+                "quaternion": encoded(body.orientation),
+                "shift": encoded(body.shift),
+                "points": encoded(shape.points),
+                "shapes": encoded(shape.shapes.reshape(len(shape.points), -1)),
+                "p": encoded(shape.coordinates),
+                "triangles": encoded(shape.cells, "i4"),
+            }
+            for body, shape in zip(bodies, shapes, strict=True)
+        ],
         "joints": [_marker_data(marker) for marker in joint_markers(run.results.scene, bodies)],
         "tools": [_marker_data(marker) for marker in tool_markers(wanted, bodies)],
-        "paths": [_path_data(run, target) for target in wanted],
-    }
-
-
-def _body_data(run: AnalysisRun, body: MovingBody, size: float, notes: list[str]) -> dict[str, Any]:
-    shape = coarse_surface(run.results, body, size, MAX_TRIANGLES, notes)
-    return {
-        "name": plain(body.name),
-        "position": encoded(body.position),
-        "quaternion": encoded(body.orientation),
-        "shift": encoded(body.shift),
-        "points": encoded(shape.points),
-        "shapes": encoded(shape.shapes.reshape(len(shape.points), -1)),
-        "p": encoded(shape.coordinates),
-        "triangles": encoded(shape.cells, "i4"),
+        "paths": paths,
     }
 
 
@@ -121,25 +117,14 @@ def _marker_data(marker: Marker) -> dict[str, Any]:
     }
 
 
-def _path_data(run: AnalysisRun, target: PointTarget) -> dict[str, Any]:
-    data: dict[str, Any] = {"name": plain(target.point)}
-    if target.columns == run.results.space.translations:
-        frames = _frames(run)
-        data["target"] = encoded(target.places[frames[frames < len(target.wanted)]])
-    return data
-
-
-# What a mode of a family does most: the translation or rotation of which axis, and how the chart calls it.
+# What a mode of a family does most: translation (0) or rotation (1) of which axis, and how the chart calls it.
 MOTION = {
-    "in-plane-bending": ("translation", 1, "y"),
-    "out-of-plane-bending": ("translation", 2, "z"),
-    "axial": ("translation", 0, "x"),
-    "torsion": ("rotation", 0, "twist"),
+    "in-plane-bending": (0, 1, "y"),
+    "out-of-plane-bending": (0, 2, "z"),
+    "axial": (0, 0, "x"),
+    "torsion": (1, 0, "twist"),
 }
 
-CURVE_POINTS = 201
-LINK_TRIANGLES = 8000
-MODES = 12  # of a link at most, on its surface: each costs 6 bytes a point
 FINEST = 32767  # a displacement of 1
 
 
@@ -153,12 +138,12 @@ class ModesOnPage:
 
     @property
     def rows(self) -> Iterator[tuple[Any, ...]]:
-        """Number, family, frequency (Hz) and damping ratio of each mode."""
+        """Return number, family, frequency (Hz) and damping ratio of each mode."""
         return zip(count(1), self.body.family, self.body.frequency, self.body.damping_ratio)
 
 
 def link_modes(runs: Sequence[AnalysisRun]) -> list[ModesOnPage]:
-    """The modal bodies behind the runs, each once; those whose file is not found are left out."""
+    """Return the modal bodies behind the runs, each once, without those whose file is missing."""
     users: dict[str, list[str]] = {}
     bodies: dict[str, ModalBody] = {}
     for run in runs:
@@ -176,45 +161,42 @@ def link_modes(runs: Sequence[AnalysisRun]) -> list[ModesOnPage]:
 
 def _charts(body: ModalBody, prefix: str) -> list[Chart]:
     charts = []
-    x = np.linspace(body.stations.position[0, 0], body.stations.position[-1, 0], CURVE_POINTS)
-    places = [body.interpolate(at) for at in x]
+    x = np.linspace(body.stations.position[0, 0], body.stations.position[-1, 0], 201)
+    _, *motions = body.along_axis(x)
     for family in dict.fromkeys(body.family):
-        kind, axis, label = MOTION.get(family, ("translation", 1, "y"))
-        shapes = np.array([getattr(place, kind) for place in places])
+        kind, axis, label = MOTION.get(family, (0, 1, "y"))
+        shapes = motions[kind]
         members = [k for k, other in enumerate(body.family) if other == family]
         chart = Chart(file_name(prefix, family), f"{body.name}: {family}", f"{label}, largest = 1", x_label="x (m)")
         for k, color in zip(members, shades(len(members)), strict=True):
-            shape = shapes[:, axis, k]
-            largest = float(np.max(np.abs(shape)))
-            line = {"color": color, "width": 1.5}
-            label = f"mode {k + 1}: {body.frequency[k]:.5g} Hz"
-            chart.add(label, x, shape / (largest or 1.0), line=line)
+            shape, label = shapes[:, axis, k], f"mode {k + 1}: {body.frequency[k]:.5g} Hz"
+            chart.add(label, x, shape / (np.abs(shape).max() or 1.0), line={"color": color, "width": 1.5})
         charts.append(chart)
     return charts
 
 
 def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
-    """Return surfaces with mode shapes as data for the page's script; links without known surface are omitted."""
-    surfaces = [(link, body_surface(link.body)) for link in links]
-    entries = [
-        _entry(link, mesh.points, triangles_of(mesh.cells), mesh.mode_shapes)
-        for link, mesh in surfaces
-        if mesh.cells.shape[1] > 2
-    ]
+    """Return surfaces with mode shapes as data for the page's script; links without known surface are omitted.
+
+    Of each, points (p, 3), m, triangles (t, 3), and modes (m, p, 3) of which the largest displacement is `FINEST`.
+    """
+    entries = []
+    for link in links:
+        body, mesh = link.body, body_surface(link.body)
+        if mesh.cells.shape[1] == 2:
+            continue
+        kept, triangles = coarsened(mesh.points, triangles_of(mesh.cells), 8000)
+        shown = min(body.mode_count, 12)  # each costs 6 bytes a point
+        # Scaled on all points, so that a mode does not depend on which of them are kept.
+        modes = [drawn_mode(mesh.mode_shapes[:, :, k], 1.0).displacement[kept] / AMPLITUDE for k in range(shown)]
+        entries.append(
+            {
+                "label": ", ".join(link.labels),
+                "points": encoded(mesh.points[kept]),
+                "triangles": encoded(triangles, "i4"),
+                "modes": encoded(np.round(FINEST * np.array(modes)), "i2"),
+                "names": [f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(shown)],
+                "amplitude": AMPLITUDE * body.length / FINEST,
+            }
+        )
     return {"links": entries, "up": UP.tolist(), "viewer": VIEWER.tolist()}
-
-
-def _entry(link: ModesOnPage, points: Array, triangles: Integers, shapes: Array) -> dict[str, Any]:
-    """Points (p, 3) in m, triangles (t, 3), and modes (m, p, 3) of which the largest displacement is 1."""
-    body, (kept, triangles) = link.body, coarsened(points, triangles, LINK_TRIANGLES)
-    shown = min(body.mode_count, MODES)
-    # Scaled on all points, so that a mode does not depend on which of them are kept.
-    modes = [drawn_mode(shapes[:, :, k], 1.0).displacement[kept] / AMPLITUDE for k in range(shown)]
-    return {
-        "label": ", ".join(link.labels),
-        "points": encoded(points[kept]),
-        "triangles": encoded(triangles, "i4"),
-        "modes": encoded(np.round(FINEST * np.array(modes)), "i2"),
-        "names": [f"{k + 1}: {body.frequency[k]:.5g} Hz, {body.family[k]}" for k in range(shown)],
-        "amplitude": AMPLITUDE * body.length / FINEST,
-    }

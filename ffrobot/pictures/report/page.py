@@ -35,19 +35,11 @@ class Table(NamedTuple):
     rows: Sequence[tuple[str, ...]]
 
 
-def _named(first: str, rows: Iterable[tuple[str, Cells]]) -> Table:
-    """Of rows by heading, below `first` the names of their runs."""
-    named = list(rows)
+def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], runs: Sequence[AnalysisRun]) -> Table:
+    """Rows by heading, below `first` the names of their runs."""
+    named = [(run.label, cells) for run in runs for cells in cells_of(run.results, run.analysis)]
     heading = (first, *(key.replace("\n", " ") for key in named[0][1])) if named else ()
     return Table(heading, [(name, *cells.values()) for name, cells in named])
-
-
-def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], runs: Sequence[AnalysisRun]) -> Table:
-    return _named(first, ((run.label, cells) for run in runs for cells in cells_of(run.results, run.analysis)))
-
-
-def _analyses(results: Results, analysis: str) -> Iterator[Cells]:
-    yield analysis_cells(results, results.verdict[analysis])
 
 
 def _loops(results: Results, analysis: str) -> Iterator[Cells]:
@@ -56,12 +48,8 @@ def _loops(results: Results, analysis: str) -> Iterator[Cells]:
 
 
 def _warnings_table(runs: Sequence[AnalysisRun]) -> Table:
-    rows = [
-        (run.label, kind, text)
-        for kind, attribute in (("warning", "warnings"), ("note", "notes"))
-        for run in runs
-        for text in getattr(run.results, attribute).get(run.analysis, ())
-    ]
+    rows = [(run.label, "warning", text) for run in runs for text in run.results.warnings.get(run.analysis, ())]
+    rows += [(run.label, "note", text) for run in runs for text in run.results.notes.get(run.analysis, ())]
     return Table(("analysis", "", "text"), rows)
 
 
@@ -85,30 +73,28 @@ def _bending_table(runs: Sequence[AnalysisRun]) -> Table:
 
 
 def peaks_table(runs: Sequence[AnalysisRun]) -> Table:
-    """Table of the largest absolute values of the most read quantities, in every run."""
-    rows = [(run.label, what, value, f"{at:.4g}") for run in runs for what, value, at in _peaks(run)]
+    """Return a table of the largest absolute values of the most read quantities, in every run."""
+    rows = []
+    for run in runs:
+        results, analysis, peaks = run.results, run.analysis, list[tuple[str, str, float]]()
+        for target in targets(results, analysis):
+            error = path_error(run, target)
+            most, at = largest(results.time(analysis)[: len(error)], error)
+            peaks.append((f"distance of {target.point} from its path", millimeters(most), at))
+        for joint in (keys["name"] for keys in results.scene.get("joint", [])):
+            for coordinate in joint_coordinates(results.scene, joint):
+                if results.has(moment := f"{analysis}/joints/{joint}/moment"):
+                    peak, at = results.peak(moment + coordinate.column)
+                    name = f"motor of joint {joint}{coordinate.label}"
+                    peaks.append((name, f"{number(peak)} {coordinate.force_unit}", at))
+        for point in bending_points(results, analysis):
+            deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
+            peaks.append((f"deflection of {point}", millimeters(deflection), at))
+        rows += [(run.label, what, value, f"{at:.4g}") for what, value, at in peaks]
     return Table(("analysis", "largest", "value", "at (s)"), rows)
 
 
-def _peaks(run: AnalysisRun) -> Iterator[tuple[str, str, float]]:
-    """(quantity, its largest size, when it has that) of a run."""
-    results, analysis = run.results, run.analysis
-    for target in targets(results, analysis):
-        error = path_error(run, target)
-        most, at = largest(results.time(analysis)[: len(error)], error)
-        yield f"distance of {target.point} from its path", millimeters(most), at
-    for joint in (keys["name"] for keys in results.scene.get("joint", [])):
-        for coordinate in joint_coordinates(results.scene, joint):
-            if results.has(moment := f"{analysis}/joints/{joint}/moment"):
-                name = f"motor of joint {joint}{coordinate.label}"
-                peak, at = results.peak(moment + coordinate.column)
-                yield name, f"{number(peak)} {coordinate.force_unit}", at
-    for point in bending_points(results, analysis):
-        deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
-        yield f"deflection of {point}", millimeters(deflection), at
-
-
-def origins_table(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> Table:
+def _origins_table(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> Table:
     """Files, hashes and versions that the page rests on."""
     rows = []
     for results, source in labelled(files):
@@ -162,7 +148,7 @@ def _zeros_table(runs: Sequence[AnalysisRun]) -> Table:
 
 
 def placements_table(runs: Sequence[AnalysisRun]) -> Table:
-    """Return optimum and evenly spaced patch positions of placement analyses."""
+    """Return a table of optimum and evenly spaced patch positions of placement analyses."""
     rows = []
     for run in runs:
         group = f"{run.analysis}/placement"
@@ -177,7 +163,7 @@ def placements_table(runs: Sequence[AnalysisRun]) -> Table:
 
 
 TABLES: Mapping[str, Callable[[Sequence[AnalysisRun]], Table]] = {
-    "analyses": partial(_of_cells, "analysis", _analyses),
+    "analyses": partial(_of_cells, "analysis", lambda results, name: [analysis_cells(results, results.verdict[name])]),
     "loops": partial(_of_cells, "closed loop", _loops),
     "zeros": _zeros_table,
     "placements": placements_table,
@@ -190,41 +176,36 @@ TABLES: Mapping[str, Callable[[Sequence[AnalysisRun]], Table]] = {
 """What the page calls them."""
 
 
-HERE = Path(__file__).parent
-OWN = ("page.js", "modes.js", "player.js", "mechanism.js", "page.css")  # what the template calls page_js, …
-
-
 def write_report(paths: Sequence[Path], path: Path) -> None:
     """Write a page about one results file, or several side by side, to `path`; an earlier report is replaced.
 
-    `paths` may have studies, too: their files, or folders of design commands. Raises `InputError` where a file is no
-    results file and no study, or `path` is a file of another kind, `SolveError` where the page cannot be
-    written or Plotly is not installed.
+    `paths` may have studies, too: their files, or folders of design commands.
+
+    Raises:
+        InputError: a file is no results file and no study, or `path` is a file of another kind.
+        SolveError: the page cannot be written, or Plotly is not installed.
     """
     check_ending(path, "output", (".html", ".htm"))
     files = {p: study_files(p) for p in paths}
     studies = [(file, read_study(file)) for p in paths for file in files[p]]
     with ExitStack() as stack:
         results = [stack.enter_context(Results(p)) for p in paths if not files[p]]
-        write_atomically(path, report(results, studies).encode(), "report")
-
-
-def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ()) -> str:
-    """The page as text."""
-    return page_of(_content(files, studies))
+        write_atomically(path, page_of(_content(results, studies)).encode(), "report")
 
 
 def page_of(content: Mapping[str, Any]) -> str:
-    """The template with its content; with Plotly where there are charts."""
+    """Return the page with its content, and with Plotly where there are charts."""
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
         from plotly.offline import get_plotlyjs, get_plotlyjs_version
     except ModuleNotFoundError as error:
         raise SolveError(f"a report needs {error.name}, which is not installed: pip install plotly jinja2") from None
+    here = Path(__file__).parent
     environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(here), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    own = {name.replace(".", "_"): (HERE / name).read_text(encoding="utf-8") for name in OWN}
+    files = (here / name for name in ("page.js", "modes.js", "player.js", "mechanism.js", "page.css"))
+    own = {file.name.replace(".", "_"): file.read_text(encoding="utf-8") for file in files}  # page_js, …
     versions = {"plotly_version": get_plotlyjs_version(), "ffrobot_version": VERSION}
     page = environment.get_template("page.html")
     return page.render(content, plotly_js=get_plotlyjs(), **own, **versions)
@@ -239,7 +220,7 @@ def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) ->
         "solved": bool(files),
         "studies": [_study_part(study) for _, study in studies],
         "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
-        "origins": origins_table(files, studies),
+        "origins": _origins_table(files, studies),
         "scenes": [(source or r.name, r.scene_text) for r, source in labelled(files)],
         **solved,
     }

@@ -20,7 +20,7 @@ from .study import LOOKS, Band, Bars, DesignAxis, Diagram, Look, Parallel, Point
 
 
 def write_diagrams(diagrams: Sequence[Diagram], folder: Path) -> list[Path]:
-    """A figure for each, as PNG and PDF; the files written."""
+    """Write a figure of each diagram as PNG and PDF into `folder`; returns the files."""
     with style():
         return [path for one in diagrams for path in write_figure(literal(draw(one)), folder, one.name)]
 
@@ -38,18 +38,21 @@ def draw(diagram: Diagram) -> Figure:
             return _draw_bars(diagram)
         case Parallel():
             return _draw_parallel(diagram)
+    figure, axes = new_axes(diagram.title)
+    axes.set_ylabel(diagram.y_label)
+    match diagram:
         case Band():
-            return _draw_band(diagram)
+            _draw_band(axes, diagram)
         case Progress():
-            return _draw_progress(diagram)
+            _draw_progress(axes, diagram)
         case Points():
-            return _draw_points(diagram)
+            _draw_points(axes, diagram)
+    legend(axes)
+    return figure
 
 
 MOST = 15  # the largest
-TICKS = 7  # intervals of an axis at most
 WIDTH, BAR, REST = 5.0, 0.22, 0.8  # inches: of the figure, of a bar, of title and axis
-ROOM = 0.2  # of the axis, beside the longest bars: for their numbers
 
 
 def _draw_bars(diagram: Bars) -> Figure:
@@ -73,7 +76,7 @@ def _draw_bars(diagram: Bars) -> Figure:
         )
         numbers = [_number(value, "+" if diagram.signed else "") for value in series.values[:MOST]]
         axes.bar_label(bars, numbers, padding=2, fontsize=7)
-    axes.margins(x=ROOM)
+    axes.margins(x=0.2)  # for the numbers of the longest bars
     axes.locator_params(axis="x", nbins=7)
     axes.set_yticks(range(len(labels)), labels)
     axes.tick_params(axis="y", length=0)
@@ -90,23 +93,19 @@ def _number(value: float | None, sign: str) -> str:
     return "none" if value is None else f"{value:{sign}.3g}".replace("-", "−") if value else "0"
 
 
-def _draw_band(band: Band) -> Figure:
-    figure, axes = new_axes(band.title)
-    axes.fill_between(
-        band.time, band.lowest, band.highest, color=COLORS[5], alpha=0.3, linewidth=0.0, label=band.worst_label
-    )
-    axes.fill_between(band.time, band.low, band.high, color=COLORS[4], alpha=0.7, linewidth=0.0, label=band.band_label)
+def _draw_band(axes: Axes, band: Band) -> None:
+    for low, high, color, alpha, label in (
+        (band.lowest, band.highest, COLORS[5], 0.3, band.worst_label),
+        (band.low, band.high, COLORS[4], 0.7, band.band_label),
+    ):
+        axes.fill_between(band.time, low, high, color=color, alpha=alpha, linewidth=0.0, label=label)
     axes.plot(band.time, band.median, color=COLORS[1], label="median")
     axes.plot(band.time, band.nominal, color=COLORS[6], linestyle=":", label="nominal values")
     axes.set_xlabel("time (s)")
-    axes.set_ylabel(band.y_label)
     axes.margins(x=0.0)
-    legend(axes)
-    return figure
 
 
-def _draw_progress(diagram: Progress) -> Figure:
-    figure, axes = new_axes(diagram.title)
+def _draw_progress(axes: Axes, diagram: Progress) -> None:
     number = np.arange(len(diagram.values))
     values = floats(diagram.values)
     axes.plot(number, floats(diagram.best), color=COLORS[0], drawstyle="steps-post", label="best so far")
@@ -122,26 +121,19 @@ def _draw_progress(diagram: Progress) -> Figure:
         axes.set_yscale("log")
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_xlabel("design, in the order of the search")
-    axes.set_ylabel(diagram.y_label)
-    legend(axes)
-    return figure
 
 
-def _draw_points(diagram: Points) -> Figure:
-    figure, axes = new_axes(diagram.title)
+def _draw_points(axes: Axes, diagram: Points) -> None:
     x, y = np.array(diagram.x), np.array(diagram.y)
     sure = np.array(diagram.sure, dtype=bool)
     axes.plot(x, y, color=COLORS[0])
     axes.plot(x[sure], y[sure], "o", color=COLORS[0])
     axes.plot(x[~sure], y[~sure], "o", color=COLORS[0], markerfacecolor="white")
     axes.set_xlabel(diagram.x_label)
-    axes.set_ylabel(diagram.y_label)
-    return figure
 
 
 AXIS_WIDTH, HEIGHT = 1.25, 3.4  # inches: of an axis, of the figure
 LETTERS, LINE = 18, 9  # of a name, in a line; points that a line takes
-FAINT = 0.35  # opacity of many lines
 
 
 def _draw_parallel(diagram: Parallel) -> Figure:
@@ -156,15 +148,15 @@ def _draw_parallel(diagram: Parallel) -> Figure:
     places = np.column_stack([axis.places for axis in diagram.axes])
     for state, look in LOOKS.items():
         for row in (k for k, one in enumerate(diagram.states) if one == state):
-            _line(axes, places[row], look, FAINT if state == "kept" and len(places) > 30 else 1.0)
+            _line(axes, places[row], look, 0.35 if state == "kept" and len(places) > 30 else 1.0)
     for k, axis in enumerate(diagram.axes):
         _axis(axes, k, axis)
-    samples = []
-    for state, look in LOOKS.items():
-        if state in diagram.states:
-            label = diagram.best_label if state == "best" else look.label
-            line = Line2D([], [], color=look.color, linestyle=look.dash, linewidth=look.width, label=label)
-            samples.append(line)
+    labels = {state: look.label for state, look in LOOKS.items()} | {"best": diagram.best_label}
+    samples = [
+        Line2D([], [], color=look.color, linestyle=look.dash, linewidth=look.width, label=labels[state])
+        for state, look in LOOKS.items()
+        if state in diagram.states
+    ]
     if any(axis.limit is not None for axis in diagram.axes):
         samples.append(Line2D([], [], linewidth=1.6, label="limit, pointing beyond it", **_beyond(1)))
     figure.legend(handles=samples, loc="outside lower center", ncols=len(samples))
@@ -199,7 +191,7 @@ def _ticks(axis: DesignAxis) -> list[tuple[float, str]]:
     """Round numbers within the axis, or the rows of a catalog, and their texts."""
     if axis.names:
         return [(float(k), name) for k, name in enumerate(axis.names)]
-    locators: list[Locator] = [MaxNLocator(TICKS, steps=[1, 2, 5, 10])]
+    locators: list[Locator] = [MaxNLocator(7, steps=[1, 2, 5, 10])]  # intervals of an axis at most
     if axis.logarithmic:
         is_long = axis.high > 1e3 * axis.low
         locators.insert(0, LogLocator(subs=[1.0] if is_long else [1.0, 2.0, 5.0]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from ...common.rotations import in_3d
 from ...map.map_file import CONDITIONS, Quantity, quantities
 from ...map.pose_map import PoseMap
 from ...mbs.posture.workspace import GridAxis
+from ..figures.plot import image_of
 from ..figures.style import ORDERED, SIZE, SceneAxes, legend, new_axes, projected, style
 from ..projection import FRONT, PLANE, SIDE, SPACE
 
@@ -26,21 +26,15 @@ FLAT = 1e-9  # of the largest extent: no extent
 
 
 def draw_map(pose_map: PoseMap) -> list[Path]:
-    """A picture of each quantity that differs from pose to pose, in the folder of the map; their files."""
+    """Write a picture of each quantity that differs from pose to pose into the folder of the map; returns the files."""
     files = []
     with style():
-        for name, figure in (*_maps(pose_map), *_lobes(pose_map)):
+        shown = {name: one for name, one in quantities(pose_map).items() if not one.everywhere}
+        maps = ((name, _draw(pose_map, one)) for name, one in shown.items() if np.isfinite(one.values).any())
+        for name, figure in (*maps, *_lobes(pose_map)):
             files.append(pose_map.plan.folder / f"{name}.png")
-            content = io.BytesIO()
-            figure.savefig(content, format="png")
-            write_atomically(files[-1], content.getvalue(), "picture", ours=True)
+            write_atomically(files[-1], image_of(figure, "png"), "picture", ours=True)
     return files
-
-
-def _maps(pose_map: PoseMap) -> Iterator[tuple[str, Figure]]:
-    for name, quantity in quantities(pose_map).items():
-        if np.isfinite(quantity.values).any() and not quantity.everywhere:
-            yield name, _draw(pose_map, quantity)
 
 
 def _lobes(pose_map: PoseMap) -> Iterator[tuple[str, Figure]]:

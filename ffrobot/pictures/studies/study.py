@@ -87,26 +87,26 @@ class DesignAxis(Record):
     names: tuple[str, ...] = ()
 
     def place(self, values: Array) -> Array:
-        """Return positions of values on the axis, 0 at `low` and 1 at `high`."""
+        """Return positions (…) of values (…), in the unit of the axis: 0 at `low` and 1 at `high`."""
         scaled = np.log if self.logarithmic else np.asarray
         low, high = scaled(np.array([self.low, self.high]))
         return as_floats((scaled(values) - low) / (high - low))
 
     @property
     def places(self) -> Array:
-        """Positions (n,) of all designs on the axis; NaN for failed ones."""
+        """Return positions (n,) of all designs, from 0 to 1, NaN of failed ones."""
         return self.place(floats(self.values))
 
 
 def floats(values: Numbers) -> Array:
-    """Convert numbers to an array (n,), None to NaN."""
+    """Return numbers as an array (n,) in their unit, None as NaN."""
     return as_floats(np.array([np.nan if value is None else value for value in values]))
 
 
 def axis_of_response(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> DesignAxis:
-    """The axis of a response, with room for all its values and its limit."""
-    shown = np.array([value for value in (*values, limit) if value is not None] or [0.0])
-    low, high = float(shown.min()), float(shown.max())
+    """Return the axis of a response, with room for all its values and its limit."""
+    shown = [value for value in (*values, limit) if value is not None] or [0.0]
+    low, high = min(shown), max(shown)
     logarithmic = low > 0.0 and high > low * 10.0**DECADES
     if logarithmic:
         room = (high / low) ** ROOM

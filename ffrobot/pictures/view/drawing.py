@@ -18,7 +18,6 @@ from ..projection import AXIS_LENGTH, LINK, SPACE, TOOL_COLORS, TOOL_LENGTH, Vie
 from ..shapes import drawn_mode
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels, at most so wide
-NARROWEST = 1.1  # width over height
 PANEL = (700, 360)  # pixels, of a mode
 COLUMNS = 2
 MODES = 6  # that are drawn at most
@@ -56,9 +55,16 @@ def main() -> None:
 
 def _draw_motion(job: dict[str, Any]) -> None:
     """Bodies where they were, pale, and as exaggerated, colored; the same view and colors in all frames."""
-    grids = [_exaggerated(job, step) for step in job["steps"]]
+    name, unit = SHOWN[job["color"]]
+    grids = []  # as it was, and exaggerated with what it is colored by
+    for step in job["steps"]:
+        grid = _read(job["grid"], step)
+        shown = grid.copy()
+        shown.points = grid.points + (job["scale"] - 1.0) * grid["exaggeration"]
+        values = grid[job["color"]]
+        shown[name] = unit * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
+        grids.append((grid, shown))
     everything = np.concatenate([shown.points for _, shown in grids])
-    name = SHOWN[job["color"]][0]
     largest = max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids)
     # The next round number, of a few digits that quarters of it have too; 1 for zero.
     power = 10.0 ** np.floor(np.log10(largest)) if largest > 0.0 else 1.0
@@ -71,7 +77,7 @@ def _draw_motion(job: dict[str, Any]) -> None:
     widest, height = MOVIE_SIZE if job["movie"] else SIZE
     wide, high, _ = np.ptp(everything @ np.stack(view, axis=1), axis=0)
     needed = (1.0 - BAR_ROOM) * wide / max(high, 1e-9 * wide, 1e-300)
-    window = 2 * round(0.5 * min(widest, max(NARROWEST, needed) * height)), height  # no wider than what is seen needs
+    window = 2 * round(0.5 * min(widest, max(1.1, needed) * height)), height  # no wider than what is seen needs
     for k, (grid, shown) in enumerate(grids):
         plotter = pyvista.Plotter(off_screen=True, window_size=window)
         if job["scale"] != 1.0 and not job["movie"]:
@@ -84,17 +90,6 @@ def _draw_motion(job: dict[str, Any]) -> None:
         plotter.close()
 
 
-def _exaggerated(job: dict[str, Any], step: int) -> tuple[Any, Any]:
-    """The grid at a time step as it was, and exaggerated with what it is colored by."""
-    grid = _read(job["grid"], step)
-    shown = grid.copy()
-    shown.points = grid.points + (job["scale"] - 1.0) * grid["exaggeration"]
-    name, unit = SHOWN[job["color"]]
-    values = grid[job["color"]]
-    shown[name] = unit * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
-    return grid, shown
-
-
 def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
     """(p,) whether a point is on a body that is zero everywhere at all steps, as rigid ones are: they have no color."""
     grid = grids[0][0]
@@ -103,7 +98,7 @@ def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
     largest = np.zeros(int(owner.max(initial=0)) + 1)
     for _, shown in grids:
         np.fmax.at(largest, owner, shown[name])
-    return np.asarray(largest[owner] == 0.0)
+    return largest[owner] == 0.0
 
 
 def _draw_modes(job: dict[str, Any]) -> None:
@@ -187,10 +182,7 @@ def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: floa
 
 
 def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0.0) -> None:
-    """Title, directions, and the view of the other pictures.
-
-    `room` is the part of the height at the bottom that is for a color bar.
-    """
+    """Title, directions, and the view of the other pictures; `room` for a color bar is a part of the height."""
     plotter.set_background("white")
     plotter.add_text(title, font_size=9, color="black", position="upper_left")
     plotter.add_axes(color="black", viewport=CORNER)

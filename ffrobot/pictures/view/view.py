@@ -10,13 +10,12 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeVar
 
-import h5py
 import numpy as np
 
 from ...common.arrays import Array, Indices, Integers, NDArray, as_rows
@@ -33,7 +32,6 @@ from ..shapes import body_surface, surface_shape
 
 # VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -50,75 +48,64 @@ class Grid:
 
 def vtkhdf_image(grid: Grid) -> bytes:
     """Serialize a grid as VTKHDF bytes, reproducibly; points are rounded to 7 digits."""
+    corners = np.concatenate([np.full(len(block), block.shape[1]) for block in grid.cells])
+    connectivity = np.concatenate([block.ravel() for block in grid.cells])
+    moved = {"Points": grid.points} | {f"PointData/{name}": values for name, values in grid.point_data.items()}
+    arrays: dict[str, NDArray[np.generic]] = {
+        "NumberOfPoints": np.array([grid.points.shape[1]]),
+        "NumberOfCells": np.array([len(corners)]),
+        "NumberOfConnectivityIds": np.array([len(connectivity)]),
+        "Connectivity": connectivity,
+        "Offsets": np.append(0, np.cumsum(corners)),
+        "Types": np.array([CELL_TYPE[v] for v in corners], dtype=np.uint8),
+        **{name: values.reshape(-1, *values.shape[2:]).astype(np.float32) for name, values in moved.items()},
+        **{f"CellData/{name}": values for name, values in grid.cell_data.items()},
+    }
+    if grid.time is not None:  # points of each step and their data follow those of the step before
+        same = np.zeros(len(grid.time), dtype=np.int64)
+        own = np.arange(len(grid.time)) * grid.points.shape[1]
+        arrays |= {
+            "Steps/Values": grid.time,
+            "Steps/NumberOfParts": np.ones_like(same),
+            "Steps/PartOffsets": same,
+            "Steps/PointOffsets": own,
+            "Steps/CellOffsets": same[:, None],
+            "Steps/ConnectivityIdOffsets": same[:, None],
+            **{f"Steps/PointDataOffsets/{name}": own for name in grid.point_data},
+            **{f"Steps/CellDataOffsets/{name}": same for name in grid.cell_data},
+        }
     with in_memory() as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0])
         root.attrs["Type"] = np.bytes_("UnstructuredGrid")
-        _write_cells(root, grid)
-        for name, values in {"Points": grid.points, **_named("PointData", grid.point_data)}.items():
-            _write(root, name, values.reshape(-1, *values.shape[2:]).astype(np.float32))  # step after step
-        for name, cell_values in _named("CellData", grid.cell_data).items():
-            _write(root, name, cell_values)
+        for name, values in arrays.items():
+            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 1000 else {}
+            root.create_dataset(name, data=values, track_times=False, **packed)
         if grid.time is not None:
-            _write_steps(root, grid, grid.time)
+            root["Steps"].attrs["NSteps"] = len(grid.time)
         return image_of(file)
 
 
-def _named(group: str, arrays: Mapping[str, T]) -> dict[str, T]:
-    return {f"{group}/{name}": values for name, values in arrays.items()}
-
-
-def _write_cells(root: h5py.Group, grid: Grid) -> None:
-    corners = np.concatenate([np.full(len(block), block.shape[1]) for block in grid.cells])
-    connectivity = np.concatenate([block.ravel() for block in grid.cells])
-    counts = {"Points": grid.points.shape[1], "Cells": len(corners), "ConnectivityIds": len(connectivity)}
-    for name, count in counts.items():
-        _write(root, f"NumberOf{name}", np.array([count]))
-    _write(root, "Connectivity", connectivity)
-    _write(root, "Offsets", np.concatenate([[0], np.cumsum(corners)]))
-    _write(root, "Types", np.array([CELL_TYPE[v] for v in corners], dtype=np.uint8))
-
-
-def _write_steps(root: h5py.Group, grid: Grid, time: Array) -> None:
-    """Where each step begins: its points and their data follow those of the step before, cells are the same."""
-    steps = root.create_group("Steps")
-    steps.attrs["NSteps"] = len(time)
-    same, own = np.zeros(len(time), dtype=np.int64), np.arange(len(time)) * grid.points.shape[1]
-    arrays = {
-        "Values": time,
-        "NumberOfParts": np.ones_like(same),
-        "PartOffsets": same,
-        "PointOffsets": own,
-        "CellOffsets": same[:, None],
-        "ConnectivityIdOffsets": same[:, None],
-        **{f"PointDataOffsets/{name}": own for name in grid.point_data},
-        **{f"CellDataOffsets/{name}": same for name in grid.cell_data},
-    }
-    for name, values in arrays.items():
-        _write(steps, name, values)
-
-
-def _write(group: h5py.Group, name: str, values: NDArray[np.generic]) -> None:
-    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 1000 else {}
-    group.create_dataset(name, data=values, track_times=False, **packed)
-
-
 def results_grid(results: Results, analysis: str, frames: Indices, notes: list[str]) -> Grid:
-    """The bodies of an analysis at the outputs `frames` (T,), where they were: r = R + A (x + Φ p), m, global axes.
+    """Return the bodies of an analysis at the outputs `frames` (T,), where they were: r = R + A (x + Φ p), m, global.
 
     Point data: `deflection` A Φ p, and `exaggeration`, by which points move when deflections are made larger by one
     while joints stay shut: r + (s − 1) exaggeration shows deformations s times as large. `von_mises`, Pa, where
-    stresses of a surface are known. Cell data: `body`, its number in the scene. `notes` say what could not be drawn as
-    it is.
+    stresses of a surface are known. Cell data: `body`, its number in the scene. `notes` say what could not be drawn.
     """
     bodies = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
     data = dict[str, list[Array]](deflection=[], exaggeration=[], von_mises=[])
     for shape, body in zip(shapes, bodies, strict=True):
-        deflection, stress = shape.deflection, _von_mises(results, analysis, body.name, frames)
+        deflection = shape.deflection
+        stress = np.full(deflection.shape[:2], np.nan)
+        if results.has(f"{analysis}/stress/{body.name}/surface"):
+            with suppress(InputError):  # a note where its surface is drawn
+                link = results.modal_body(body.name)
+                stress = von_mises(surface_stress(link, results.stress_recovery(analysis, body.name).at(frames)))
         data["deflection"].append(deflection)
         data["exaggeration"].append(deflection + body.shift[:, None])
-        data["von_mises"].append(np.full(deflection.shape[:2], np.nan) if stress is None else stress)
+        data["von_mises"].append(stress)
     if all(np.isnan(stress).all() for stress in data["von_mises"]):
         del data["von_mises"]
     first = np.cumsum([0, *(len(shape.points) for shape in shapes[:-1])])
@@ -130,17 +117,6 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
         point_data={name: np.concatenate(parts, axis=1) for name, parts in data.items()},
         cell_data={"body": np.repeat([numbers.index(b.name) for b in bodies], [len(s.cells) for s in shapes])},
     )
-
-
-def _von_mises(results: Results, analysis: str, body: str, frames: Indices) -> Array | None:
-    """(T, p) Pa on the surface of a body; None where it is not known."""
-    if not results.has(f"{analysis}/stress/{body}/surface"):
-        return None
-    try:
-        link = results.modal_body(body)
-    except InputError:  # a note where its surface is drawn
-        return None
-    return von_mises(surface_stress(link, results.stress_recovery(analysis, body).at(frames)))
 
 
 SECONDS = 300.0  # after which a machine that cannot draw is given up …
@@ -173,7 +149,8 @@ class Picture:
 def draw_pictures(pictures: Sequence[Picture]) -> None:
     """Draw PNG files in a separate process, which VTK ends if OpenGL is missing.
 
-    Raises `SolveError` where PyVista is not installed or cannot draw on this machine.
+    Raises:
+        SolveError: PyVista is not installed, or cannot draw on this machine.
     """
     if find_spec("pyvista") is None:
         raise SolveError(
@@ -223,14 +200,16 @@ class Viewed:
 def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewed:
     """Write grids (.vtkhdf) and pictures (.png) of a modal body file or of a results file into `folder`.
 
-    Raises `InputError` where the file cannot be read or has no such analysis, `SolveError` where a file cannot be
-    written, or pictures that are asked for cannot be drawn: grids are written all the same. Where stresses of a surface
-    are known there is a second picture, `.stress.png`.
+    Where stresses of a surface are known there is a second picture, `.stress.png`.
+
+    Raises:
+        InputError: the file cannot be read, or has no such analysis.
+        SolveError: a file cannot be written, or pictures that are asked for cannot be drawn: grids are written.
     """
     options = options or Options()
     check_folder(folder)
     notes: list[str] = []
-    views = [_modal_body(path)] if is_modal_body_file(path) else _results(path, options, notes)
+    views = _modal_body(path) if is_modal_body_file(path) else _results(path, options, notes)
     paths, pictures = list[Path](), list[Picture]()
     for name, grid, shown in views:
         paths.append(folder / f"{name}.vtkhdf")
@@ -246,10 +225,11 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
     return Viewed(paths, list(dict.fromkeys(notes)))
 
 
-View = tuple[str, Grid, list[Picture]]  # name of its files, grid, pictures without the grid's path
+Views = Iterable[tuple[str, Grid, list[Picture]]]
+"""Names of files, grids, and pictures without the paths of the grids."""
 
 
-def _modal_body(path: Path) -> View:
+def _modal_body(path: Path) -> Views:
     """Of the surface of a link, undeformed, with every mode as a vector: displacement per unit of modal coordinate."""
     body = read_modal_body(path)
     mesh, name = body_surface(body), file_name(body.name)
@@ -258,10 +238,10 @@ def _modal_body(path: Path) -> View:
         for k, family in enumerate(body.family)
     }
     grid = Grid([mesh.cells], mesh.points[None], point_data=modes)
-    return name, grid, [Picture(body.name, path=f"{name}.png", length=body.length)]
+    return [(name, grid, [Picture(body.name, path=f"{name}.png", length=body.length)])]
 
 
-def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
+def _results(path: Path, options: Options, notes: list[str]) -> Views:
     with Results(path) as results:
         analyses = results.analyses
         if options.analysis is not None:
@@ -277,15 +257,14 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
             pictures = []
             for color, suffix in (("deflection", ""), ("von_mises", ".stress")):
                 if color in grid.point_data:
-                    step = _step(grid, options.time, color)
-                    scale = visible_scale(grid, [step]) if options.scale is None else options.scale
-                    picture = motion_picture(results, analysis, frames, grid, (step,), scale=scale, color=color)
+                    steps = (_step(grid, options.time, color),)
+                    picture = _motion(results, analysis, frames, grid, steps, scale=options.scale, color=color)
                     pictures.append(replace(picture, path=f"{name}{suffix}.png"))
             yield name, grid, pictures
 
 
 def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
-    """Outputs equally far apart, the one nearest to the largest deflection moved there."""
+    """Return at most `count` outputs (T,) equally far apart, one of them moved to the largest deflection."""
     time = results.time(analysis)
     frames = np.linspace(0, len(time) - 1, min(len(time), count)).round().astype(np.intp)
     points = [f"{analysis}/points/{point}/deflection" for point in results.names(f"{analysis}/points")]
@@ -304,31 +283,28 @@ def _step(grid: Grid, time: float | None, color: str) -> int:
     return int(np.argmax(np.nanmax(np.linalg.norm(values, axis=2) if values.ndim == 3 else values, axis=1)))
 
 
-def visible_scale(grid: Grid, steps: Sequence[int]) -> float:
-    """Return the factor that makes deflections at these steps visible."""
-    size = max(float(np.ptp(grid.points[step], axis=0).max()) for step in steps)
-    deflection = np.linalg.norm(grid.point_data["deflection"][list(steps)], axis=2)
-    return visible_exaggeration(size, float(deflection.max()))
-
-
-def motion_picture(
-    results: Results, analysis: str, frames: Indices, grid: Grid, steps: tuple[int, ...], *, scale: float, color: str
-) -> Picture:
-    """Return the picture of some steps of a grid, whose steps are the outputs `frames` of an analysis."""
+def _motion(
+    results: Results, analysis: str, frames: Indices, grid: Grid, steps: tuple[int, ...], *,
+    scale: float | None, color: str = "deflection",
+) -> Picture:  # fmt: skip
+    """The picture of some steps of a grid, whose steps are the outputs `frames` of an analysis."""
     assert grid.time is not None
+    some = list(steps)
+    if scale is None:
+        size = np.ptp(grid.points[some], axis=1).max()
+        scale = visible_exaggeration(float(size), np.linalg.norm(grid.point_data["deflection"][some], axis=2).max())
     name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
     braces = name.replace("{", "{{").replace("}", "}}")
-    bodies = moving_bodies(results, analysis, frames[list(steps)])
-    joints = joint_markers(results.scene, bodies)
+    bodies = moving_bodies(results, analysis, frames[some])
     tools = tool_markers(targets(results, analysis), bodies)
     return Picture(
         f"{braces}, t = {{time}} s{exaggerated}",
         steps=steps,
-        times=tuple(float(t) for t in grid.time[list(steps)]),
+        times=tuple(map(float, grid.time[some])),
         scale=scale,
         color=color,
         in_space=not results.space.is_plane,
-        joints=_directed(joints, scale, len(steps)),
+        joints=_directed(joint_markers(results.scene, bodies), scale, len(steps)),
         tools=_directed([tool for tool in tools if tool.directions.size], scale, len(steps)),
         ground=as_rows(ground_places([results.scene])),
     )
@@ -365,8 +341,7 @@ def _rendered(
     from PIL import Image
 
     grid, steps = results_grid(results, analysis, outputs, notes), tuple(range(len(outputs)))
-    scale = visible_scale(grid, steps) if scale is None else scale
-    picture = motion_picture(results, analysis, outputs, grid, steps, scale=scale, color="deflection")
+    picture = _motion(results, analysis, outputs, grid, steps, scale=scale)
     with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "grid.vtkhdf"
         write_atomically(file, vtkhdf_image(grid), "grid", ours=True)
