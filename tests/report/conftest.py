@@ -1,10 +1,13 @@
 """Pages of solved cases, and a real browser to open them in."""
 
+import io
 import json
 import shutil
 import time
 
+import numpy as np
 import pytest
+from PIL import Image
 from selenium.webdriver import Chrome, ChromeOptions, ChromeService
 
 from ffrobot.cli import cli
@@ -46,11 +49,13 @@ class Browser:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = Chrome(options=options, service=ChromeService(DRIVER))
 
-    def open(self, path):
-        """Load a page and wait until the mechanism is drawn."""
+    def open(self, path, *, playing=False):
+        """Load a page and wait until the mechanism moves; stop it, so that all else is drawn faster."""
         self.driver.get_log("browser")  # of the page before
         self.driver.get(path.as_uri())
-        self.wait('document.querySelector("#mechanism .main-svg") !== null')
+        self.wait("state.playing", 60)
+        if not playing:
+            self.run("play(false)")
 
     def run(self, script, *arguments):
         return self.driver.execute_script(script, *arguments)
@@ -73,6 +78,16 @@ class Browser:
             count,
         )  # fmt: skip
 
+    def draw_all(self):
+        """Scroll through the page until every chart has been near the window."""
+        for y in range(0, self.value("document.body.scrollHeight"), 700):
+            self.run(f"window.scrollTo(0, {y})")
+            self.wait(
+                "[...document.querySelectorAll('[data-chart]')].every((c) => { const r = c.getBoundingClientRect();"
+                "return r.top > innerHeight || r.bottom < 0 || c.querySelector('.main-svg') })"
+            )
+        self.run("window.scrollTo(0, 0)")
+
     def slide(self, name, value):
         """Move a slider as a user does."""
         self.run(
@@ -81,14 +96,16 @@ class Browser:
             name, value,
         )  # fmt: skip
 
-    @property
-    def complaints(self):
-        """What the page wrote to the console."""
+    def check(self):
+        """The page wrote nothing to the console and asked for no other file."""
         messages = [entry["message"] for entry in self.driver.get_log("browser")]
-        return [message for message in messages if not any(remark in message for remark in GRAPHICS)]
+        assert [message for message in messages if not any(remark in message for remark in GRAPHICS)] == []
+        assert self.value('performance.getEntriesByType("resource").map((entry) => entry.name)') == []
 
     def screenshot(self, selector):
-        return self.driver.find_element("css selector", selector).screenshot_as_png
+        """The colors (rows, columns, 3) of an element."""
+        png = self.driver.find_element("css selector", selector).screenshot_as_png
+        return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
 
 
 OPEN = []

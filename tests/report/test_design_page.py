@@ -1,8 +1,13 @@
 """Studies of design commands on the page, alone and beside results, in a real browser."""
 
+import shutil
+from pathlib import Path
+
+import h5py
 import numpy as np
 import pytest
 
+from ffrobot.common.checksum import seal
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.studies.figures import draw
 from ffrobot.pictures.studies.study import (
@@ -88,7 +93,7 @@ def test_a_page_of_studies_alone(browser, folder, tmp_path):
     write_report([folder], page)
     browser.driver.get_log("browser")
     browser.driver.get(page.as_uri())
-    assert browser.complaints == []
+    browser.check()
     assert browser.value("places.length") == 0
     pictures = "[...document.querySelectorAll('.diagrams img')]"
     browser.wait(f"{pictures}.every((one) => one.complete)")
@@ -138,10 +143,20 @@ def test_convergence_and_bands(folder):
     assert names(band) == ["lowest and highest sample", "5% to 95%", "median", "nominal values"]
 
 
-def test_beside_results(browser, page, folder, two_link):
-    """Motion and designs on one page."""
-    browser.open(page(two_link.folder / "scene.results.h5", folder))
-    assert browser.complaints == []
+def test_beside_results(browser, page, folder, slider_crank, two_link, tmp_path):
+    """Motions of two scenes and designs on one page; <b> of a name is not bold, neither in HTML nor in Plotly."""
+    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
+    with h5py.File(path, "r+") as file:
+        file.attrs["name"] = "<b>A & B</b>"
+    seal(path)
+    browser.open(page(path, slider_crank.folder / "scene.results.h5", folder))
+    browser.draw_all()
+    charts = browser.value("places.length")
+    assert charts == len(browser.run("return document.querySelectorAll('[data-chart] .main-svg:first-child')")) >= 20
+    browser.check()
+    assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
+    legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"
+    assert "<b>A & B</b>: inverse" in browser.value(legend)
     links = browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)")
     assert links == ["Motion", "Summary", "Histories", "Modes", "Design", "Input files and versions"]
     assert browser.value("document.querySelectorAll('.diagrams img').length") == 6

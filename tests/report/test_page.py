@@ -1,10 +1,7 @@
 """Pages of scenes in 3D in a real browser: drawn without a complaint, as it was solved, moving, turned by a drag."""
 
-import io
-
 import numpy as np
 import pytest
-from PIL import Image
 from scipy.spatial.transform import Rotation
 from selenium.webdriver import ActionChains
 
@@ -21,17 +18,24 @@ FLOATS = 2e-6  # m: numbers of the page have 7 digits, lengths are about 1 m
 WAIT = 60  # s: without a graphics card, beside other work
 
 
-@pytest.fixture(scope="module")
-def arm_page(page, arm_3r):
-    return page(arm_3r.folder / "scene.results.h5")
-
-
-@pytest.fixture(scope="module")
-def paused(browser, arm_page):
-    """The arm's page, standing still."""
-    browser.open(arm_page)
-    browser.wait("stage.data !== undefined && stage.data.length > 0", WAIT)
+def played(browser, path):
+    """Open a page, which plays by itself, and stop it."""
+    browser.open(path, playing=True)
+    browser.wait("state.playing && state.t > 0", WAIT)
+    at, before = browser.value("state.t"), trace(browser, 2)
+    browser.wait(f"Math.abs(state.t - {at}) > 0.02", WAIT)
     browser.run("play(false)")
+    browser.wait("!state.showing", WAIT)
+    assert np.abs(trace(browser, 2) - before).max() > 1e-4
+    browser.check()
+    kinds = browser.value("stage.data.map((trace) => trace.type)")
+    assert kinds.count("mesh3d") == 3  # bodies, of both cases
+
+
+@pytest.fixture(scope="module")
+def paused(browser, page, arm_3r):
+    """The arm's page, standing still."""
+    played(browser, page(arm_3r.folder / "scene.results.h5"))
     return browser
 
 
@@ -50,20 +54,12 @@ def trace(browser, number):
 
 def pixels(browser):
     """The picture of the robot, (rows, columns): where it is in its colour, a blue."""
-    image = np.asarray(Image.open(io.BytesIO(browser.screenshot("#mechanism"))).convert("RGB"), dtype=int)
-    red, green, blue = np.moveaxis(image[: image.shape[0] - 60], 2, 0)  # without the legend
+    red, green, blue = np.moveaxis(browser.screenshot("#mechanism")[:-60], 2, 0)  # without the legend
     return (blue > red + 60) & (blue > green + 20)
 
 
-@pytest.mark.parametrize("case", ["arm_3r", "slider_crank_3d"])
-def test_page_opens_without_a_complaint(browser, page, request, case):
-    browser.open(page(request.getfixturevalue(case).folder / "scene.results.h5"))
-    browser.wait("state.t > 0", WAIT)
-    browser.run("play(false)")
-    assert browser.complaints == []
-    assert browser.value('performance.getEntriesByType("resource").map((entry) => entry.name)') == []
-    kinds = browser.value("stage.data.map((trace) => trace.type)")
-    assert kinds.count("mesh3d") == 3  # bodies, of both cases
+def test_page_of_a_closed_loop(browser, page, slider_crank_3d):
+    played(browser, page(slider_crank_3d.folder / "scene.results.h5"))
 
 
 @pytest.mark.parametrize("t", [0.0, 0.1, 0.6])
@@ -103,10 +99,8 @@ def test_pixels_move(paused):
     start = pixels(paused)
     show(paused, 0.6)
     end = pixels(paused)
-    assert start.sum() > 300
-    assert end.sum() > 300
-    assert (start & ~end).sum() > 200
-    assert (end & ~start).sum() > 200
+    assert min(start.sum(), end.sum()) > 300
+    assert min((start & ~end).sum(), (end & ~start).sum()) > 200
 
 
 def drag(browser, selector, pixels, moves=9):
@@ -133,17 +127,6 @@ def test_drag_turns_the_scene(paused):
     show(paused, 0.25)
     np.testing.assert_allclose(paused.value(eye), turned, atol=1e-3)
     assert (pixels(paused) ^ picture).sum() > 200
-
-
-def test_plays_by_itself(browser, arm_page):
-    browser.open(arm_page)
-    browser.wait("state.playing && state.t > 0", WAIT)
-    at = browser.value("state.t")
-    before = trace(browser, 2)
-    browser.wait(f"Math.abs(state.t - {at}) > 0.02", WAIT)
-    browser.run("play(false)")
-    browser.wait("!state.showing", WAIT)
-    assert np.abs(trace(browser, 2) - before).max() > 1e-4
 
 
 def test_charts_and_tables_of_the_arm(arm_3r):

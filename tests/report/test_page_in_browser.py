@@ -1,42 +1,23 @@
 """The page in a real browser: no errors, no network, everything drawn, a mechanism that moves as it was solved."""
 
-import shutil
-from pathlib import Path
-
-import h5py
 import numpy as np
 import pytest
-
-from ffrobot.common.checksum import seal
-
-
-def draw_all(browser):
-    """Scroll through the page until every chart has been near the window."""
-    browser.run("window.scrollTo(0, 0)")
-    height = browser.value("document.body.scrollHeight")
-    for y in range(0, height, 700):
-        browser.run(f"window.scrollTo(0, {y})")
-        browser.wait(
-            "[...document.querySelectorAll('[data-chart]')].every((c) => { const r = c.getBoundingClientRect();"
-            "return r.top > innerHeight || r.bottom < 0 || c.querySelector('.main-svg') })"
-        )
-    browser.run("window.scrollTo(0, 0)")
 
 
 @pytest.fixture(scope="module")
 def opened(browser, two_link_page):
-    """The two-link page, opened once for all tests that do not ask for another one."""
+    """The two-link page with all its charts, opened once."""
     browser.open(two_link_page)
+    browser.draw_all()
     return browser
 
 
 @pytest.fixture
 def paused(opened):
     """The two-link page, standing still at t = 0, to scale."""
-    browser = opened
-    browser.slide("exaggeration", 0)
-    browser.slide("time", 0)
-    return browser
+    opened.slide("exaggeration", 0)
+    opened.slide("time", 0)
+    return opened
 
 
 JOINTS = {"O": "link1.root", "A": "link2.root"}  # scene.toml
@@ -64,33 +45,6 @@ def show(browser, t, exaggeration=1.0):
     browser.wait(f"Math.abs(state.t - {t}) < 1e-9")
 
 
-@pytest.mark.parametrize(
-    "cases", [pytest.param(("two_link",), marks=pytest.mark.nightly), ("slider_crank", "two_link")]
-)
-def test_page_opens_without_a_complaint(browser, page, request, cases):
-    folders = [request.getfixturevalue(case).folder for case in cases]
-    browser.open(page(*(folder / "scene.results.h5" for folder in folders)))
-    draw_all(browser)
-    charts = browser.value("places.length")
-    assert charts == len(browser.run("return document.querySelectorAll('[data-chart] .main-svg:first-child')"))
-    assert charts >= 10 * len(cases)
-    assert browser.complaints == []
-    assert browser.value('performance.getEntriesByType("resource").map((entry) => entry.name)') == []
-
-
-def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
-    """A browser would take <b> for bold, and so would Plotly."""
-    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
-    with h5py.File(path, "r+") as file:
-        file.attrs["name"] = "<b>A & B</b>"
-    seal(path)
-    browser.open(page(path, two_link.folder / "scene.results.h5"))
-    assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
-    legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"
-    assert "<b>A & B</b>: inverse" in browser.value(legend)
-    assert browser.complaints == []
-
-
 @pytest.mark.parametrize("t", [0.0, 0.25, 1.0])
 def test_mechanism_is_where_it_was_solved(paused, two_link, t):
     show(paused, t)
@@ -115,7 +69,6 @@ def test_hidden_run_catches_up_when_shown(paused, two_link):
 
 
 def test_histories_show_what_the_file_holds(paused, two_link):
-    draw_all(paused)
     curve = "document.querySelector('[data-chart=\"deflection_link2.tip\"]').data.find((d) => d.name === 'inverse, y')"
     # Plotly decodes the binary text into a typed array of its own.
     drawn = np.array(paused.value(f"Array.from({curve}._inputArray || {curve}.y._inputArray || {curve}.y)"))
@@ -124,7 +77,6 @@ def test_histories_show_what_the_file_holds(paused, two_link):
 
 
 def test_nothing_on_the_page_sends_data_away(paused):
-    draw_all(paused)
     buttons = set(paused.value("[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)"))
     assert {"Download plot", "Reset axes"} <= buttons
     assert not [title for title in buttons if "share" in title.lower() or "cloud" in title.lower()]
@@ -132,7 +84,6 @@ def test_nothing_on_the_page_sends_data_away(paused):
 
 
 def test_voltage_charts_mark_the_limit(paused):
-    draw_all(paused)
     shapes = "document.querySelector('[data-chart=\"required_voltage_inverse_link1\"]').layout.shapes.map((s) => s.y0)"
     assert paused.value(shapes) == [-200, 200]  # V, `limit` in the scene file
 
@@ -156,13 +107,13 @@ def test_phones_show_whole_titles_and_scroll_one_way_only(browser, two_link_page
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     try:
         browser.open(two_link_page)
-        browser.run("play(false)")
-        draw_all(browser)
+        browser.draw_all()
         assert browser.value("document.documentElement.scrollWidth") == 390
         assert browser.value("document.querySelectorAll('.modebar-btn').length") == 0
         right_ends = "[...document.querySelectorAll('.gtitle')].map((title) => title.getBoundingClientRect().right)"
         ends = browser.value(right_ends)
         assert len(ends) > 10
         assert max(ends) <= 390
+        browser.check()
     finally:
         browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
