@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "exchange"))
 
-from other_codes import pinocchio_moments
+from other_codes import pinocchio_dynamics
 from record import options, record
 from rigid_robots import moments, with_motion
 
@@ -58,7 +58,9 @@ def difference(urdf, folder, rng, python):
         found = np.array([file[f"inverse/joints/{called[name]}/moment"][0] for name in moving])
     rights = [np.array([expected[name] for name in moving])]
     if python is not None:
-        rights.append(pinocchio_moments(python, urdf, moving, motion))
+        q, v, a = ([[part[name] for name in moving]] for part in motion)
+        (answer,) = pinocchio_dynamics(python, urdf, moving, q=q, v=v, a=a, tau=a)["rnea"]
+        rights.append(np.array(answer))
     return max(np.abs(found - wanted).max() / np.abs(wanted).max() for wanted in rights), len(moving)
 
 

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 PACKAGE = "pin==2.6.20"  # of the Python versions that this program runs on; with NumPy below 2
-MOMENTS, DYNAMICS, STIFFNESS = (
-    Path(__file__).with_name(f"pinocchio_{what}.py") for what in ("moments", "dynamics", "stiffness")
-)
+DYNAMICS, STIFFNESS = (Path(__file__).with_name(f"pinocchio_{what}.py") for what in ("dynamics", "stiffness"))
 PATIENCE = 600  # s for a download of 100 MB
 
 
@@ -43,16 +41,9 @@ def _make(folder, python):
     (folder / "complete").touch()
 
 
-def pinocchio_moments(python, urdf, names, motion):
-    """Motor moments of the joints `names` of the URDF file at q, v, a, which are dicts by name (rad, m, s)."""
-    numbers = [repr(values[name]) for values in motion for name in names]
-    done = subprocess.run([python, MOMENTS, urdf, *names, *numbers], capture_output=True, text=True, check=True)
-    return np.array(done.stdout.split(), dtype=float)
-
-
-def pinocchio_dynamics(python, urdf, names, motion):
-    """What `pinocchio_dynamics.py` answers for q, v, a and tau (T, n) of a `motion` of the joints `names`."""
-    request = {"names": names} | {key: values.tolist() for key, values in motion._asdict().items()}
+def pinocchio_dynamics(python, urdf, names, **motion):
+    """What `pinocchio_dynamics.py` answers for q, v, a and tau (T, n) of the joints `names`."""
+    request = {"names": names} | {key: np.asarray(values).tolist() for key, values in motion.items()}
     return _answer(python, DYNAMICS, urdf, request)
 
 

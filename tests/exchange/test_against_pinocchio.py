@@ -61,7 +61,7 @@ def test_accelerations_moments_and_mass_matrices(robot, pinocchio_dynamics):
     tree = system.model.tree
     names = [node.joint.name for node in sorted(tree.nodes, key=lambda node: node.v.start)]
     assert len(names) == tree.n_v
-    expected = pinocchio_dynamics(urdf, names, motion)
+    expected = pinocchio_dynamics(urdf, names, **motion._asdict())
 
     def accelerations(q, v, force):
         return system.core.evaluate(q, v, np.zeros(0), force, None)[0]

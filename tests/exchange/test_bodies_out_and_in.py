@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from ffrobot.exchange.bodies.integrals import integrals_of
 from ffrobot.exchange.bodies.matrices import craig_bampton_file, exudyn_file
 from ffrobot.exchange.bodies.mbdyn import fem_text, read_fem
 from ffrobot.exchange.bodies.sid import read_sid, sid_text
+from ffrobot.fe_models.modal_body import Interface, Stations
 from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton
 from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
 
@@ -86,30 +88,18 @@ def test_modes_of_any_normalisation_become_orthonormal(bodies):
     np.testing.assert_allclose(back.I_bar * signs, body.I_bar, atol=1e-10)
 
 
-class Mixed:
-    """A body in coordinates q, p = T q, which `ModalBody` does not take; what `fem_text` asks for."""
-
-    def __init__(self, body, T):
-        self.__dict__.update({item.name: getattr(body, item.name) for item in dataclasses.fields(body)})
-        self.mode_count = body.mode_count
-        self.interpolate = body.interpolate
-        self.T = T
-
-
 def mixed(body, T):
-    """The text's own numbers changed: M, K, D, shapes and invariants by the congruence with T."""
-    from ffrobot.fe_models.modal_body import Interface, Stations
-
-    changed = Mixed(body, T)
-    changed.modal_mass, changed.stiffness = T.T @ T, T.T @ body.stiffness @ T
-    changed.S_bar, changed.I_bar = body.S_bar @ T, body.I_bar @ T
-    changed.S_bar_kl = np.einsum("abkl,km,ln->abmn", body.S_bar_kl, T, T)
-    changed.interfaces = {
-        name: Interface(at.position, at.translation @ T, at.rotation @ T) for name, at in body.interfaces.items()
-    }
-    at = body.stations
-    changed.stations = Stations(at.position, at.translation @ T, at.rotation @ T, at.height)
-    return changed
+    """What `fem_text` asks for, in coordinates q, p = T q, which `ModalBody` does not take: a congruence with T."""
+    at, names = body.stations, [item.name for item in dataclasses.fields(body)]
+    return SimpleNamespace(**{name: getattr(body, name) for name in names} | {
+        "mode_count": body.mode_count, "interpolate": body.interpolate,
+        "modal_mass": T.T @ T, "stiffness": T.T @ body.stiffness @ T,
+        "S_bar": body.S_bar @ T, "I_bar": body.I_bar @ T,
+        "S_bar_kl": np.einsum("abkl,km,ln->abmn", body.S_bar_kl, T, T),
+        "interfaces": {name: Interface(end.position, end.translation @ T, end.rotation @ T)
+                       for name, end in body.interfaces.items()},
+        "stations": Stations(at.position, at.translation @ T, at.rotation @ T, at.height),
+    })  # fmt: skip
 
 
 def test_lumped_masses_of_a_fem_file(bodies):
@@ -126,8 +116,6 @@ def test_lumped_masses_of_a_fem_file(bodies):
 
 
 def with_all_points(body, points):
-    from ffrobot.fe_models.modal_body import Interface
-
     zero = np.zeros((3, body.mode_count))
     more = {f"p{k}": Interface(points.x[k], points.Phi[k], zero) for k in range(2, len(points.x))}
     root, tip = (Interface(points.x[k], points.Phi[k], zero) for k in (0, 1))

@@ -265,11 +265,10 @@ def test_motion(robot, name):
 
 
 @pytest.fixture
-def slave(tmp_path):
+def slave(robot, tmp_path):
     """The folder in which the arm's FMU is unpacked, one with blanks, what it logs, and what makes an instance."""
-    folder, told, scene = tmp_path / "an FMU, unpacked", [], tmp_path / "scene.toml"
-    scene.write_text(scene_text("arm"))
-    extract(str(export_file(scene, "fmu", None, None).path), str(folder))
+    folder, told = tmp_path / "an FMU, unpacked", []
+    extract(str(robot("arm")[0]), str(folder))
     return folder, told, lambda: instance_of(folder, told)
 
 
@@ -315,10 +314,8 @@ def test_steps_that_are_repeated(slave):
     """Kept states bring back motion, inputs and step sizes: the same again to the last bit, also after a reset."""
     _, told, make = slave
     instance, reference = make()
-    outputs, motor = (
-        [reference[name] for name in ("joint/shoulder/rate", "point/fore.tip/z")],
-        reference["joint/elbow/moment"],
-    )
+    outputs = [reference[name] for name in ("joint/shoulder/rate", "point/fore.tip/z")]
+    motor = reference["joint/elbow/moment"]
     instance.setReal([motor], [-0.5])
     instance.doStep(0.0, 0.1)
     kept, then = instance.getFMUstate(), instance.getReal(outputs)

@@ -214,36 +214,20 @@ def test_whole_seconds_and_nanoseconds(epoch, tmp_path):
     np.testing.assert_array_equal(table.values, [row[1:] for row in ROWS])
 
 
-def points(time):
-    return [{"positions": [a, b], "time_from_start": time(t)} for t, a, b in ROWS]
+def plan(time, rows=ROWS):
+    points = [{"positions": [a, b], "time_from_start": time(t)} for t, a, b in rows]
+    return {"joint_names": ["hip", "knee"], "points": points}
 
 
+LATER = plan(lambda t: t - 0.5, [*ROWS[1:], ROWS[2]])
 MESSAGES = {
-    "ROS 2": {
-        "joint_names": ["hip", "knee"],
-        "points": points(lambda t: {"sec": int(t), "nanosec": round(t % 1 * 1e9)}),
-    },
-    "ROS 1": {
-        "joint_names": ["hip", "knee"],
-        "points": points(lambda t: {"secs": int(t), "nsecs": round(t % 1 * 1e9)}),
-    },
-    "protobuf": {"joint_names": ["hip", "knee"], "points": points(lambda t: f"{t}s")},
+    "ROS 2": plan(lambda t: {"sec": int(t), "nanosec": round(t % 1 * 1e9)}),
+    "ROS 1": plan(lambda t: {"secs": int(t), "nsecs": round(t % 1 * 1e9)}),
+    "protobuf": plan(lambda t: f"{t}s"),
     "segments, of which the last point is there twice": {
-        "trajectory": [
-            {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)[:2]}},
-            {
-                "joint_trajectory": {
-                    "joint_names": ["hip", "knee"],
-                    "points": [
-                        {"positions": [a, b], "time_from_start": max(t - 0.5, 0)} for t, a, b in (*ROWS[1:], ROWS[2])
-                    ],
-                }
-            },
-        ]
+        "trajectory": [{"joint_trajectory": plan(float, ROWS[:2])}, {"joint_trajectory": LATER}]
     },
-    "numbers": {
-        "goal": {"trajectory": {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)}}}
-    },
+    "numbers": {"goal": {"trajectory": {"joint_trajectory": plan(float)}}},
 }
 
 
@@ -285,24 +269,30 @@ def test_wrong_motions(text, tmp_path):
     assert WRONG[text] in str(error.value)
 
 
-@pytest.mark.parametrize("version", [8, 9])
-def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
-    """Written by rosbags, whose messages name joints in any order."""
+def bag_of(folder, rows, version=9):
+    """A bag, by rosbags, with JointStates of `rows`: topic, stamp (s), positions by joint."""
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
 
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    of = types.types
-    kind = "sensor_msgs/msg/JointState"
-    with Writer(tmp_path / "bag", version=version) as writer:
-        topic = writer.add_connection("/joint_states", kind, typestore=types)
-        for k, (t, hip, knee) in enumerate(ROWS):
-            stamp = of["builtin_interfaces/msg/Time"](sec=EPOCH + int(t), nanosec=round(t % 1 * 1e9))
+    types, kind, topics = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/JointState", {}
+    of, none = types.types, np.zeros(0)
+    with Writer(folder, version=version) as writer:
+        for k, (topic, t, positions) in enumerate(rows):
+            if topic not in topics:
+                topics[topic] = writer.add_connection(topic, kind, typestore=types)
+            stamp = of["builtin_interfaces/msg/Time"](sec=int(t), nanosec=round(t % 1 * 1e9))
             header = of["std_msgs/msg/Header"](stamp=stamp, frame_id="")
-            pairs = [("hip", hip), ("knee", knee)][:: 1 if k % 2 == 0 else -1]
-            none = np.zeros(0)
-            message = of[kind](header, [name for name, _ in pairs], np.array([q for _, q in pairs]), none, none)
-            writer.write(topic, EPOCH * 10**9 + k, types.serialize_cdr(message, kind))
+            message = of[kind](header, list(positions), np.array(list(positions.values())), none, none)
+            writer.write(topics[topic], EPOCH * 10**9 + k * 10**7, types.serialize_cdr(message, kind))
+    return folder
+
+
+@pytest.mark.parametrize("version", [8, 9])
+def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
+    """Messages name joints in any order."""
+    pairs = [[("hip", hip), ("knee", knee)][:: (-1) ** k] for k, (_, hip, knee) in enumerate(ROWS)]
+    rows = [("/joint_states", EPOCH + t, dict(of)) for (t, *_), of in zip(ROWS, pairs, strict=True)]
+    bag_of(tmp_path / "bag", rows, version)
     done = ffrobot.ok("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
     assert "measured positions of /joint_states" in done.stdout
     table = load_waypoints(tmp_path / "path.csv")
@@ -316,24 +306,6 @@ def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
     (tmp_path / "bag" / "metadata.yaml").write_text("not: a bag\n")
     broken = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "other.csv")
     assert (broken.returncode, "expected a bag of ROS" in broken.stderr) == (2, True)
-
-
-def bag_of(folder, rows):
-    """A bag with JointStates of `rows`: topic, stamp (s), positions by joint."""
-    from rosbags.rosbag2 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    types, kind, topics = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/JointState", {}
-    of, none = types.types, np.zeros(0)
-    with Writer(folder, version=9) as writer:
-        for k, (topic, t, positions) in enumerate(rows):
-            if topic not in topics:
-                topics[topic] = writer.add_connection(topic, kind, typestore=types)
-            stamp = of["builtin_interfaces/msg/Time"](sec=int(t), nanosec=round(t % 1 * 1e9))
-            header = of["std_msgs/msg/Header"](stamp=stamp, frame_id="")
-            message = of[kind](header, list(positions), np.array(list(positions.values())), none, none)
-            writer.write(topics[topic], EPOCH * 10**9 + k * 10**7, types.serialize_cdr(message, kind))
-    return folder
 
 
 @pytest.mark.parametrize("before", [0.01, -0.01])
@@ -364,13 +336,11 @@ def test_a_joint_on_two_topics(tmp_path):
 def test_motions_that_move_at_their_ends_are_told(tmp_path):
     """A sine begins at its largest rate and ends at rest after a quarter of its period."""
     times = np.linspace(0.0, 1.0, 11)
-    points = [
-        {"positions": [np.sin(np.pi / 2 * t), 0.0], "velocities": [np.pi / 2 * np.cos(np.pi / 2 * t), 0.0],
-         "time_from_start": t}
-        for t in times
-    ]  # fmt: skip
+    message = plan(float, [(t, np.sin(np.pi / 2 * t), 0.0) for t in times])
+    for t, point in zip(times, message["points"], strict=True):
+        point["velocities"] = [np.pi / 2 * np.cos(np.pi / 2 * t), 0.0]
     path = tmp_path / "motion.json"
-    path.write_text(json.dumps({"joint_names": ["hip", "knee"], "points": points}), encoding="utf-8")
+    path.write_text(json.dumps(message), encoding="utf-8")
     (remark,) = read_motion(path).remarks
     assert remark.startswith('"hip" at the first point: velocities of up to 1.57 left out: waypoints begin and')
 

@@ -14,64 +14,28 @@ from rigid_robots import moments, random_urdf, with_motion
 from ffrobot import InputError, Results
 from ffrobot.exchange.export import export_file
 
-ARM = """
-name = "anyhow"
-space = "spatial"
-gravity = [0.0, 0.0, -9.81]
-
-[[body]]
-name = "turret"
-rigid = { mass = 4.0, center = [0.02, -0.03, 0.1], inertia = [[0.03, 0.002, -0.001], [0.002, 0.02, 0.003], [-0.001, 0.003, 0.015]], points = { foot = [0.01, 0.02, -0.1], top = [0.0, 0.05, 0.2] } }
-
-[[body]]
-name = "slide"
-rigid = { mass = 2.0, center = [0.1, 0.0, 0.0], inertia = [0.004, 0.02, 0.02], points = { back = [-0.1, 0.02, 0.0], front = [0.3, 0.0, 0.04] } }
-
-[[body]]
-name = "cover"
-rigid = { mass = 0.5, center = [0.0, 0.01, 0.0], inertia = [0.001, 0.002, 0.002], points = { rim = [0.05, 0.0, 0.0] } }
-
-[[body]]
-name = "hand"
-rigid = { mass = 1.0, center = [0.0, 0.0, 0.06], inertia = [0.002, 0.003, 0.001], points = { wrist = [0.02, -0.01, 0.0], tool = [0.0, 0.03, 0.15] } }
-
-[[payload]]
-point = "hand.tool"
-mass = 0.7
-center = [0.0, 0.01, 0.04]
-inertia = [0.001, 0.001, 0.0005]
-
-[[joint]]
-name = "waist"
-type = "revolute"
-between = ["ground", "turret.foot"]
-at = [0.3, -0.2, 0.5]
-axis = [0.1, -0.2, 2.0]
-rpy = [0.3, -0.4, 1.1]
-position_limit = [-2.0, 2.5]
-moment_limit = 90.0
-
-[[joint]]
-name = "lift"
-type = "prismatic"
-between = ["slide.back", "turret.top"]                # the second side carries the first
-axis = [1.0, 0.5, -0.2]
-rpy = [1.2, 0.2, -0.7]
-
-[[joint]]
-name = "lid"
-type = "weld"
-between = ["turret.top", "cover.rim"]
-rpy = [0.0, 1.5707963267948966, 0.5]
-
-[[joint]]
-name = "wrist"
-type = "revolute"
-between = ["hand.wrist", "slide.front"]               # likewise
-axis = [0.0, 1.0, 0.3]
-rpy = [-0.6, 0.1, 0.2]
-viscous_friction = 0.2
-"""  # noqa: E501 (a table of TOML is one line)
+TENSOR = [[0.03, 0.002, -0.001], [0.002, 0.02, 0.003], [-0.001, 0.003, 0.015]]
+ARM = tomli_w.dumps({
+    "name": "anyhow", "space": "spatial", "gravity": tables_3d.DOWN,
+    "body": [
+        tables_3d.rigid("turret", 4.0, TENSOR, [0.02, -0.03, 0.1], foot=[0.01, 0.02, -0.1], top=[0.0, 0.05, 0.2]),
+        tables_3d.rigid("slide", 2.0, [0.004, 0.02, 0.02], [0.1, 0.0, 0.0], back=[-0.1, 0.02, 0.0],
+                        front=[0.3, 0.0, 0.04]),
+        tables_3d.rigid("cover", 0.5, [0.001, 0.002, 0.002], [0.0, 0.01, 0.0], rim=[0.05, 0.0, 0.0]),
+        tables_3d.rigid("hand", 1.0, [0.002, 0.003, 0.001], [0.0, 0.0, 0.06], wrist=[0.02, -0.01, 0.0],
+                        tool=[0.0, 0.03, 0.15]),
+    ],
+    "payload": [{"point": "hand.tool", "mass": 0.7, "center": [0.0, 0.01, 0.04], "inertia": [0.001, 0.001, 0.0005]}],
+    "joint": [
+        tables_3d.revolute("waist", "ground", "turret.foot", [0.1, -0.2, 2.0], at=[0.3, -0.2, 0.5],
+                           rpy=[0.3, -0.4, 1.1], position_limit=[-2.0, 2.5], moment_limit=90.0),
+        # the second side carries the first, twice
+        tables_3d.joint("lift", "prismatic", "slide.back", "turret.top", axis=[1.0, 0.5, -0.2], rpy=[1.2, 0.2, -0.7]),
+        tables_3d.revolute("wrist", "hand.wrist", "slide.front", [0.0, 1.0, 0.3], rpy=[-0.6, 0.1, 0.2],
+                           viscous_friction=0.2),
+        tables_3d.joint("lid", "weld", "turret.top", "cover.rim", rpy=[0.0, np.pi / 2, 0.5]),
+    ],
+})  # fmt: skip
 NAMES = ("waist", "lift", "wrist")
 MOTION = [dict(zip(NAMES, row, strict=True)) for row in ((0.4, 0.15, -0.8), (1.1, -0.6, 2.0), (-3.0, 2.0, 5.0))]
 

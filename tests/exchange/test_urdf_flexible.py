@@ -1,6 +1,7 @@
 """Links of a URDF that a link file makes flexible: where they stand, where joints are on them, what is refused."""
 
 import re
+import shutil
 import tomllib
 
 import gmsh
@@ -56,11 +57,18 @@ def import_with(ffrobot, folder, link=BAR, text=ARM, name="upper"):
     return ffrobot("import", "arm.urdf", "-o", "out", "--flexible", f"{name}=bar.toml", cwd=folder)
 
 
-def test_a_stiff_link_carries_what_the_rigid_one_does(tmp_path, ffrobot):
-    """Weights in three postures: frames, interfaces and welds are where the URDF has them."""
-    done = import_with(ffrobot, tmp_path)
+@pytest.fixture(scope="module")
+def out(tmp_path_factory, ffrobot):
+    """The folder of the scene, and what was printed."""
+    folder = tmp_path_factory.mktemp("arm")
+    done = import_with(ffrobot, folder)
     assert done.returncode == 0, done.stderr
-    scene = tmp_path / "out" / "scene.toml"
+    return folder / "out", done.stdout
+
+
+def test_a_stiff_link_carries_what_the_rigid_one_does(out, tmp_path, ffrobot):
+    """Weights in three postures: frames, interfaces and welds are where the URDF has them."""
+    scene = shutil.copytree(out[0], tmp_path / "out") / "scene.toml"
     text, names = scene.read_text(), ("turn", "shoulder", "elbow")
     rest = dict.fromkeys(names, 0.0)
     for posture in ((0.0, 0.0, 0.0), (0.4, -1.0, 0.7), (-2.0, 0.5, 1.9)):
@@ -77,18 +85,18 @@ def test_a_stiff_link_carries_what_the_rigid_one_does(tmp_path, ffrobot):
         np.testing.assert_allclose(found, [expected[name] for name in names], atol=9e-6)
 
 
-def test_the_link_file_gets_length_and_interfaces(tmp_path, ffrobot):
-    done = import_with(ffrobot, tmp_path)
-    link = tomllib.loads((tmp_path / "out" / "upper.toml").read_text())
+def test_the_link_file_gets_length_and_interfaces(out):
+    folder, printed = out
+    link = tomllib.loads((folder / "upper.toml").read_text())
     assert link["geometry"]["length"] == pytest.approx(0.5, rel=1e-15)
     assert link["interface"] == [{"name": "middle", "position": pytest.approx(0.2, rel=1e-15)}]
-    joints = {entry["name"]: entry for entry in tomllib.loads((tmp_path / "out" / "scene.toml").read_text())["joint"]}
+    joints = {entry["name"]: entry for entry in tomllib.loads((folder / "scene.toml").read_text())["joint"]}
     assert joints["shoulder"]["between"][1] == "upper.root"
     assert joints["elbow"]["between"] == ["upper.tip", "fore.origin"]
     assert joints["middle"]["type"] == "weld"
     assert joints["middle"]["between"] == ["upper.middle", "box.origin"]
-    assert 'link "upper" is flexible: upper.toml determines its inertia, not its <inertial>' in done.stdout
-    assert 'length 0.5 m, the distance to joint "elbow"' in done.stdout
+    assert 'link "upper" is flexible: upper.toml determines its inertia, not its <inertial>' in printed
+    assert 'length 0.5 m, the distance to joint "elbow"' in printed
 
 
 WRONG = {
@@ -110,14 +118,15 @@ def test_what_is_refused(changes, expected, tmp_path, ffrobot):
 
 
 @pytest.mark.parametrize("name", ["a\n[[load]]\nx.toml", "../outside"])
-def test_links_of_any_name_get_files_of_their_own_in_the_folder(name, tmp_path, ffrobot):
+def test_links_of_any_name_get_files_of_their_own_in_the_folder(name, out, tmp_path, ffrobot):
     """Both files are what they are without such names, but for names: no line of one is read as a key."""
-    assert import_with(ffrobot, tmp_path).returncode == 0
-    plain = {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "out").iterdir()}
-    (tmp_path / "arm.urdf").write_text(ARM.replace('"upper"', f'"{name}"'.replace("\n", "&#10;")), encoding="utf-8")
-    ffrobot.ok("import", "arm.urdf", "-o", "other", "--flexible", f"{name}=bar.toml", cwd=tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"arm.urdf", "bar.toml", "out", "other"}
-    found = {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "other").iterdir()}
+    text = ARM.replace('"upper"', f'"{name}"'.replace("\n", "&#10;"))
+    assert import_with(ffrobot, tmp_path, text=text, name=name).returncode == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"arm.urdf", "bar.toml", "out"}
+    plain, found = (
+        {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in folder.iterdir()}
+        for folder in (out[0], tmp_path / "out")
+    )
     (link,) = (value for key, value in found.items() if key != "scene.toml")
     assert {key: link[key] for key in link if key != "name"} == {
         key: value for key, value in plain["upper.toml"].items() if key != "name"

@@ -283,27 +283,10 @@ def test_units_in_a_wrong_scale_are_told(imported):
     assert 'link "arm": its center of mass is 1.5 m from its frame, its inertia within 0.1 m' in out
 
 
-CUBE = """solid cube
-{}endsolid cube
-"""
-
-
-def stl_of_cube(a):
-    """A closed cube of edge a, m, a corner at the origin."""
-    corners = np.array([[x, y, z] for x in (0, a) for y in (0, a) for z in (0, a)])
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    facets = ""
-    for p, q, r, s in quads:
-        for triangle in ((p, q, r), (p, r, s)):
-            vertices = "".join("vertex {} {} {}\n".format(*corners[k]) for k in triangle)
-            facets += f"facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n"
-    return CUBE.format(facets)
-
-
 def test_masses_of_meshes(tmp_path, imported):
     """A cube of 0.1 m as a mesh in mm: 1e-3 m³, so 2000 kg/m³; its inertia of 2 kg is m a²/6 about each axis."""
-    pytest.importorskip("trimesh")
-    (tmp_path / "cube.stl").write_text(stl_of_cube(100.0))
+    cube = pytest.importorskip("trimesh").creation.box((100.0, 100.0, 100.0))
+    cube.apply_translation((50.0, 50.0, 50.0)).export(tmp_path / "cube.stl")
     visual = '<visual><geometry><mesh filename="package://{}/cube.stl" scale="1e-3 1e-3 1e-3"/></geometry></visual>'
     arm = link("arm", INERTIAL + visual.format(tmp_path.name))
     _, out = imported(robot(BASE, arm, joint("j", "base", "arm")))

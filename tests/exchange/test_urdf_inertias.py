@@ -7,9 +7,9 @@ import pytest
 
 import ffrobot
 from ffrobot import FfrobotError
-from ffrobot.exchange.urdf.scene import least_change
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.exchange.urdf.robot import read_urdf
+from ffrobot.exchange.urdf.scene import least_change
 
 INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.025"'
 TIAGO = 'ixx="0.0019" ixy="0" ixz="0" iyy="0.00846" iyz="0" izz="0.01059"'  # its first arm link, 2 % off

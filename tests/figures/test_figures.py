@@ -63,10 +63,7 @@ def test_figure_file_decides_what_is_drawn(results, tmp_path):
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        (
-            'curves = [{ data = "inverse/joints/Q/moment", label = "" }]',
-            'expected the dataset "inverse/joints/Q/moment"',
-        ),
+        ('curves = [{ data = "inverse/Q/moment", label = "" }]', 'expected the dataset "inverse/Q/moment"'),
         ('curves = [{ data = "inverse/joints/O/reaction[2]", label = "" }]', "expected column 2"),
         ('kind = "path"\ncurves = [{ data = "inverse/bodies/rod/angle", label = "" }]', "expected two columns"),
         ('curves = [{ data = "a", label = "", file = "none.csv" }]', "expected an existing file"),
@@ -94,21 +91,23 @@ def test_only_the_figures_asked_for(results, tmp_path):
 def test_limits_of_a_motor_over_its_speed():
     """Every point of the curve is at one limit and within the others; without limits there is none."""
     limits = MotorLimits(moment=20.0, speed=5.0, power=40.0)
-    points = limit_curves(limits, 4.0, 18.0)
-    speed, moment = np.abs(points[~np.isnan(points).any(axis=1)]).T
+
+    def drawn(limits, *largest):
+        points = limit_curves(limits, *largest)
+        return points[~np.isnan(points).any(axis=1)]
+
+    points = drawn(limits, 4.0, 18.0)
+    speed, moment = np.abs(points).T
     shares = np.array([moment / 20.0, speed / 5.0, speed * moment / 40.0])
     np.testing.assert_allclose(shares.max(axis=0), 1.0, rtol=1e-12)
-    assert {tuple(sign) for sign in np.sign(points[~np.isnan(points).any(axis=1)])} >= {(1, 1), (-1, 1), (1, -1)}
+    assert {tuple(sign) for sign in np.sign(points)} >= {(1, 1), (-1, 1), (1, -1)}
     assert len(limit_curves(MotorLimits(), 4.0, 18.0)) == 0
-    power_alone = limit_curves(MotorLimits(power=40.0), 4.0, 18.0)
-    drawn = power_alone[~np.isnan(power_alone).any(axis=1)]
-    np.testing.assert_allclose(np.abs(drawn).prod(axis=1), 40.0, rtol=1e-12)
-    moment_alone = limit_curves(MotorLimits(moment=3.0), 4.0, 2.0)
-    drawn = moment_alone[~np.isnan(moment_alone).any(axis=1)]
-    np.testing.assert_array_equal(np.abs(drawn[:, 1]), 3.0)
-    assert 4.0 < np.abs(drawn[:, 0]).max() < 5.0  # no farther than the data ask for
-    corners = limit_curves(MotorLimits(moment=3.0, speed=2.0), 0.1, 0.1)  # a rectangle, however small the data
-    assert {tuple(point) for point in np.abs(corners[~np.isnan(corners).any(axis=1)])} == {(0, 3), (2, 3), (2, 0)}
+    np.testing.assert_allclose(np.abs(drawn(MotorLimits(power=40.0), 4.0, 18.0)).prod(axis=1), 40.0, rtol=1e-12)
+    speed, moment = np.abs(drawn(MotorLimits(moment=3.0), 4.0, 2.0)).T
+    np.testing.assert_array_equal(moment, 3.0)
+    assert 4.0 < speed.max() < 5.0  # no farther than the data ask for
+    corners = drawn(MotorLimits(moment=3.0, speed=2.0), 0.1, 0.1)  # a rectangle, however small the data
+    assert {tuple(point) for point in np.abs(corners)} == {(0, 3), (2, 3), (2, 0)}
 
 
 def test_magnitude_scale_and_x_of_a_curve(results):
@@ -125,16 +124,21 @@ def test_exaggeration_of_what_can_be_seen(deflection, s):
     assert visible_exaggeration(1.0, deflection) == s
 
 
-@pytest.mark.parametrize(("patches", "is_map"), [(10, True), (4, False)])
-def test_many_saturated_voltages_are_drawn_as_a_map(patches, is_map):
-    """A row for each patch with its voltage; few patches as lines, with their limits, and times at these shaded."""
-    time = np.linspace(0.0, 1.0, 50)
-    voltages = 200.0 * np.sign(np.sin(np.outer(time + 0.01, np.arange(1.0, patches + 1.0)) * 9.0))
+def voltages_drawn(time, voltages):
+    """Between limits of ±200 V."""
     results = SimpleNamespace(data=lambda _: voltages, time=lambda _: time)
     record = FigureRecord(name="v", curves=(Curve(data="v", label="patch"),), y_label="voltage (V)", limits=(-200, 200))
     figure, axes = new_axes("")
     draw_time_history(axes, record, results)
     figure.canvas.draw()
+    return axes
+
+
+@pytest.mark.parametrize(("patches", "is_map"), [(10, True), (4, False)])
+def test_many_saturated_voltages_are_drawn_as_a_map(patches, is_map):
+    """A row for each patch with its voltage; few patches as lines, with their limits, and times at these shaded."""
+    time = np.linspace(0.0, 1.0, 50)
+    axes = voltages_drawn(time, 200.0 * np.sign(np.sin(np.outer(time + 0.01, np.arange(1.0, patches + 1.0)) * 9.0)))
     assert len(axes.images) == is_map
     assert len(axes.lines) == (0 if is_map else patches + 2)
     assert len(axes.collections) == (0 if is_map else 1)
@@ -147,11 +151,7 @@ def test_times_at_a_limit_are_shaded():
     """From 0.5 s on the second patch is at its limit; 0.1 % below it is not."""
     time = np.linspace(0.0, 1.0, 101)
     voltages = np.stack([199.7 * np.sin(2 * np.pi * time), np.minimum(400.0 * time, 200.0)], axis=1)
-    results = SimpleNamespace(data=lambda _: voltages, time=lambda _: time)
-    axes = new_axes("")[1]
-    record = FigureRecord(name="v", curves=(Curve(data="v", label="patch"),), y_label="voltage (V)", limits=(-200, 200))
-    draw_time_history(axes, record, results)
-    (shade,) = axes.collections
+    (shade,) = voltages_drawn(time, voltages).collections
     (span,) = shade.get_paths()
     assert [span.vertices[:, 0].min(), span.vertices[:, 0].max()] == pytest.approx([0.5, 1.0])
 

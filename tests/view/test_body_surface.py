@@ -2,32 +2,18 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, modal_body, rectangle, tube
 
-from ffrobot import make_link
 from ffrobot.pictures.shapes import body_surface
 
-STEEL = "material = { youngs_modulus = 2.1e11, poissons_ratio = 0.3, density = 7850.0 }\n"
-RECTANGLE = 'section = { shape = "rectangle", height = 0.02, width = 0.03 }'
-TUBE = 'section = { shape = "tube", outer = 0.04, inner = 0.03 }'
-STEPPED = f"segment = [{{ until = 0.25, {TUBE} }}, {{ until = 1.0, {RECTANGLE} }}]"
+RECTANGLE, TUBE = {"section": rectangle(0.02, 0.03)}, {"section": tube(0.04, 0.03)}
+STEPPED = {"segment": [{"until": 0.25} | TUBE, {"until": 1.0} | RECTANGLE]}
 
 
-@pytest.fixture(scope="module")
-def beam(tmp_path_factory):
-    """Make a beam of the given geometry with modes of all families."""
-    folder = tmp_path_factory.mktemp("beams")
-
-    def make(geometry):
-        path = folder / "beam.toml"
-        path.write_text(
-            f'name = "beam"\n{STEEL}geometry = {{ kind = "beam", length = 1.0, {geometry} }}\n'
-            'mesh = { elements = 4 }\nreference = { condition = "cantilever" }\n'
-            'modes = { count = 12, family = "all" }\n',
-            encoding="utf-8",
-        )
-        return make_link(path).body
-
-    return make
+def beam(geometry):
+    """With modes of all families."""
+    link = beam_link(1.0, None, 4, modes={"count": 12, "family": "all"})
+    return modal_body(link | {"geometry": {"kind": "beam", "length": 1.0} | geometry})
 
 
 def volume(mesh):
@@ -45,21 +31,17 @@ def polygon(diameter, q=16):
 
 @pytest.mark.parametrize(
     ("geometry", "expected"),
-    [
-        (RECTANGLE, 0.02 * 0.03),
-        (TUBE, polygon(0.04)),
-        (STEPPED, 0.25 * polygon(0.04) + 0.75 * 0.02 * 0.03),
-    ],
+    [(RECTANGLE, 0.0006), (TUBE, polygon(0.04)), (STEPPED, 0.25 * polygon(0.04) + 0.75 * 0.0006)],
     ids=["rectangle", "tube", "stepped"],
-)  # fmt: skip
-def test_surface_is_closed_and_holds_the_volume(beam, geometry, expected):
+)
+def test_surface_is_closed_and_holds_the_volume(geometry, expected):
     mesh = body_surface(beam(geometry))
     assert volume(mesh) == pytest.approx(expected, rel=1e-12)  # positive: normals point outwards
     sides = np.stack([mesh.cells, np.roll(mesh.cells, -1, axis=1)], axis=2).reshape(-1, 2)
     assert {tuple(side) for side in sides} == {tuple(side[::-1]) for side in sides}  # each once in either direction
 
 
-def test_corners_move_with_their_section(beam):
+def test_corners_move_with_their_section():
     """All six motions at once, of a place that is a station: Φ + θ × a."""
     body = beam(RECTANGLE)
     p = 1e-3 * np.arange(1.0, 1.0 + len(body.family))
