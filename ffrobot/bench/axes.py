@@ -14,11 +14,8 @@ from .precision import KINDS, Row, TimedRun, errors, run, with_analysis
 
 Keys = dict[str, Any]
 
-# Patches that fit the modes of the scene need not fit others; where they do, this changes nothing.
-_ANY_NUMBER_OF_MODES = {"allocation": "least-squares", "mode_weights": None}
 
-
-def refined(scene: Scene, elements: float, modes: float) -> Scene | None:
+def _refined(scene: Scene, elements: float, modes: float) -> Scene | None:
     """The scene with `elements` and `modes` times as many of them in every link that is given by its link file.
 
     None where neither changes anything: no link files, or none with such keys.
@@ -33,13 +30,14 @@ def refined(scene: Scene, elements: float, modes: float) -> Scene | None:
             body = body.model_copy(update={"link": LinkTable(keys, link_path(body.link))})
         bodies.append(body)
     update: Keys = {"body": tuple(bodies)}
-    if modes != 1:
-        update["pzt"] = tuple(layout.model_copy(update=_ANY_NUMBER_OF_MODES) for layout in scene.pzt)
+    if modes != 1:  # patches that fit the modes of the scene need not fit others; where they do, nothing changes
+        any_number = {"allocation": "least-squares", "mode_weights": None}
+        update["pzt"] = tuple(layout.model_copy(update=any_number) for layout in scene.pzt)
     return scene.model_copy(update=update) if changed else None
 
 
-def sizes_of(scene: Scene) -> dict[str, str]:
-    """Return numbers of elements and modes in the link files, for the record: "20", or "20, 40" where they differ."""
+def _sizes(scene: Scene) -> dict[str, str]:
+    """Numbers of elements and modes in the link files: "20", or "20, 40" where they differ."""
     links = [link_keys(body.link) for body in scene.body if body.link is not None]
     meshes = (item for keys in links for item in keys.get("mesh", {}).items())
     elements = [str(value) for key, value in meshes if key not in ("cell", "order")]
@@ -84,16 +82,14 @@ def measure_axes(scene: Scene, analysis: IntegratedAnalysis, budget: float, disp
     """
     tight = max(TIGHTEST_TOLERANCE, UNSEEN * analysis.tolerance)
     rows: list[Row] = []
-    trial = _Trials(scene, analysis, budget, display)
-    fine = ELEMENTS[-1] if trial(ELEMENTS[-1], 1.0, tight) is not None else 1.0
+    trial = _Trials(scene, analysis.name, budget, display)
+    fine = ELEMENTS[-1] if trial(ELEMENTS[-1], 1.0, tight) else 1.0
     axes = {"mesh": [(f, 1.0) for f in ELEMENTS], "modes": [(fine, f) for f in MODES]}
     for axis, factors in axes.items():
-        best = trial(*factors[-1], tight)
-        if best is not None:
+        if best := trial(*factors[-1], tight):
             rows += [trial.row(axis, *factor, tight, best) for factor in factors[:-1]]
     rows.append(trial.row("time", 1.0, 1.0, analysis.tolerance, trial(1.0, 1.0, tight)))
-    everything = trial(fine, MODES[-1], tight)
-    if everything is not None:
+    if everything := trial(fine, MODES[-1], tight):
         rows.append(trial.row("total", 1.0, 1.0, analysis.tolerance, everything))
     return rows
 
@@ -101,47 +97,42 @@ def measure_axes(scene: Scene, analysis: IntegratedAnalysis, budget: float, disp
 class _Trials:
     """Runs of one analysis with links refined; each combination once."""
 
-    def __init__(self, scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher) -> None:
-        self.scene, self.analysis, self.budget, self.display = scene, analysis, budget, display
-        self.done: dict[tuple[float, float, float], TimedRun | str] = {}
+    def __init__(self, scene: Scene, name: str, budget: float, display: Watcher) -> None:
+        self.scene, self.name, self.budget, self.display = scene, name, budget, display
+        self.done: dict[tuple[float, float, float], TimedRun] = {}
 
-    def __call__(self, elements: float, modes: float, tolerance: float) -> TimedRun | str | None:
-        """The run, why there is none, or None where the link files do not let elements or modes change."""
+    def __call__(self, elements: float, modes: float, tolerance: float) -> TimedRun | None:
+        """The run; None where the link files do not let elements or modes change."""
         key = (elements, modes, tolerance)
         if key not in self.done:
-            scene = self._scene(elements, modes)
-            if scene is None:
+            if (scene := self._scene(elements, modes)) is None:
                 return None
             self.display.stage(f"{elements:g} × elements, {modes:g} × modes, tolerance {tolerance:.0e}")
-            self.done[key] = self._run(scene, tolerance)
+            try:
+                timed = run(with_analysis(scene, self.name, tolerance=tolerance), self.name, self.budget, self.display)
+            except FfrobotError as error:  # such as more modes than half the mesh has
+                timed = TimedRun("", "refused", 0.0, 0, 0, 0, {}, {}, str(error).splitlines()[0])
+            self.done[key] = timed
         return self.done[key]
 
-    def row(self, axis: str, elements: float, modes: float, tolerance: float, best: TimedRun | str | None) -> Row:
+    def row(self, axis: str, elements: float, modes: float, tolerance: float, best: TimedRun | None) -> Row:
         timed, scene = self(elements, modes, tolerance), self._scene(elements, modes)
+        assert timed is not None
         assert scene is not None
-        completed = isinstance(timed, TimedRun) and timed.completed
-        error: dict[str, float] = {}
-        if completed and isinstance(best, TimedRun) and isinstance(timed, TimedRun):
-            error = errors(timed.histories, best.histories)
+        assert best is not None
+        error = errors(timed.histories, best.histories)
         return {
             "axis": axis,
             "times": modes if axis == "modes" else elements,
-            **sizes_of(scene),
+            **_sizes(scene),
             "tolerance": tolerance,
-            "status": timed.status if isinstance(timed, TimedRun) else "refused",
-            "against": best.status if isinstance(best, TimedRun) else "refused",
-            "why": timed if isinstance(timed, str) else best if isinstance(best, str) else None,
-            "integrator": timed.integrator if isinstance(timed, TimedRun) else None,
-            "seconds": timed.seconds if isinstance(timed, TimedRun) else None,
+            "status": timed.status,
+            "against": best.status,
+            "why": timed.why or best.why,
+            "integrator": timed.integrator or None,
+            "seconds": timed.seconds or None,
             **{f"error_{kind}": error.get(kind) for kind in KINDS},
         }
 
     def _scene(self, elements: float, modes: float) -> Scene | None:
-        return self.scene if elements == modes == 1.0 else refined(self.scene, elements, modes)
-
-    def _run(self, scene: Scene, tolerance: float) -> TimedRun | str:
-        name = self.analysis.name
-        try:
-            return run(with_analysis(scene, name, tolerance=tolerance), name, self.budget, self.display)
-        except FfrobotError as error:  # such as more modes than half the mesh has
-            return str(error).splitlines()[0]
+        return self.scene if elements == modes == 1.0 else _refined(self.scene, elements, modes)

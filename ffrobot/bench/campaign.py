@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib import import_module
@@ -50,28 +51,8 @@ COLUMNS: Mapping[str, Sequence[str]] = {
 HEADINGS = {"seconds_min": "least seconds"}
 
 
-def write_record(folder: Path, part: str, rows: Sequence[Row], about: Mapping[str, object]) -> list[Path]:
-    """Write PART.csv and PART.json into `folder`, which is made where absent. Returns the two paths.
-
-    Columns are those of all rows; cells are empty where a row has no such value. `about` goes into the JSON only.
-    """
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    table = as_csv([columns, *([_short(row.get(key, "")) for key in columns] for row in rows)])
-    record = {"format": FORMAT, "format_version": FORMAT_VERSION, "part": part, **about, "rows": rows}
-    texts = {"csv": table, "json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"}
-    paths = [folder / f"{part.replace('-', '_')}.{extension}" for extension in texts]
-    for path, text in zip(paths, texts.values(), strict=True):
-        write_atomically(path, text.encode(), "record", make_folder=True)
-    return paths
-
-
-def _short(value: object) -> object:
-    """Five digits: more are noise here."""
-    return f"{value:.5g}" if isinstance(value, float) else value
-
-
 def as_text(rows: Sequence[Row], columns: Sequence[str]) -> tuple[list[str], list[list[str]]]:
-    """Headings and cells of `columns`; those that are empty in all rows are left out."""
+    """Headings and cells of `columns`, without those that are empty in all rows."""
     shown = [column for column in columns if any(row.get(column) is not None for row in rows)]
     headings = [HEADINGS.get(column, column.removeprefix("error_").replace("_", " ")) for column in shown]
     values = ([row.get(column) for column in shown] for row in rows)
@@ -79,40 +60,26 @@ def as_text(rows: Sequence[Row], columns: Sequence[str]) -> tuple[list[str], lis
     return headings, cells
 
 
-LIBRARIES = ("ffrobot", "numpy", "scipy", "h5py")
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-
-
 def _about_machine() -> dict[str, object]:
+    information = Path("/proc/cpuinfo")
+    text = information.read_text(encoding="utf-8") if information.is_file() else ""
+    model = re.search(r"^model name\s*:\s*(.*)", text, re.MULTILINE)
+    libraries = ("ffrobot", "numpy", "scipy", "h5py")
     return {
-        "processor": _processor(),
+        "processor": model[1] if model else platform.processor() or platform.machine(),
         "cores": os.cpu_count(),
         "system": platform.platform(),
         "compiler": _core.build,
         "versions": {
             "python": platform.python_version(),
-            **{name: str(import_module(name).__version__) for name in LIBRARIES},
+            **{name: str(import_module(name).__version__) for name in libraries},
         },
-        "threads": {name: os.environ.get(name) for name in THREADS},
+        "threads": {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")},
     }
-
-
-def load() -> float:
-    """Number of runnable processes, mean of the last minute; tells how quiet the machine was during timing."""
-    return os.getloadavg()[0]
 
 
 def _content_hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _processor() -> str:
-    information = Path("/proc/cpuinfo")
-    if information.is_file():
-        for line in information.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
 
 
 Swept = tuple[ReferenceRun, list[Point]]
@@ -137,7 +104,11 @@ class Campaign:
             rows = measure_axes(scene, analysis, self.settings.budget, self.display)
             about = {"inputs": inputs_of(scene, {}), "analysis": analysis.name}
             self.keep("axes", rows, about, folder, f"{scene.name}, {analysis.name}: where errors come from")
-            self.drawn(_draw_axes(rows, scene.name, folder))
+            for axis, what in (("mesh", "elements"), ("modes", "modes")):
+                along = grouped(rows, "axis").get(axis, ())
+                curves = {kind: points_of(along, "times", f"error_{kind}") for kind in KINDS}
+                label, name = f"times the {what} of the links", f"error_{axis}"
+                self.drawn(draw(curves, f"{scene.name}: {axis}", label, "error / peak", folder, name))
         return swept
 
     def work_precision(self, scene: Scene, name: str, folder: Path) -> Swept:
@@ -153,17 +124,36 @@ class Campaign:
         return reference, points
 
     def keep(self, part: str, rows: Sequence[Row], about: Mapping[str, object], folder: Path, title: str) -> None:
-        """Write and print the rows of a part; `about` goes into its JSON, beside machine and settings."""
+        """Write PART.csv and PART.json of the rows of a part, and print them.
+
+        `about` goes into the JSON beside machine, settings and load: processes that ran in the last minute (mean).
+        """
+        columns = list(dict.fromkeys(key for row in rows for key in row))
+        cells = ([row.get(key, "") for key in columns] for row in rows)
+        short = ([f"{cell:.5g}" if isinstance(cell, float) else cell for cell in row] for row in cells)
         settings = asdict(self.settings)
-        inputs = _content_hash(repr((settings, about.get("inputs"))))
-        record = {"machine": self.machine, "load": load(), "settings": settings, "inputs_hash": inputs, "title": title}
-        self.drawn(write_record(folder, part, rows, record | dict(about)))
-        columns, lines = as_text(rows, self.columns[part])
+        record = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "part": part,
+            "machine": self.machine,
+            "load": os.getloadavg()[0],
+            "settings": settings,
+            "inputs_hash": _content_hash(repr((settings, about.get("inputs")))),
+            "title": title,
+            **about,
+            "rows": rows,
+        }
+        texts = {"csv": as_csv([columns, *short]), "json": json.dumps(record, indent=1, ensure_ascii=False) + "\n"}
+        for extension, text in texts.items():
+            path = folder / f"{part.replace('-', '_')}.{extension}"
+            write_atomically(path, text.encode(), "record", make_folder=True)
+            self.drawn([path])
         self.console.print(title, soft_wrap=True)
-        print_table(self.console, columns, lines)
+        print_table(self.console, *as_text(rows, self.columns[part]))
 
     def drawn(self, paths: Sequence[Path]) -> None:
-        """Print the files written."""
+        """Print the names of files written."""
         for path in paths:
             self.console.print(str(path), soft_wrap=True)
 
@@ -189,16 +179,6 @@ def draw_work_precision(groups: Mapping[str, Rows], title: str, folder: Path) ->
     for kind in KINDS:
         curves = {name: points_of(rows, TIME, f"error_{kind}") for name, rows in groups.items()}
         written += draw(curves, f"{title}: {kind}", time, error, folder, f"work_precision_{kind}")
-    return written
-
-
-def _draw_axes(rows: Rows, title: str, folder: Path) -> list[Path]:
-    written: list[Path] = []
-    for axis in ("mesh", "modes"):
-        along = grouped(rows, "axis").get(axis, ())
-        curves = {kind: points_of(along, "times", f"error_{kind}") for kind in KINDS}
-        label = "times the elements of the links" if axis == "mesh" else "times the modes of the links"
-        written += draw(curves, f"{title}: {axis}", label, "error / peak", folder, f"error_{axis}")
     return written
 
 

@@ -27,73 +27,61 @@ _KIND_OF = {
     ("joints", "reaction"): "force",
     ("joints", "moment"): "moment",
     ("pzt", "required_voltage"): "voltage",
+    ("points", "position"): "position",  # displacement where nothing bends
 }
-_WITHOUT_DEFLECTION = {("points", "position"): "displacement"}  # of scenes in which nothing bends
+NEGLIGIBLE_PEAK = 1e-6  # of the largest of a kind: below is round-off, such as deflections at supports
 
-# Histories whose peak is below this part of the largest of their kind are round-off: deflections at supports.
-NEGLIGIBLE_PEAK = 1e-6
-
-
-def histories(results: Results, analysis: str) -> dict[str, dict[str, Array]]:
-    """Return the histories whose errors are measured, by kind and dataset: arrays (T,) or (T, columns), SI units."""
-    named = _datasets(results, analysis, _KIND_OF)
-    if "displacement" not in named:
-        named |= _datasets(results, analysis, _WITHOUT_DEFLECTION)
-    return named
+Histories = Mapping[str, Mapping[str, Array]]
+"""By kind of quantity and dataset: arrays (T,) or (T, columns), SI units."""
 
 
-def _datasets(results: Results, analysis: str, kinds: Mapping[tuple[str, str], str]) -> dict[str, dict[str, Array]]:
-    named: dict[str, dict[str, Array]] = {}
-    for (group, dataset), kind in kinds.items():
+def _histories(results: Results, analysis: str) -> Histories:
+    kinds: dict[str, dict[str, Array]] = {}
+    for (group, dataset), kind in _KIND_OF.items():
         for member in results.names(f"{analysis}/{group}"):
             name = f"{group}/{member}/{dataset}"
             if results.has(f"{analysis}/{name}"):
-                named.setdefault(kind, {})[name] = results[f"{analysis}/{name}"]
-    notable: dict[str, dict[str, Array]] = {}
-    for kind, datasets in named.items():
+                kinds.setdefault(kind, {})[name] = results[f"{analysis}/{name}"]
+    for datasets in kinds.values():
         peaks = {name: float(np.abs(values).max(initial=0.0)) for name, values in datasets.items()}
-        least = NEGLIGIBLE_PEAK * max(peaks.values())
-        if kept := {name: values for name, values in datasets.items() if peaks[name] > least}:
-            notable[kind] = kept
-    return notable
+        for name, peak in peaks.items():
+            if peak <= NEGLIGIBLE_PEAK * max(peaks.values()):
+                del datasets[name]
+    position = kinds.pop("position", {})
+    kinds["displacement"] = kinds.get("displacement") or position
+    return {kind: datasets for kind, datasets in kinds.items() if datasets}
 
 
-def errors(
-    measured: Mapping[str, Mapping[str, Array]], reference: Mapping[str, Mapping[str, Array]]
-) -> dict[str, float]:
+def errors(measured: Histories, reference: Histories) -> dict[str, float]:
     """Return, by kind, the largest difference at any output, relative to the peak of the same dataset in `reference`.
 
-    Kinds that the reference does not have are left out, and datasets that only one of them has.
+    Kinds and datasets that only one of them has are omitted.
     """
     result = {}
     for kind, datasets in reference.items():
-        common = datasets.keys() & measured.get(kind, {}).keys()
-        if common:
+        if common := datasets.keys() & measured.get(kind, {}).keys():
             result[kind] = max(relative(measured[kind][name], datasets[name]) for name in common)
     return result
 
 
 def relative(values: Array, reference: Array) -> float:
-    """Largest difference over the peak of `reference`."""
+    """Return the largest difference of histories (T, …) over the peak of `reference`, dimensionless."""
     return float(np.abs(values - reference).max() / np.abs(reference).max())
-
-
-UNLIMITED = 10**12  # steps: the budget ends a run
 
 
 @dataclass(frozen=True)
 class TimedRun:
-    """One solve: how it ended, its cost, and its histories."""
+    """One solve: how it ended, its cost, and its histories, which are empty unless it completed."""
 
     integrator: str  # the one that ran; for "auto" the one chosen
-    status: str  # "completed", "over budget", or how the integration failed
+    status: str  # "completed", "over budget", "refused", or how the integration failed
     seconds: float  # integration and outputs, of the analysis and of those whose actuation it takes
     steps: int
     rejected: int
     evaluations: int
-    # by kind of quantity and dataset; empty unless completed
-    histories: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    histories: Histories = field(repr=False)
     bodies: Mapping[str, str] = field(repr=False)  # SHA-256 of the modal body file of each flexible body
+    why: str | None = None  # it was refused
 
     @property
     def completed(self) -> bool:
@@ -101,38 +89,30 @@ class TimedRun:
         return self.status == "completed"
 
 
-class Deadline(Watcher):
-    """Stops a solve when its analyses have run for `budget` seconds, and shows how far it is."""
+class _Deadline(Watcher):
+    """Stops a solve when its analyses have run for `budget` seconds from their first step; `passed` says so."""
 
     def __init__(self, budget: float, display: Watcher) -> None:
-        self.budget, self.display = budget, display
+        self.budget, self.display, self.passed = budget, display, False
         self.began: float | None = None
 
-    @property
-    def passed(self) -> bool:
-        """Whether the budget is exceeded; time counts from the first step."""
-        return self.began is not None and time.perf_counter() - self.began > self.budget
-
     def advance(self, t: float, end: float) -> bool:
-        """Return False if the budget is exceeded."""
         self.began = self.began or time.perf_counter()
+        self.passed = time.perf_counter() - self.began > self.budget
         return self.display.advance(t, end) and not self.passed
 
 
 def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
     """The analysis of that name, or the first that integrates. Raises `InputError` where there is none."""
     integrated = [a for a in scene.analysis if isinstance(a, IntegratedAnalysis) and a.is_resumable]
+    wanted = "expected one that integrates over time, pcid or forward"
     if not integrated:
         kinds = quoted(sorted({analysis.kind for analysis in scene.analysis}))
-        raise InputError(f"{scene.path}: analysis: expected one that integrates over time, pcid or forward", kinds)
-    for one in integrated:
-        if name in (None, one.name):
-            return one
-    if other := next((analysis for analysis in scene.analysis if analysis.name == name), None):
-        raise InputError(
-            f'{scene.path}: analysis "{name}": expected one that integrates over time, pcid or forward',
-            f'kind = "{other.kind}"',
-        )
+        raise InputError(f"{scene.path}: analysis: {wanted}", kinds)
+    if found := next((one for one in integrated if name in (None, one.name)), None):
+        return found
+    if other := next((one for one in scene.analysis if one.name == name), None):
+        raise InputError(f'{scene.path}: analysis "{name}": {wanted}', f'kind = "{other.kind}"')
     names = [analysis.name for analysis in integrated]
     raise InputError(
         f"{scene.path}: analysis: expected one of {quoted(names)}", f'"{name}"{did_you_mean(name or "", names)}'
@@ -144,7 +124,7 @@ def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
     kept: list[Analysis] = []
     for analysis in reversed(scene.analysis):
         if analysis.name == name or any(later.takes_actuation and later.source == analysis.name for later in kept):
-            alike = {"max_steps": UNLIMITED, **changes} if analysis.is_resumable else {}
+            alike = {"max_steps": 10**12, **changes} if analysis.is_resumable else {}  # the budget ends a run
             kept.append(analysis.model_copy(update=alike))
     return scene.model_copy(update={"analysis": tuple(reversed(kept))})
 
@@ -155,21 +135,20 @@ def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool 
     Raises `InputError` for anything wrong with the scene, `SolveError` where no state is found, `KeyboardInterrupt`
     after Ctrl-C.
     """
-    deadline = Deadline(budget, display)
+    deadline = _Deadline(budget, display)
     solution = solve_scene(scene, deadline)
-    outcomes = list(solution.outcomes.values())
-    last = outcomes[-1]
-    status, runs = last.status, [outcome.statistics for outcome in outcomes]
+    runs = [outcome.statistics for outcome in solution.outcomes.values()]
+    status = [outcome.status for outcome in solution.outcomes.values()][-1]
     if status == "interrupted":
         if not deadline.passed:
             raise KeyboardInterrupt
         status = "over budget"
-    datasets: dict[str, dict[str, Array]] = {}
+    datasets: Histories = {}
     if keep and status == "completed":
         with Results.from_image(results_image(solution), scene.path) as results:
-            datasets = histories(results, name)
+            datasets = _histories(results, name)
     return TimedRun(
-        integrator=last.statistics.integrator.name,
+        integrator=runs[-1].integrator.name,
         status=status,
         seconds=sum(each.wall_seconds for each in runs),
         steps=sum(each.steps for each in runs),
@@ -225,13 +204,12 @@ class ReferenceRun:
     other_tolerance: float
     # by kind, the difference from the run with `other`: an estimate of the larger error of the two
     error: Mapping[str, float]
-    histories: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    histories: Histories = field(repr=False)
     bodies: Mapping[str, str] = field(repr=False)
 
     def about(self) -> Row:
         """Integrators, tolerances and errors of the reference, for the JSON record."""
-        keys = ("integrator", "tolerance", "other", "other_tolerance")
-        return {**{key: getattr(self, key) for key in keys}, "error": dict(self.error)}
+        return {key: value for key, value in vars(self).items() if key not in ("histories", "bodies")}
 
     @property
     def in_words(self) -> str:
@@ -243,7 +221,7 @@ class ReferenceRun:
 
 @dataclass
 class Point:
-    """A point of the diagram: an integrator at a tolerance, run several times."""
+    """A point of the diagram: an integrator at a tolerance, run several times; errors by kind, relative to peaks."""
 
     integrator: str
     tolerance: float
@@ -288,9 +266,9 @@ def find_reference(scene: Scene, name: str, tolerance: float, budget: float, dis
             f'{scene.path}: analysis "{name}": no reference at tolerance = {tolerance:g}: two integrators have to'
             f" finish within {PATIENCE * budget:g} s; raise --budget or leave out tight --tolerances"
         )
-    (integrator, at, best), (other, other_at, second) = done
+    (_, _, best), (_, _, second) = done
     error = errors(second.histories, best.histories)
-    return ReferenceRun(integrator, at, other, other_at, error, histories=best.histories, bodies=best.bodies)
+    return ReferenceRun(*done[0][:2], *done[1][:2], error, histories=best.histories, bodies=best.bodies)
 
 
 def measure_points(
@@ -307,10 +285,10 @@ def measure_points(
             if _is_hopeless(points, integrator, tolerance):
                 continue
             display.stage(f"{name}: {integrator} at {tolerance:.0e}")
-            first = run(at(scene, name, integrator, tolerance), name, settings.budget, display)
-            points.append(
-                Point(integrator, tolerance, first, errors(first.histories, reference.histories), [first.seconds])
-            )
+            timed = with_analysis(scene, name, integrator=integrator, tolerance=tolerance)
+            first = run(timed, name, settings.budget, display)
+            error = errors(first.histories, reference.histories)
+            points.append(Point(integrator, tolerance, first, error, [first.seconds]))
     for repetition in range(1, settings.repeat):
         for point in points:
             if point.first.completed:
@@ -330,11 +308,7 @@ def _is_hopeless(points: Sequence[Point], integrator: str, tolerance: float) -> 
 
 def repeat_point(scene: Scene, name: str, point: Point, budget: float, display: Watcher) -> float:
     """Run a point once more, however long it takes this time; returns its seconds."""
-    again = run(at(scene, name, point.integrator, point.tolerance), name, 10 * budget, display, keep=False)
+    timed = with_analysis(scene, name, integrator=point.integrator, tolerance=point.tolerance)
+    again = run(timed, name, 10 * budget, display, keep=False)
     point.seconds.append(again.seconds)
     return again.seconds
-
-
-def at(scene: Scene, name: str, integrator: str, tolerance: float) -> Scene:
-    """The scene with the analysis `name` alone, integrated so."""
-    return with_analysis(scene, name, integrator=integrator, tolerance=tolerance)
