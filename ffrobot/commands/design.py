@@ -187,6 +187,6 @@ def sweep(
         click.echo(f"ffrobot: {line}", err=True)
     if not keep:
         drop_results(plan)
-    print_table(plan.table, plan.keys, rows, plan.collected, summary_console())
+    print_table(plan, rows, summary_console())
     if not any(row.status == "completed" for row in rows):
         raise SolveError(f"{plan.table}: no run completed")

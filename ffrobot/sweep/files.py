@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,7 +15,6 @@ import tomli_w
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import write_atomically
 from ..common.keys import MOST_RUNS, check_name
-from ..common.libraries import scipy
 from ..common.tables import DEEPEST, shown
 from ..common.toml_files import load_toml
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
@@ -58,8 +55,8 @@ class Variation:
 def parse_variation(text: str) -> Variation:
     """Read a variation: `key=0.01:0.03:9` (evenly spaced), `key=1e-6:1e-3:4:log` or a list `key=0.1,0.2`.
 
-    Lists may have texts: `key="static","undeformed"`. `key,key=…` sets both to the same value.
-    Raises `InputError` where it is none of these.
+    Lists may have texts: `key="static","undeformed"`. `key,key=…` sets both to the same value. Raises `InputError` for
+    other text.
     """
     key, equals, values = text.partition("=")
     keys = tuple(tuple(one.strip().split(".")) for one in key.split(","))
@@ -97,19 +94,6 @@ def _range(keys: tuple[tuple[str, ...], ...], pieces: Sequence[str], text: str) 
     return Variation(keys, tuple(float(value) for value in spaced), (first, last), logarithmic)
 
 
-def grid(variations: Sequence[Variation]) -> list[tuple[Value, ...]]:
-    """Every combination of the values; the last key varies fastest. Raises `InputError` where these are too many."""
-    if (count := math.prod(len(variation.values) for variation in variations)) > MOST_RUNS:
-        raise InputError(f"--vary: expected at most {MOST_RUNS} runs", f"{count}: --sample takes some of them")
-    return list(product(*(variation.values for variation in variations)))
-
-
-def latin_hypercube(variations: Sequence[Variation], count: int, seed: int) -> list[tuple[Value, ...]]:
-    """Return `count` combinations whose values spread evenly over each range (McKay, Beckman & Conover 1979)."""
-    sample = scipy.stats.qmc.LatinHypercube(len(variations), seed=seed).random(count)
-    return [tuple(v.draw(float(u)) for v, u in zip(variations, row, strict=True)) for row in sample]
-
-
 Table = dict[str, Any]
 Node = dict[str, Any] | list[Any]
 
@@ -131,7 +115,7 @@ class RunFiles:
     inputs: dict[str, str]
 
     def write(self, folder: Path) -> Path:
-        """Write them into `folder`; returns the scene file."""
+        """Write the files into `folder`; returns the path of the scene file."""
         folder.mkdir(parents=True, exist_ok=True)
         for path, tables in (*self.links.items(), (folder / SCENE, self.scene)):
             write_atomically(path, tomli_w.dumps(tables).encode(), "scene of the run", ours=True)
@@ -205,7 +189,7 @@ def _link_of(
     scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table], option: str = "--vary"
 ) -> Table:
     """The content of the link file that `links.BODY.…` means, read once, or the table in the scene itself."""
-    with_links = [body["name"] for body in _bodies(scene) if "link" in body]
+    with_links = [name for name, body in reversed(_bodies(scene).items()) if "link" in body]
     if len(key) < 3 or key[1] not in with_links:
         dotted = ".".join(key)
         raise InputError(
@@ -227,16 +211,16 @@ def _link_of(
 
 
 def _body(scene: Table, name: str) -> Table:
-    table = next((body for body in _bodies(scene) if body["name"] == name), None)
-    if table is None:
+    if (table := _bodies(scene).get(name)) is None:
         raise InputError(f'--vary: expected no other name of the body "{shown(name)}" with {LINKS}.{shown(name)}')
     return table
 
 
-def _bodies(scene: Table) -> list[Table]:
+def _bodies(scene: Table) -> dict[str, Table]:
+    """The first body of each name; scenes are not validated yet."""
     bodies = scene.get("body")
     tables = [body for body in bodies if isinstance(body, dict)] if isinstance(bodies, list) else []
-    return [body for body in tables if isinstance(body.get("name"), str)]
+    return {body["name"]: body for body in reversed(tables) if isinstance(body.get("name"), str)}
 
 
 def _resolve(data: Node, folder: Path) -> None:
@@ -250,7 +234,7 @@ def _resolve(data: Node, folder: Path) -> None:
 
 
 def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), option: str = "--vary") -> Value:
-    """data[key], entries of a list as in `set_key`; None where there is none. `option`: of the command, in messages."""
+    """Return data[key], entries of a list as in `set_key`; None if absent. `option`: of the command, in messages."""
     value: Value = data
     for part in key:
         if not isinstance(value, dict | list) or (isinstance(value, dict) and part not in value):
@@ -260,7 +244,7 @@ def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), opti
 
 
 def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...] = ()) -> None:
-    """data[key] = value; entries of a list go by their number (from 0), their `name` or their `body`.
+    """Set data[key] = value; entries of a list go by their number (from 0), their `name` or their `body`.
 
     `whole` is what messages call the key, where that is not `key` itself.
     """

@@ -83,7 +83,7 @@ class Row:
     wanted: tuple[str, ...] = ()
 
     def has(self, wanted: tuple[str, ...]) -> bool:
-        """Whether the results have what is `wanted`, as of `Sweep`."""
+        """Whether the results have all datasets that are `wanted`; see `Sweep`."""
         return not self.wanted or (bool(wanted) and set(wanted) <= set(self.wanted))
 
     def changes(self, inputs: Mapping[str, str]) -> list[str]:
@@ -111,11 +111,10 @@ def perform(run: SweepRun) -> Row | None:
     if code in STOPPED:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
-    message = "" if code == 0 else _message(printed, run.folder, code)
+    row = Row(run.number, run.values, status, "" if code == 0 else _message(printed, run.folder, code))
     quantities = _quantities(results, run) if results.exists() else {}
     inputs = run.inputs | imported
-    row = Row(run.number, run.values, status, message, quantities, inputs=inputs)
-    return replace(row, imported=tuple(imported), wanted=run.wanted)
+    return replace(row, quantities=quantities, inputs=inputs, imported=tuple(imported), wanted=run.wanted)
 
 
 def finished_row(folder: Path) -> Row | None:
@@ -145,23 +144,21 @@ def _quantities(path: Path, run: SweepRun) -> dict[str, float]:
             if run.wanted:
                 continue
             quantities[f"{analysis} warnings"] = float(len(about["warnings"]))
-            for name in _standard(results, analysis):
-                quantities[f"{name} max"] = _reduce(results, name, "max")
+            for pattern in STANDARD:
+                for member in results.names(f"{analysis}/{pattern.partition('/')[0]}"):
+                    name = f"{analysis}/{pattern.format(member)}"
+                    if results.has(name):
+                        quantities[f"{name} max"] = _reduce(results, name, "max")
         for request in run.collect:
             name, reduction = collected(request)
             if name in SETTLING:
                 with suppress(InputError):
                     quantities[f"{name} {reduction}"] = float(results.settling(reduction)[1][SETTLING[name]])
             else:
-                quantities[f"{name} {reduction}"] = _reduce(results, _meant(results, name), reduction)
+                wanted, bracket, column = name.partition("[")
+                dataset = by_dots(results, list(results)).get(wanted.replace("/", "."), wanted)
+                quantities[f"{name} {reduction}"] = _reduce(results, f"{dataset}{bracket}{column}", reduction)
     return quantities
-
-
-def _meant(results: Results, name: str) -> str:
-    """The dataset, also with dots for "/", and of the first analysis without its name; `name` where there is none."""
-    wanted, bracket, column = name.partition("[")
-    dataset = by_dots(results, list(results)).get(wanted.replace("/", "."))
-    return name if dataset is None else f"{dataset}{bracket}{column}"
 
 
 def by_dots(results: Results, datasets: Sequence[str]) -> dict[str, str]:
@@ -177,24 +174,17 @@ def missing_columns(rows: Sequence[Row], requests: Sequence[str], folder: Path) 
     for request in requests:
         name, reduction = collected(request)
         values = [row.quantities.get(f"{name} {reduction}") for row in completed]
-        if name in SETTLING and completed and all(value is None for value in values):
+        if not completed or any(one is not None and (name in SETTLING or not np.isnan(one)) for one in values):
+            continue
+        if name in SETTLING:
             yield f'--collect: expected a point with residual vibration, found no "{reduction}" in any run'
-        elif name not in SETTLING and completed and all(value is None or np.isnan(value) for value in values):
+        else:
             known: list[str] = []
             for path in (folder / "runs").glob(f"*/{RESULTS}"):
                 with suppress(InputError), Results(path) as results:
                     known = known or list(results)
             near = did_you_mean(name, known)
             yield f'--collect: expected the name of a dataset, found no "{name}" in any run{near}'
-
-
-def _standard(results: Results, analysis: str) -> Iterator[str]:
-    for pattern in STANDARD:
-        group = pattern.partition("/")[0]
-        for member in results.names(f"{analysis}/{group}"):
-            name = f"{analysis}/{pattern.format(member)}"
-            if results.has(name):
-                yield name
 
 
 def _reduce(results: Results, name: str, reduction: str) -> float:

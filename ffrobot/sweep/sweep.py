@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -18,12 +19,14 @@ from rich.table import Table
 from ..batch.batch import Batch
 from ..common.errors import InputError, StoppedError
 from ..common.files import check_folder, write_atomically
+from ..common.keys import MOST_RUNS
+from ..common.libraries import scipy
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import as_csv
 from ..common.version import digest_of_content
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
-from .files import SCENE, RunFiles, Value, Variation, grid, latin_hypercube, parse_variation, run_files
+from .files import SCENE, RunFiles, Value, Variation, parse_variation, run_files
 from .runs import RESULTS, ROW, Row, SweepRun, collected, finished_row, perform
 
 PLAN = "plan.json"
@@ -62,11 +65,6 @@ class Sweep:
         return [variation.name for variation in self.variations]
 
     @property
-    def collected(self) -> list[str]:
-        """Names of the table's columns with collected quantities."""
-        return [" ".join(collected(request)) for request in self.collect]
-
-    @property
     def table(self) -> Path:
         """Path of the table with all rows."""
         return self.folder / "table.csv"
@@ -74,23 +72,21 @@ class Sweep:
     @property
     def runs(self) -> list[SweepRun]:
         """Runs in the order of the table."""
-        folder = self.folder.absolute() / "runs"
-        common: dict[str, Any] = dict(collect=self.collect, allow_python=self.allow_python, wanted=self.wanted)
-        return [
-            SweepRun(k, values, folder / self._name(k, values), **common)
-            for k, values in enumerate(self.points, start=len(self.earlier))
-        ]
+        runs = []
+        for k, values in enumerate(self.points, start=len(self.earlier)):
+            name = f"{k:04d}"
+            if self.growing:
+                changes = {".".join(key): value for key, value in self.changes(values).items()}
+                name = digest_of_content(changes)[:16]
+            folder = self.folder.absolute() / "runs" / name
+            run = SweepRun(k, values, folder, self.collect, allow_python=self.allow_python, wanted=self.wanted)
+            runs.append(run)
+        return runs
 
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
         """Return changed values of one run's scene, by key."""
         points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
         return {**self.fixed, **{key: value for v, value, own in points if value != own for key in v.keys}}
-
-    def _name(self, number: int, values: Sequence[Value]) -> str:
-        if not self.growing:
-            return f"{number:04d}"
-        changes = {".".join(key): value for key, value in self.changes(values).items()}
-        return digest_of_content(changes)[:16]
 
 
 def check_once(keys: Sequence[Key], option: str = "--vary") -> None:
@@ -102,7 +98,9 @@ def check_once(keys: Sequence[Key], option: str = "--vary") -> None:
 def plan_sweep(
     scene: Path, vary: Sequence[str], folder: Path, sample: int | None, seed: int, collect: Sequence[str]
 ) -> Sweep:
-    """Every combination of the values, or `sample` points of a Latin hypercube.
+    """Plan a run for every combination of the values, the last key fastest, or `sample` points of a Latin hypercube.
+
+    Its values spread evenly over each range (McKay, Beckman & Conover 1979).
 
     Raises `InputError` for a wrong `--vary` or `--collect`, a scene or link file that its first point makes wrong, and
     a folder that holds another sweep.
@@ -112,7 +110,13 @@ def plan_sweep(
     check_once([key for variation in variations for key in variation.keys])
     for request in collect:
         collected(request)
-    points = tuple(grid(variations) if sample is None else latin_hypercube(variations, sample, seed))
+    if sample is None:
+        if (count := math.prod(len(variation.values) for variation in variations)) > MOST_RUNS:
+            raise InputError(f"--vary: expected at most {MOST_RUNS} runs", f"{count}: --sample takes some of them")
+        points = tuple(product(*(variation.values for variation in variations)))
+    else:
+        draws = scipy.stats.qmc.LatinHypercube(len(variations), seed=seed).random(sample)
+        points = tuple(tuple(v.draw(float(u)) for v, u in zip(variations, row, strict=True)) for row in draws)
     allowed = (scene.absolute().parent, *allowed_python())  # runs have folders of their own
     sweep = Sweep(scene, variations, points, folder, tuple(collect), allowed)
     check_point(sweep, points[0])
@@ -126,7 +130,13 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
     before = len(sweep.earlier)
 
     def tabulate() -> None:
-        _write_table(sweep.table, sweep.keys, [*sweep.earlier, *(rows[k] for k in sorted(rows))])
+        known = [*sweep.earlier, *(rows[k] for k in sorted(rows))]
+        quantities = _quantities(known)
+        lines: list[list[object]] = [["run", *sweep.keys, "status", *quantities, "message"]]
+        for row in known:
+            values = [row.quantities.get(name, "") for name in quantities]
+            lines.append([row.number, *row.values, row.status, *values, row.message])
+        write_atomically(sweep.table, as_csv(lines).encode(), "table of the sweep", ours=True)
 
     if rows or sweep.table.exists():
         tabulate()
@@ -174,18 +184,14 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, SweepRun]]:
     rows, waiting = {}, {}
     for run in sweep.runs:
         files, row = _files(sweep, run), finished_row(run.folder)
-        if row is not None and not row.changes(files.inputs) and _is_whole(sweep, run, row):
+        is_read = sweep.growing and row is not None and row.status == "completed"
+        is_whole = row is not None and (not is_read or ((run.folder / RESULTS).exists() and row.has(sweep.wanted)))
+        if row is not None and is_whole and not row.changes(files.inputs):
             rows[run.number] = replace(row, number=run.number, values=run.values)
         else:
             files.write(run.folder)
             waiting[run.number] = replace(run, inputs=files.inputs)
     return rows, waiting
-
-
-def _is_whole(sweep: Sweep, run: SweepRun, row: Row) -> bool:
-    """Whether all is there that is read of a finished run."""
-    can_be_read = (run.folder / RESULTS).exists() and row.has(sweep.wanted)
-    return can_be_read or not sweep.growing or row.status != "completed"
 
 
 def _files(sweep: Sweep, run: SweepRun) -> RunFiles:
@@ -232,7 +238,7 @@ def claim_folder(sweep: Sweep) -> None:
 
 
 def forget_failures(sweep: Sweep) -> int:
-    """Let runs that did not complete be run again; how many they are."""
+    """Delete rows of runs that did not complete, so that they run again; returns their number."""
     failed = [run for run in sweep.runs if (row := finished_row(run.folder)) and row.status != "completed"]
     for run in failed:
         (run.folder / ROW).unlink()
@@ -249,25 +255,16 @@ SHOWN = 5  # quantities on the screen
 GAP = 2  # between columns
 
 
-def _write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
-    quantities = _quantities(rows)
-    lines: list[list[object]] = [["run", *keys, "status", *quantities, "message"]]
-    for row in rows:
-        values = [row.quantities.get(name, "") for name in quantities]
-        lines.append([row.number, *row.values, row.status, *values, row.message])
-    write_atomically(path, as_csv(lines).encode(), "table of the sweep", ours=True)
-
-
-def print_table(
-    path: Path, keys: Sequence[str], rows: Sequence[Row], collected: Sequence[str], console: Console
-) -> None:
-    """Print keys, status and the collected or a few default quantities; the file at `path` has them all."""
+def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
+    """Print keys, status and the collected or a few default quantities; the file has them all."""
+    asked = [" ".join(collected(request)) for request in sweep.collect]
     quantities = [name for name in _quantities(rows) if not name.endswith((" steps", " wall_seconds"))]
-    shown = quantities[:SHOWN] if not collected else [name for name in quantities if name in collected]
-    while len(shown) > 1 and sum(_width(header) + GAP for header in ("run", *keys, "status", *shown)) > console.width:
+    shown = [name for name in quantities if name in asked] if asked else quantities[:SHOWN]
+    own = ["run", *sweep.keys, "status"]
+    while len(shown) > 1 and sum(_width(header) + GAP for header in (*own, *shown)) > console.width:
         shown = shown[:-1]
     table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
-    for header in ("run", *keys, "status", *shown):
+    for header in (*own, *shown):
         table.add_column(_broken(header), justify="left" if header == "status" else "right", min_width=_width(header))
     for row in rows:
         values = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values]
@@ -278,7 +275,7 @@ def print_table(
         if row.status != "completed":
             console.print(f"run {row.number}: {row.status}: {row.message}", soft_wrap=True)
     more = f", with {len(quantities) - len(shown)} more quantities" if len(quantities) > len(shown) else ""
-    console.print(f"table      {path}{more}", soft_wrap=True)
+    console.print(f"table      {sweep.table}{more}", soft_wrap=True)
 
 
 def _broken(header: str) -> str:
@@ -290,6 +287,6 @@ def _width(header: str) -> int:
 
 
 def _quantities(rows: Sequence[Row]) -> list[str]:
-    """All that is not zero in every row: points at which a link cannot bend are no news. Of studies what they ask."""
+    """All that is not zero in every row, as points are at which links cannot bend. Of studies what they ask."""
     rows = [row for row in rows if row.wanted] or rows
     return list(dict.fromkeys(name for row in rows for name, value in row.quantities.items() if value != 0.0))
