@@ -59,8 +59,7 @@ def smooth(
     """
     from ..present.console import Display, summary_console
     from ..run.inputs import files_of
-    from ..smooth.drawn import picture
-    from ..smooth.printed import print_smooth, write_page
+    from ..smooth.printed import picture, print_smooth, write_page
     from ..smooth.smoothing import check_target, smooth_motion
 
     pairs = [text.rpartition("=") for text in servo] or [("", "", "20")]

@@ -116,40 +116,31 @@ class _Search:
             yield self._inverted(kept)
 
     def _inverted(self, averaged: Sequence[tuple[float, Array]]) -> Motion:
-        """Of the shortest that leaves little, also with wrong stiffness; of a longer one while limits are exceeded."""
+        """Of the shortest that leaves little, also with wrong stiffness; of a longer one while limits are exceeded.
+
+        Links sag at its ends as they do under its own set points, with which it begins and ends.
+        """
         least, _ = self._first(averaged, self._left_inverted)
-        for motion in [motion for motion in averaged if motion[0] >= least][:TRIALS]:
-            name, command, moments = self._inverse(*motion)
+        for span, values in [motion for motion in averaged if motion[0] >= least][:TRIALS]:
+            name, smooth = f"inverted, averaged over {1e3 * span:.3g} ms", np.vstack([values, values[-1:]])
+            times = as_floats(self.step * np.arange(len(smooth)))
+            blend = polynomial_law(SMOOTHNESS).sample(times / times[-1])
+            links = smooth + (1 - blend) * self.sag[0] + blend * self.sag[1]
+            command, moments = self.robot.inverted(times, interpolated(times, links))
+            command[[0, -1]] = values[[0, -1]]
             if max(self._excess(command), float((np.abs(moments) / self.limits.sizes[3]).max())) <= 1.0:
                 break
-        return name, command, motion[1], moments
-
-    def _inverse(self, span: float, values: Array) -> tuple[str, Array, Array]:
-        """Links sag at its ends as they do under its own set points, with which it begins and ends."""
-        smooth = np.vstack([values, values[-1:]])
-        times = as_floats(self.step * np.arange(len(smooth)))
-        blend = polynomial_law(SMOOTHNESS).sample(times / times[-1])
-        links = smooth + (1 - blend) * self.sag[0] + blend * self.sag[1]
-        command, moments = self.robot.inverted(times, interpolated(times, links))
-        command[[0, -1]] = values[[0, -1]]
-        return f"inverted, averaged over {1e3 * span:.3g} ms", command, moments
+        return name, command, values, moments
 
     def simulated(self, name: str, values: Array, smooth: Array, moments: Array | None) -> Candidate:
-        """The robot under the set points."""
         times = self.step * np.arange(len(values))
-        off = float(distances(smooth, self.values).max())
         ride = self.robot.ride(times, values)
-        torque = float((ride.torque / self.limits.sizes[3]).max())
         return Candidate(
-            name=name,
-            times=times,
-            command=values,
-            moments=moments,
-            ride=ride,
-            off_path=off,
+            name, times, values, moments, ride,
+            off_path=float(distances(smooth, self.values).max()),
             excess=self._excess(values),
-            torque=torque,
-        )
+            torque=float((ride.torque / self.limits.sizes[3]).max()),
+        )  # fmt: skip
 
     def _along(self, factor: float) -> Array:
         """Set points of the record, in `factor` times the time."""
@@ -213,7 +204,7 @@ def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
 
 
 def distances(points: Array, line: Array) -> Array:
-    """Return distances (T,) of points (T, n) from lines through vertices (m, n), about the nearest vertex of each."""
+    """Return distances (T,), in their unit, of points (T, n) from lines through vertices (m, n)."""
     nearest, last = scipy.spatial.cKDTree(line).query(points)[1], len(line) - 1
     off = []
     for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, last - 1)):

@@ -74,16 +74,14 @@ class Diagnosis:
         others = f", other joints take {share - 100:.0f} % away" if round(share) > 100 else ""
         frequency = self.frequencies[-1, int(self.by_mode.argmax())]
         why = f"faults of the stream ({', '.join(causes)})" if causes else "the motion, without a fault of the stream"
+        even = ""
+        if self.even is not self.ride and self.even.settling is not None:
+            even = f". Sent at even times, the same set points leave {1e3 * self.even.settling.residual:.3g} mm"
         return (
             f"vibration of the robot: {robot.point} swings by {1e3 * self.residual:.3g} mm peak to peak after the last"
             f" set point, at {frequency:.3g} Hz, excited by {why}; {robot.joints[worst]} causes"
-            f" {share:.0f} %{others}{self._at_even_times()}"
+            f" {share:.0f} %{others}{even}"
         )
-
-    def _at_even_times(self) -> str:
-        if self.even is self.ride or self.even.settling is None:
-            return ""
-        return f". Sent at even times, the same set points leave {1e3 * self.even.settling.residual:.3g} mm"
 
 
 def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
@@ -101,7 +99,14 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
     faults = [*faults_of_stamps(recording), *faults_of_motion(recording, limits, ride.torque)]
     if kept:
         of_even = spectrum if even is recording else _spectrum(robot.servo.motors(even.times, even.values), grid)
-        faults += [*_coarse(recording, frequencies), *_resonance(robot, frequencies, grid, of_even)]
+        step, lowest = recording.step, frequencies[:, 0].min()
+        if recording.rates is None and step * lowest > 1 / POINTS:
+            text = (
+                f"a set point every {1e3 * step:.3g} ms, {1 / (step * lowest):.2g} in a period of the lowest frequency,"
+                f" {lowest:.3g} Hz: the lines between them are felt. Expected {POINTS} at least"
+            )
+            faults.append(Fault("coarse sampling", text))
+        faults += _resonance(robot, frequencies, grid, of_even)
     return Diagnosis(
         recording=recording,
         ride=ride,
@@ -127,15 +132,6 @@ def _spectrum(path: Piecewise, frequencies: Array) -> Array:
     fine, of_motors = accelerations(path)
     kernel = np.exp(-2j * np.pi * np.outer(frequencies, fine))
     return as_floats(np.abs(kernel @ of_motors) * (fine[1] - fine[0]))
-
-
-def _coarse(recording: Recording, frequencies: Array) -> Iterator[Fault]:
-    step, lowest = recording.step, frequencies[:, 0].min()
-    if recording.rates is None and step * lowest > 1 / POINTS:
-        yield Fault(
-            "coarse sampling", f"a set point every {1e3 * step:.3g} ms, {1 / (step * lowest):.2g} in a period of the"
-            f" lowest frequency, {lowest:.3g} Hz: the lines between them are felt. Expected {POINTS} at least",
-        )  # fmt: skip
 
 
 def _resonance(robot: Robot, frequencies: Array, grid: Array, spectrum: Array) -> Iterator[Fault]:

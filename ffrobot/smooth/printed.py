@@ -1,4 +1,4 @@
-"""What `ffrobot smooth` prints, and its page: the stream, its faults, a table of joints, and what it is in words."""
+"""What `ffrobot smooth` prints and draws, and its page: the stream, its faults, tables of joints and of new motions."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from rich.console import Console
 
 from ..common.files import write_atomically
+from ..mbs.fields.waypoints import difference_quotients
+from ..pictures.figures.plot import image_of
+from ..pictures.figures.style import SIZE, literal, style
 from ..pictures.report.page import Table, page_of
 from ..present.lines import print_table
 from ..results.verdict import Settled
 from .diagnosis import Diagnosis
-from .drawn import picture
 from .smoothing import Smoothed
 
 MOTIONS = ("motion", "duration (s)", "settled (s)", "vibration (mm)")
@@ -58,7 +62,6 @@ def write_page(found: Smoothed, motion: Path | None, path: Path) -> None:
 
 
 def _tables(found: Smoothed) -> list[Table]:
-    """Of joints, and of motions where there are new ones."""
     joints = Table(COLUMNS, list(_rows(found.before)))
     columns = (*MOTIONS, f"off the path ({found.robot.units()})", "of a limit", "torque")
     return [joints, *([Table(columns, list(_motions(found)))] if found.candidates else [])]
@@ -68,6 +71,9 @@ def _lines(found: Smoothed) -> list[tuple[str, str]]:
     before, joints = found.before, len(found.before.recording.joints)
     words = [axis.words for axis in found.robot.servo.axes]
     each = [f"{joint}: {of}" for joint, of in zip(found.robot.joints, words, strict=True)]
+    settling = "no place of rest"
+    if of := before.ride.settling:
+        settling = Settled(found.robot.point, before.residual, of.frequency, of.time_to, of.tolerance).in_words
     return [
         ("motion", f"{len(before.recording.times)} set points of {joints} joint{'s' * (joints > 1)} over"
          f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
@@ -75,42 +81,24 @@ def _lines(found: Smoothed) -> list[tuple[str, str]]:
         *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),
         *(("note", remark) for remark in before.recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
-        *([("settling", _settling(found))] if before.frequencies.size else []),
+        *([("settling", settling)] if before.frequencies.size else []),
         *([] if found.robot.servo.is_invertible else [("note", STUBBORN)]),
     ]  # fmt: skip
 
 
-def _settling(found: Smoothed) -> str:
-    if (of := found.before.ride.settling) is None:
-        return "no place of rest"
-    return Settled(found.robot.point, found.before.residual, of.frequency, of.time_to, of.tolerance).in_words
-
-
 def _motions(found: Smoothed) -> Iterator[tuple[str, ...]]:
-    """The record, and candidates from the best to the worst."""
     before = found.before
     last, settling = float(before.recording.times[-1]), before.ride.settling
     assert settling is not None
-    yield (
-        "as it is",
-        f"{last:.4g}",
-        _time(last + settling.time_to),
-        f"{1e3 * before.residual:.3g}",
-        "0",
-        _part(found.excess),
-        _part(found.torque),
+    own = ("as it is", last, last + settling.time_to, before.residual, 0.0, found.excess, found.torque)
+    new = (
+        (one.name, one.times[-1], one.settled, one.residual, one.off_path, one.excess, one.torque)
+        for one in found.candidates
     )
-    for one in found.candidates:
-        numbers = (f"{1e3 * one.residual:.3g}", f"{one.off_path:.2g}", _part(one.excess), _part(one.torque))
-        yield one.name, f"{one.times[-1]:.4g}", _time(one.settled), *numbers
-
-
-def _part(of_limit: float) -> str:
-    return f"{100 * of_limit:.3g} %" if of_limit else ""
-
-
-def _time(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else "no"
+    for name, duration, settled, residual, off_path, *of_limits in (own, *new):
+        parts = (f"{100 * of_limit:.3g} %" if of_limit else "" for of_limit in of_limits)
+        numbers = (f"{duration:.4g}", f"{settled:.4g}" if np.isfinite(settled) else "no", f"{1e3 * residual:.3g}")
+        yield name, *numbers, f"{off_path:.2g}", *parts
 
 
 def _rows(of: Diagnosis) -> Iterator[tuple[str, ...]]:
@@ -118,3 +106,53 @@ def _rows(of: Diagnosis) -> Iterator[tuple[str, ...]]:
     for k, joint in enumerate(of.recording.joints):
         numbers = (values[0, k], values[-1, k], *of.peaks[:, k], 1e3 * of.alone[k])
         yield joint, *(f"{number:.3g}" for number in numbers), f"{100 * of.shares[k]:.0f} %"
+
+
+BAND = "#e8c9a0"
+WIDE = (2 * SIZE[0], 2.2 * SIZE[1])  # inches
+LEAST = 1e-3  # of the tolerance: what is drawn of distances
+
+
+def picture(found: Smoothed, extension: str) -> bytes:
+    """The file of the picture, "png" or "svg"."""
+    with style():
+        figure = Figure(figsize=WIDE, layout="constrained")
+        grid = figure.add_gridspec(2, 5)
+        _accelerations(figure.add_subplot(grid[0, :3]), found.before, found.robot.units("/s²"))
+        _spectrum(figure.add_subplot(grid[0, 3:]), found.before, found.robot.units("/s"))
+        _distance(figure.add_subplot(grid[1, :]), found)
+        return image_of(literal(figure), extension)
+
+
+def _accelerations(axes: Axes, of: Diagnosis, unit: str) -> None:
+    times, values = difference_quotients(*difference_quotients(*of.recording.dense(of.recording.step)))
+    for joint, column in zip(of.recording.joints, values.T, strict=True):
+        axes.plot(times, column, label=joint)
+    axes.set_title(f"acceleration of set points ({unit})")
+    axes.set_xlabel("t (s)")
+    axes.legend(fontsize=7)
+
+
+def _spectrum(axes: Axes, of: Diagnosis, unit: str) -> None:
+    grid, *each = of.spectrum
+    for band in of.frequencies.T:
+        axes.axvspan(min(band.min(), grid[-1]), min(band.max(), grid[-1]), color=BAND)
+    for values in each:
+        axes.plot(grid, values)
+    axes.set_yscale("log")
+    axes.set_title(f"its spectrum ({unit}), natural frequencies")
+    axes.set_xlabel("frequency (Hz)")
+
+
+def _distance(axes: Axes, found: Smoothed) -> None:
+    before, tolerance = found.before, found.robot.tolerance
+    rides = [("as it is", before.recording.times[-1], before.ride)]
+    rides += [(one.name, one.times[-1], one.ride) for one in found.candidates[:1]]
+    for name, last, ride in rides:
+        (line,) = axes.plot(ride.times, 1e3 * np.maximum(ride.off, LEAST * tolerance), label=name)
+        axes.axvline(last, color=line.get_color(), linewidth=0.8, linestyle=":")
+    axes.axhline(1e3 * tolerance, color="0.6", linewidth=0.8, linestyle="--", label="tolerance")
+    axes.set_yscale("log")
+    axes.set_title(f"distance of {found.robot.point} from its final place (mm)")
+    axes.set_xlabel("t (s)")
+    axes.legend()

@@ -14,7 +14,7 @@ from ..common.libraries import scipy
 from ..common.structs import struct
 from ..exchange.motion import read_record
 from ..mbs.analysis.pcid import Pcid
-from ..mbs.fields.waypoints import Recorded, column_of, difference_quotients, load_record
+from ..mbs.fields.waypoints import column_of, difference_quotients, load_record
 from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.motion import joint_motion
 from ..mbs.scene.analysis import TimedAnalysis
@@ -36,9 +36,10 @@ KEPT = 1e-6  # of a limit, beyond it, or rad or m beyond one of positions: round
 
 @struct
 class Recording:
-    """Set points (T, n) of n joints at `times` (T,), s, from 0 and increasing.
+    """Set points (T, n), rad or m, of n joints at `times` (T,), s, from 0 and increasing.
 
-    `stamps` (S,) are the times of all rows as they were written; `rates` (T, n) where they were written, too.
+    `stamps` (S,) are the times of all rows as they were written; `rates` (T, n), rad/s or m/s, where they were
+    written, too.
     """
 
     joints: tuple[str, ...]
@@ -54,7 +55,7 @@ class Recording:
         return float(np.median(np.diff(self.times)))
 
     def dense(self, step: float) -> tuple[Array, Array]:
-        """Times (s) and set points between which lines are close: with rates, of cubics every `step` s at most."""
+        """Return times (T,), s, and set points (T, n), rad or m: with rates, of cubics every `step` s at most."""
         if self.rates is None:
             return self.times, self.values
         parts = [np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)[1:]
@@ -66,16 +67,25 @@ class Recording:
 def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> Recording:
     """Read positions of all joints with motors from a CSV table, a JointTrajectory, or a bag of ROS.
 
-    Raises:
-        InputError: a joint is missing, or has several coordinates; rows do not move; angles seem to be degrees.
-        SolveError: a library that reads the file is not installed.
+    Raises `InputError` for a joint that is missing or has several coordinates, rows that do not move, and angles that
+    seem to be degrees; `SolveError` without the library that reads the file.
     """
     record = load_record(path) if path.suffix.lower() == ".csv" else read_record(path)
     joints = scene.motor_joints
     names = [joint.name for joint in joints]
     if several := [joint.name for joint in joints if len(joint.units) != 1]:
         raise InputError(f"{scene.path}: expected joints of one coordinate each", quoted(several))
-    columns = _columns(path, record, names)
+    try:
+        found = [column_of(record.columns, name) for name in names]
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
+    columns = list(dict.fromkeys(k for k in found if k is not None))
+    if len(columns) < len(names):
+        missing = [name for name, k in zip(names, found, strict=True) if k is None] or names  # one column is no joint's
+        raise InputError(
+            f"{path}: expected a column of every joint with a motor (constant where it rests)",
+            f"none of {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}",
+        )
     scale = np.array([1 / TURN if is_in_degrees and joint.units[0] == "rad" else 1.0 for joint in joints])
     values = record.values[:, columns] * scale
     if not is_in_degrees:
@@ -89,8 +99,8 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     if np.ptp(values, axis=0).max() <= STILL:
         raise InputError(f"{path}: expected joints that move", "none")
     rates = None if record.rates is None else record.rates[good][:, columns] * scale
-    found = Recording(tuple(names), times - times[0], values, record.times - times[0], rates, (*record.remarks, *left))
-    return without_rest(found)
+    remarks = (*record.remarks, *left)
+    return without_rest(Recording(tuple(names), times - times[0], values, record.times - times[0], rates, remarks))
 
 
 def without_rest(recording: Recording) -> Recording:
@@ -119,22 +129,6 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     return without_rest(Recording(joints, run.time, values, run.time))
 
 
-def _columns(path: Path, record: Recorded, names: Sequence[str]) -> list[int]:
-    """Which column each joint has."""
-    try:
-        found = [column_of(record.columns, name) for name in names]
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
-    columns = list(dict.fromkeys(k for k in found if k is not None))
-    if len(columns) < len(names):
-        missing = [name for name, k in zip(names, found, strict=True) if k is None] or names  # one column is no joint's
-        raise InputError(
-            f"{path}: expected a column of every joint with a motor (constant where it rests)",
-            f"none of {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}",
-        )
-    return columns
-
-
 def _check_unit(path: Path, joints: Sequence[JointRecord], values: Array) -> None:
     """Refuse angles beyond their limits, or several turns, that would lie within them if they were degrees."""
     for joint, column in zip(joints, values.T, strict=True):
@@ -157,7 +151,7 @@ class Fault:
 
 
 def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
-    """Doubled stamps, steps back, gaps and jitter."""
+    """Yield doubled stamps, steps back, gaps and jitter."""
     steps, usual = np.diff(recording.stamps), recording.step
     if doubled := int(np.count_nonzero(steps == 0.0)):
         yield Fault("doubled stamps", f"{doubled} rows have the time of the row before: only the first counts")
@@ -174,37 +168,31 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
         )  # fmt: skip
     own = steps[~late] - usual * np.maximum(np.round(steps[~late] / usual), 1.0)  # rows may be left out
     if recording.rates is None and np.sqrt(np.mean(own**2)) > UNEVEN * usual:
-        evenly = " Rows are smoother at even times: stamps are late, not the motion" if is_even(recording) else ""
+        is_late = evened(recording) is not recording
+        evenly = " Rows are smoother at even times: stamps are late, not the motion" if is_late else ""
         yield Fault(
             "jitter", f"steps of {1e3 * usual:.4g} ms jitter by {1e3 * np.sqrt(np.mean(own**2)):.3g} ms (RMS), from"
             f" {1e3 * steps.min():.3g} to {1e3 * steps[~late].max():.3g} ms.{evenly}",
         )  # fmt: skip
 
 
-def _even_times(recording: Recording) -> Array:
-    """(T,) s; of the usual step, its median, jitter leaves some per cent, which add up."""
-    return np.linspace(recording.times[0], recording.times[-1], len(recording.times))
-
-
-def is_even(recording: Recording) -> bool:
-    """Whether rows make a smoother motion at even times than at those of their stamps."""
-    both = (_even_times(recording), recording.times)
-    rates = (difference_quotients(times, recording.values)[1] for times in both)
-    by_even, by_stamps = (np.mean(np.diff(of, axis=0) ** 2) for of in rates)
-    return bool(by_even < EVEN**2 * by_stamps)
-
-
 def evened(recording: Recording) -> Recording:
-    """Return the recording with rows at even times, if these make a smoother motion."""
-    if recording.rates is not None or not is_even(recording):
+    """Return the recording with rows at even times, if these make a smoother motion than those of their stamps.
+
+    Even times divide the whole evenly: of the usual step, its median, jitter leaves some per cent, which add up.
+    """
+    if recording.rates is not None:
         return recording
-    return replace(recording, times=_even_times(recording))
+    even = np.linspace(recording.times[0], recording.times[-1], len(recording.times))
+    rates = (difference_quotients(times, recording.values)[1] for times in (even, recording.times))
+    by_even, by_stamps = (np.mean(np.diff(of, axis=0) ** 2) for of in rates)
+    return replace(recording, times=even) if by_even < EVEN**2 * by_stamps else recording
 
 
 def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Iterator[Fault]:
-    """Jumps, noise, and limits that are exceeded; of rows at even times where these are the smoother ones.
+    """Yield jumps, noise, and exceeded limits; of rows at even times where these are the smoother ones.
 
-    `torque` (n,) is what the motion takes of motors.
+    `torque` (n,), N·m or N, is what the motion takes of motors.
     """
     motion = evened(recording)
     times, values = motion.dense(motion.step / 4)
@@ -224,9 +212,9 @@ def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Ite
 
 @struct
 class Limits:
-    """Ranges of positions (n, 2); `sizes` (4, n) of speed, acceleration, jerk and torque; infinite without a limit.
+    """Ranges of positions (n, 2), rad or m; `sizes` (4, n) of speed, acceleration, jerk (rad or m, s) and torque (N·m).
 
-    `units` (n,) are those of coordinates.
+    They are infinite without a limit. `units` (n,) are those of coordinates.
     """
 
     positions: Array
@@ -243,7 +231,7 @@ def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
 
 
 def peaks(times: Array, values: Array) -> Array:
-    """Return (3, n) peak speed, acceleration and jerk of a motion (T, n) from rest to rest, by differences."""
+    """Return peaks (3, n) of speed, acceleration and jerk (rad or m, s) of a motion (T, n) from rest to rest."""
     found, usual = [], float(np.median(np.diff(times)))
     times = np.concatenate([[times[0] - usual], times, [times[-1] + usual]])
     values = np.vstack([values[:1], values, values[-1:]])
@@ -261,10 +249,13 @@ def _jumps(name: str, unit: str, times: Array, values: Array) -> Iterator[Fault]
     usual = float(np.median(steps))
     rates = np.concatenate([[0.0], np.diff(values) / steps, [0.0]])
     bends = np.diff(rates)
-    if _is_noise(bends):
+    counts = np.abs(bends) > NOTABLE * np.abs(bends).max()
+    pairs = counts[1:] & counts[:-1]
+    turns = pairs & (bends[1:] * bends[:-1] < 0.0)
+    if pairs.sum() > max(len(bends) / 4, MANY) and turns.sum() > TURNS * pairs.sum():
         yield Fault("noise", f"{name}: second differences of rows change their sign: noise, or too few digits")
         return
-    late = np.concatenate([[False], steps > LATE * usual, [False]])
+    late = np.pad(steps > LATE * usual, 1)
     bridged = late[1:] | late[:-1]
     abrupt = _stands_out(bends, NOTABLE * np.abs(rates).max(), bridged)
     if abrupt.any():
@@ -283,14 +274,6 @@ def _jumps(name: str, unit: str, times: Array, values: Array) -> Iterator[Fault]
         size = f"{abs(thirds[max(k - 1, 0) : k + 2].sum()) / usual:.3g} {unit}/s²"  # in up to three rows
         at = times[min(k, len(times) - 1)]
         yield Fault("jump of acceleration", f"{name}: acceleration jumps by {size} at t = {at:.4g} s{more}")
-
-
-def _is_noise(bends: Array) -> bool:
-    """Whether most second differences count, and change their sign from row to row."""
-    counts = np.abs(bends) > NOTABLE * np.abs(bends).max()
-    pairs = counts[1:] & counts[:-1]
-    turns = bends[1:] * bends[:-1] < 0.0
-    return bool(pairs.sum() > max(len(bends) / 4, MANY) and (turns & pairs).sum() > TURNS * pairs.sum())
 
 
 def _stands_out(sizes: Array, least: float, bridged: Booleans) -> Array:

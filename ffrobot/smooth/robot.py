@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
 from ..run.prepare import prepare_scene, unsolved
-from ..run.result import AnalysisResult
 from ..run.solve import run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
@@ -41,7 +39,7 @@ INSTANTS = 9  # postures along the motion whose frequencies are found
 
 
 def accelerations(path: Piecewise) -> tuple[Array, Array]:
-    """Times (T,), s, to the end of motors' paths, and their accelerations (T, n)."""
+    """Return times (T,), s, to the end of motors' paths, and their accelerations (T, n), rad/s² or m/s²."""
     fine = np.linspace(0.0, path.end, FINE)
     return fine, path.sample(fine, 2)
 
@@ -56,7 +54,10 @@ class Modes:
     driven: Array  # (m, n) at the point, what a unit of acceleration of each motor drives
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
-        """Return amplitudes (m, n), m, at the point at the last of `times` (T,), s, by motor `accelerations` (T, n)."""
+        """Return amplitudes (m, n), m, at the point at the last of `times` (T,), s.
+
+        They are by accelerations (T, n), rad/s² or m/s², of each motor.
+        """
         poles = self.omega * (-self.ratio + 1j * np.sqrt(1.0 - self.ratio**2))
         widths = (np.append(0.0, np.diff(times)) + np.append(np.diff(times), 0.0)) / 2
         integral = (np.exp(np.outer(poles, times[-1] - times)) * widths) @ accelerations
@@ -106,7 +107,7 @@ class Robot:
         return ", ".join(f"{unit}{per}" for unit in self._units)
 
     def modes(self, q: Array, *, of_links: bool = False) -> Modes:
-        """Return modes at the posture q (n_q,) of a run; `of_links`: motors and joints behind gears move alike."""
+        """Return modes at the posture q (n_q,), rad and m; `of_links`: motors and joints behind gears move alike."""
         mechanism = self._linear.at(0.0, q, self._still, self._still)
         sides = ("joint", "motor") if of_links else ("motor",)
         free = free_coordinates(mechanism, LOCKED if of_links or not self.has_gears else COMPLIANT)
@@ -123,15 +124,15 @@ class Robot:
         return Modes(omega, ratio, np.linalg.norm(J, axis=0)[:, None] * driven)
 
     def ride(self, times: Array, command: Array) -> Ride:
-        """Simulate set points (T, n) at `times` (T,), s, from rest; joints without motor move freely.
+        """Simulate set points (T, n), rad or m, at `times` (T,), s, from rest; joints without motor move freely.
 
         Raises `SolveError` where the motion cannot be followed.
         """
         path, last = self.servo.motors(times, command), float(times[-1])
         period = 1 / self._lowest(path)
         until = path.end + period
-        found = self._solved(path, "motor", until + min(LAST * period, LONGEST), period / PER_PERIOD)
-        run, rest, moments = found.run, commanded_rest(found.run), motor_moments(found.run)
+        run = self._solved(path, until + min(LAST * period, LONGEST), period / PER_PERIOD)
+        rest, moments = commanded_rest(run), motor_moments(run)
         torque = np.array([np.abs(moments[joint]).max() if joint in moments else 0.0 for joint in self.joints])
         postures = run.q[np.searchsorted(run.time, np.linspace(0.0, last, INSTANTS))]
         if rest is None:
@@ -148,15 +149,15 @@ class Robot:
         return Ride(replace(whole, residual=soon.residual), run.time, off, postures, torque, sag)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
-        """Set points (T', n) every `times[1]` s that make links follow `motion` at `times` (T,), and motors' torques.
+        """Return set points (T', n) every `times[1]` s by which links follow `motion`, and motors' torques (N·m, N).
 
         Gears are strained by what the motion needs: motors are ahead by K⁻¹τ, and the controllers are inverted, which
         begin before the motion and end after it by `Servo.margins`.
         """
-        found = self._solved(motion, "joint", float(times[-1]), float(times[1]))
+        run = self._solved(motion, float(times[-1]), float(times[1]), by_joints=True)
         position, rate = motion.sample(times), motion.sample(times, 1)
-        moments = np.column_stack([motor_moments(found.run)[joint] for joint in self.joints])
-        for joint, gear in gear_motions(found.run).items():
+        moments = np.column_stack([motor_moments(run)[joint] for joint in self.joints])
+        for joint, gear in gear_motions(run).items():
             k = self.joints.index(joint)
             position[:, k], rate[:, k] = gear.angle, gear.rate
             moments[[0, -1], k] = gear.gear_moment[[0, -1]]  # at rest; the rotor's acceleration jumps there
@@ -174,26 +175,21 @@ class Robot:
     def _lowest(self, path: Piecewise) -> float:
         """Hz, of the posture in which the robot starts."""
         if self._frequency is None:
-            q = self._solved(path, "motor", FIRST, FIRST).run.q[0]
+            q = self._solved(path, FIRST, FIRST).q[0]
             self._linear = LinearEquations(self._gears, q, {self.point: self.point})
             omega = self.modes(q).omega
             self._frequency = float(omega[0]) / (2 * np.pi) if len(omega) else UNKNOWN
         return self._frequency
 
-    def _following(self, path: Piecewise, subject: Literal["motor", "joint"]) -> Scene:
+    def _solved(self, path: Piecewise, end: float, output_step: float, *, by_joints: bool = False) -> Run:
+        """The robot whose motors, or joints behind their gears, follow the path, until `end` at least."""
         paths = tuple(
-            Trajectory(name=name, value=function, motor=name) if subject == "motor" else
-            Trajectory(name=name, value=function, joint=name)
+            Trajectory(name=name, value=function, joint=name if by_joints else None, motor=None if by_joints else name)
             for name, function in zip(self.joints, path.functions(), strict=True)
-        )  # fmt: skip
-        return self._scene.model_copy(update={"trajectory": paths})
-
-    def _solved(
-        self, path: Piecewise, subject: Literal["motor", "joint"], end: float, output_step: float
-    ) -> AnalysisResult:
+        )
         end = np.ceil(end / output_step * (1 - ROUND_OFF)) * output_step
         analysis = Pcid(name=RUN, kind="pcid", end=end, output_step=output_step, tolerance=TOLERANCE)
-        scene = self._following(path, subject).model_copy(update={"analysis": (analysis,)})
-        found = run_analyses(unsolved(replace(self._prepared, scene=scene)), self._watcher).analyses[RUN]
-        found.run.check_completed("")
+        scene = self._scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)})
+        found = run_analyses(unsolved(replace(self._prepared, scene=scene)), self._watcher).analyses[RUN].run
+        found.check_completed("")
         return found

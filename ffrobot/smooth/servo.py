@@ -1,17 +1,150 @@
-"""Position controllers of joints: what motors do under a stream of set points, and the set points for a motion.
+"""Position controllers of joints: transfer functions, what motors do under set points, and set points for a motion.
 
 Each axis is taken as θ_r = G θ_cmd, which loads do not disturb. Between two set points the command is a straight line,
-as controllers of robots interpolate a stream.
+as controllers of robots interpolate a stream. G is of a bandwidth, of polynomials, or fitted to a measured response.
 """
 
 from __future__ import annotations
 
+from functools import partial, reduce
+from pathlib import Path
+
 import numpy as np
 
 from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.errors import InputError
+from ..common.libraries import scipy
 from ..common.structs import struct
+from ..common.toml_files import read_csv
 from ..mbs.fields.paths import Piecewise
-from .axes import Axis
+from ..mbs.fields.waypoints import numbers_of
+
+APART = 1e-4  # of a pole: nearer ones are moved so far apart, which changes G by 1e-8
+UNITY = 1e-3  # by which G(0) may be off 1
+CLOSE = 0.01  # by which G may be off measured values (RMS) before more poles are tried
+PAIRS, FASTEST = (1, 2, 3), 10.0  # of poles, and how many times the largest measured frequency they may be
+OVERDAMPED = 1e3  # largest damping ratio of fitted poles, and one over the least
+POOR = 0.2  # of a measured response: a fit that is off by more (RMS) is none
+FEWEST = 4  # rows of a measured response, at as many frequencies
+COLUMNS = ["frequency", "magnitude", "phase"]
+
+
+@struct
+class Axis:
+    """G(s) = e^(−delay·s) numerator/denominator, coefficients of the highest power first and the last of both 1.
+
+    `words` say what it is.
+    """
+
+    numerator: Array
+    denominator: Array
+    delay: float = 0.0
+    words: str = ""
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles of G, 1/s, none of them double."""
+        roots = np.roots(self.denominator)
+        is_real = np.abs(roots.imag) < APART * np.abs(roots)
+        real, upper = np.sort(roots[is_real].real), np.sort_complex(roots[~is_real & (roots.imag > 0.0)])
+        for of in (real, upper):
+            for k in np.flatnonzero(np.abs(np.diff(of)) < APART * np.abs(of[1:])):
+                of[k : k + 2] *= [1 + APART, 1 - APART]
+        return np.concatenate([real, upper, upper.conj()])
+
+    def at(self, s: ComplexArray) -> ComplexArray:
+        """Return G, a ratio of angles or ways, at s (1/s)."""
+        return np.asarray(np.exp(-self.delay * s) * np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
+
+
+def axis_of(servo: float | str, ratio: float) -> Axis:
+    """ω²/(s² + 2ζω s + ω²) of a natural frequency (Hz) and damping ratio, "NUMERATOR / DENOMINATOR", or a CSV table.
+
+    Behind the denominator, whose numbers have blanks between them, "/ DELAY" (s) may follow. The table has measured
+    values: frequency (Hz), magnitude, phase (degrees).
+
+    Raises `InputError` for an axis that is not stable, does not come to its command, or follows jumps of its rate.
+    """
+    try:
+        parts = [np.array([float(word) for word in part.split()]) for part in str(servo).split("/")]
+    except ValueError:
+        return _measured(Path(str(servo)))
+    if len(parts) == 1 and parts[0].size == 1:
+        (omega,) = 2 * np.pi * parts[0]
+        if not (0.0 < omega < np.inf and 0.0 < ratio < np.inf):
+            found = f"{omega / 2 / np.pi:g} Hz and {ratio:g}"
+            raise InputError("servo: expected a frequency above 0 Hz and a damping ratio above 0", found)
+        words = f"{parts[0][0]:.3g} Hz, damping ratio {ratio:.3g}"
+        return Axis(np.ones(1), np.array([omega**-2, 2 * ratio / omega, 1.0]), words=words)
+    numerator, denominator, delay = (
+        (*parts, np.zeros(1), np.zeros(0))[:3] if len(parts) in (2, 3) else [np.zeros(0)] * 3
+    )
+    numerator, denominator = np.trim_zeros(numerator, "f"), np.trim_zeros(denominator, "f")
+    is_axis = numerator.size and len(denominator) >= len(numerator) + 2 and delay.size == 1 and 0.0 <= delay[0] < np.inf
+    if not (is_axis and np.isfinite([*numerator, *denominator]).all() and np.roots(denominator).real.max() < 0.0
+            and abs(numerator[-1] - denominator[-1]) <= UNITY * abs(denominator[-1])):  # fmt: skip
+        raise InputError(
+            'servo: expected "NUMERATOR / DENOMINATOR" or "… / … / DELAY", stable, equal to 1 at s = 0, with at least'
+            " two poles more than zeros",
+            f'"{servo}"',
+        )
+    return Axis(numerator / numerator[-1], denominator / denominator[-1], float(delay[0]), str(servo))
+
+
+def _measured(path: Path) -> Axis:
+    """Fitted to a CSV table. Raises `InputError` naming file and line."""
+    header, rows = read_csv(path, "table of a frequency response")
+    if header != COLUMNS or len(rows) < FEWEST:
+        expected = f"columns {','.join(COLUMNS)} and at least {FEWEST} rows"
+        raise InputError(f"{path}: expected {expected}", f"{','.join(header)!r} and {len(rows)}")
+    frequency, magnitude, phase = np.transpose([numbers_of(path, line, row, 3) for line, row in rows])
+    if min(frequency.min(), magnitude.min()) <= 0.0 or len(np.unique(frequency)) < FEWEST:
+        raise InputError(f"{path}: expected magnitudes above 0 at {FEWEST} or more frequencies above 0", "others")
+    response = magnitude * np.exp(1j * np.radians(phase))
+    axis = fitted(frequency, response)
+    missed, size = (np.sqrt(np.mean(np.abs(of) ** 2)) for of in (axis.at(2j * np.pi * frequency) - response, response))
+    off = float(missed / min(size, 1.0))
+    if not off <= POOR:
+        raise InputError(
+            f"{path}: expected magnitudes (1 at low frequencies, not dB) and phases (degrees, negative where motors"
+            " lag) of a controller",
+            f"ones that {2 * PAIRS[-1]} poles are {100 * off:.0f} % off (RMS)",
+        )
+    return axis
+
+
+def fitted(frequency: Array, response: ComplexArray) -> Axis:
+    """Fit the axis with the fewest poles that is near a response (F,) at frequencies (F,), Hz; else the nearest of all.
+
+    Least squares of G with pairs of poles ω²/(s² + 2ζω s + ω²), two zeros less, and a delay.
+    """
+    s = 2j * np.pi * frequency
+    unit = float(abs(s[int((np.abs(response) < np.sqrt(0.5)).argmax()) or -1]))  # rad/s, where it falls by 3 dB
+
+    def axis(x: Array, pairs: int, words: str = "") -> Axis:
+        omega, ratio = unit * np.exp(x[:pairs]), np.exp(x[pairs : 2 * pairs])
+        sections = np.column_stack([omega**-2, 2 * ratio / omega, np.ones(pairs)])
+        numerator = np.append(x[2 * pairs : -1] / unit ** np.arange(2 * pairs - 2, 0, -1), 1.0)
+        return Axis(numerator, reduce(np.polymul, sections), float(x[-1]) / unit, words)
+
+    def off(x: Array, pairs: int) -> Array:
+        return (axis(x, pairs).at(s) - response).view(float)
+
+    found = list[tuple[float, Axis]]()
+    for pairs in PAIRS:
+        start = np.concatenate([np.log(1.5) * np.arange(pairs), np.full(pairs, np.log(0.7)), np.zeros(2 * pairs - 1)])
+        start[-1] = 0.01
+        low, high = np.full((2, len(start)), np.inf) * [[-1.0], [1.0]]
+        low[-1], high[:pairs] = 0.0, np.log(FASTEST * np.abs(s).max() / unit)
+        low[pairs : 2 * pairs], high[pairs : 2 * pairs] = -np.log(OVERDAMPED), np.log(OVERDAMPED)
+        fit = scipy.optimize.least_squares(partial(off, pairs=pairs), start, bounds=(low, high), x_scale="jac")
+        error = float(np.sqrt(2 * fit.cost / len(s)))
+        words = f"measured: {2 * pairs} poles, delay {1e3 * fit.x[-1] / unit:.3g} ms, off by {100 * error:.2g} % (RMS)"
+        found.append((error, axis(fit.x, pairs, words)))
+        if error < CLOSE:
+            break
+    return min(found, key=lambda one: one[0])[1]
+
 
 ROUNDED = 9  # digits of times (s) of delayed set points
 LEFT = 1e-6  # of a step: what the controller has left to do counts as done
@@ -31,7 +164,7 @@ class Servo:
         return max(axis.delay + _decay(axis.poles) for axis in self.axes)
 
     def motors(self, times: Array, command: Array) -> Piecewise:
-        """Paths of n motors from rest, under set points (T, n) at `times` (T,), s; on to `settled` after the last one.
+        """Return paths of n motors from rest, under set points (T, n) at `times` (T,), rad or m, s, on to `settled`.
 
         Each line of the command is exact: a change of its slope by Δ adds Δ (t − Σρ + Σρ e^(λt)), with the residues ρ
         of G/s² at the poles λ of G.
@@ -73,7 +206,7 @@ class Servo:
         return max(self.margins) <= LASTING
 
     def command(self, step: float, position: Array, rate: Array) -> Array:
-        """Set points (T, n) every `step` s for motors' positions and rates (T, n) that rest at both ends.
+        """Return set points (T, n) every `step` s for motors from rest to rest: positions, rates (T, n), rad or m, s.
 
         By Fourier transforms: θ_cmd = θ_r + F θ̇_r, F = (e^(−Δs)/(G sinc²) − 1)/s. The longest delay Δ keeps axes
         together; sinc² is what lines between set points leave of a frequency.
@@ -94,7 +227,7 @@ def _decay(poles: ComplexArray) -> float:
 
 
 def quintics(nodes: Array, states: Array) -> Piecewise:
-    """Through positions, rates and accelerations (K, 3, n) at `nodes` (K,), s."""
+    """Return a path through positions, rates and accelerations (K, 3, n), rad or m and s, at `nodes` (K,), s."""
     h = np.diff(nodes)[:, None]
     (p, v, a), (q, w, b) = states[:-1].transpose(1, 0, 2), states[1:].transpose(1, 0, 2)
     d, v, w, a, b = q - p, v * h, w * h, a * h**2, b * h**2

@@ -20,13 +20,11 @@ from ..exchange.motion import (
 )
 from ..run.watcher import Watcher
 from ..scene.load import load_robot
-from ..scene.scene import Scene
-from .axes import axis_of
 from .candidates import Candidate, candidates
 from .diagnosis import Diagnosis, diagnose
 from .recording import Limits, limits_of, planned, read_recording
 from .robot import Robot
-from .servo import Servo
+from .servo import Servo, axis_of
 
 KINDS = ("averaged", "slower", "shaped", "inverted")
 
@@ -169,7 +167,14 @@ def smooth_motion(
         check_known(kind, KINDS, f"kind: expected one of {quoted(KINDS)}")
     if not 10.0 <= rate <= 10_000.0:
         raise InputError("rate: expected 10 to 10000 Hz", f"{rate:g}")
-    controllers = _servo(loaded, servo, damping_ratio)
+    joints = [joint.name for joint in loaded.motor_joints]
+    by_joint = servo if isinstance(servo, Mapping) else dict.fromkeys(joints, servo)
+    expected = f"{loaded.path}: servo: expected one controller of each of {quoted(joints)}"
+    for joint in by_joint:
+        check_known(joint, joints, expected)
+    if missing := [joint for joint in joints if joint not in by_joint]:
+        raise InputError(expected, f"none of {quoted(missing)}")
+    controllers = Servo(tuple(axis_of(by_joint[joint], damping_ratio) for joint in joints))
     watcher.stage("motion")
     read = planned(loaded, 1 / rate, watcher) if path is None else read_recording(
         Path(path), loaded, is_in_degrees=degrees
@@ -181,15 +186,3 @@ def smooth_motion(
     needed = has_rest and (before.residual > settled or before.faults)
     new = candidates(robot, before, limits, 1 / rate, kind) if needed else ()
     return Smoothed(robot, before, limits, tuple(new), kind)
-
-
-def _servo(scene: Scene, servo: float | str | Mapping[str, float | str], ratio: float) -> Servo:
-    """The controllers of all joints with motors."""
-    joints = [joint.name for joint in scene.motor_joints]
-    by_joint = servo if isinstance(servo, Mapping) else dict.fromkeys(joints, servo)
-    expected = f"{scene.path}: servo: expected one controller of each of {quoted(joints)}"
-    for joint in by_joint:
-        check_known(joint, joints, expected)
-    if missing := [joint for joint in joints if joint not in by_joint]:
-        raise InputError(f"{expected}", f"none of {quoted(missing)}")
-    return Servo(tuple(axis_of(by_joint[joint], ratio) for joint in joints))

@@ -13,11 +13,10 @@ from ffrobot import InputError, smooth_motion
 from ffrobot.mbs.fields.paths import averaged_step, law_in
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_robot
-from ffrobot.smooth.axes import axis_of
 from ffrobot.smooth.diagnosis import diagnose
 from ffrobot.smooth.recording import limits_of, read_recording
 from ffrobot.smooth.robot import Robot
-from ffrobot.smooth.servo import Servo
+from ffrobot.smooth.servo import Servo, axis_of
 from ffrobot.smooth.smoothing import Smoothed
 
 J, OMEGA, WAY, T, SERVO, RATIO = 5.0, 2 * np.pi * 7.3, 0.6, 0.5, 20.0, 0.8
@@ -148,60 +147,42 @@ def test_jumps_have_their_size_wherever_they_lie(tmp_path):
 SMOOTH = law_in(0.9, "rest-to-rest", 4)
 
 
-def _stamps(change):
-    times, rows = TIMES.copy(), motion(SMOOTH)
-    change(times)
-    return times, rows
+JITTER = np.append(0.0, np.random.default_rng(2).normal(0.0, 0.0012, len(TIMES) - 1))
+RIPPLE = 4e-4 * np.sin(2 * np.pi * 8.0 * TIMES) * SMOOTH.sample(TIMES, 1)[:, 0]
 
 
-def _rows(change):
-    rows = motion(SMOOTH)
-    rows["hip"] = rows["hip"] + change
-    return TIMES, rows
+def stream(law=SMOOTH, late=0.0, hip=0.0, kept=slice(None), faster=1.0):
+    """Stamps and rows, stamps `late` by so many s, with more at the hip, and only those that are kept."""
+    rows = motion(law)
+    rows["hip"] = rows["hip"] + hip
+    return ((TIMES + late) / faster)[kept], {name: row[kept] for name, row in rows.items()}
 
 
-def _jitter(times):
-    times[1:] += np.random.default_rng(2).normal(0.0, 0.0012, len(times) - 1)
-
-
-def _doubled(times):
-    times[[40, 60]] = times[[39, 59]]
-
-
-def _back(times):
-    times[50] = times[47] - 0.001
-
-
-def _gap():
-    kept = np.r_[0:55, 60:126]
-    return TIMES[kept], {name: rows[kept] for name, rows in motion(SMOOTH).items()}
-
-
-def _coarse():
-    return TIMES[::5], {name: rows[::5] for name, rows in motion(SMOOTH).items()}
+def at(rows, value):
+    return np.where(np.isin(np.arange(len(TIMES)), rows), value, 0.0)
 
 
 FAULTS = {
-    "none": (lambda: (TIMES, motion(SMOOTH)), set()),
-    "jitter": (lambda: _stamps(_jitter), {"jitter"}),
-    "doubled stamps": (lambda: _stamps(_doubled), {"doubled stamps"}),
-    "steps back": (lambda: _stamps(_back), {"steps back"}),
-    "gap": (_gap, {"gap"}),
-    "position": (lambda: _rows(np.where(TIMES > 0.3, 0.006, 0.0)), {"jump of position"}),
-    "speed": (lambda: (TIMES, motion(averaged_step(np.array([0.9])))), {"jump of speed"}),
-    "acceleration": (lambda: (TIMES, motion(averaged_step(np.array([0.6, 0.3])))), {"jump of acceleration"}),
-    "coarse": (_coarse, {"coarse sampling"}),
-    "limit": (lambda: (TIMES / 2, motion(SMOOTH)), {"limit"}),
-    "place": (lambda: _rows(np.full(len(TIMES), 2.9)), {"limit"}),
-    "resonance": (lambda: _rows(4e-4 * np.sin(2 * np.pi * 8.0 * TIMES) * SMOOTH.sample(TIMES, 1)[:, 0]), {"resonance"}),
-    "noise": (lambda: _rows(np.random.default_rng(3).normal(0.0, 2e-4, len(TIMES))), {"noise"}),
+    "none": ({}, set()),
+    "jitter": ({"late": JITTER}, {"jitter"}),
+    "doubled stamps": ({"late": at([40, 60], -STEP)}, {"doubled stamps"}),
+    "steps back": ({"late": at([50], -3 * STEP - 0.001)}, {"steps back"}),
+    "gap": ({"kept": np.r_[0:55, 60:126]}, {"gap"}),
+    "position": ({"hip": np.where(TIMES > 0.3, 0.006, 0.0)}, {"jump of position"}),
+    "speed": ({"law": averaged_step(np.array([0.9]))}, {"jump of speed"}),
+    "acceleration": ({"law": averaged_step(np.array([0.6, 0.3]))}, {"jump of acceleration"}),
+    "coarse": ({"kept": slice(None, None, 5)}, {"coarse sampling"}),
+    "limit": ({"faster": 2.0}, {"limit"}),
+    "place": ({"hip": 2.9}, {"limit"}),
+    "resonance": ({"hip": RIPPLE}, {"resonance"}),
+    "noise": ({"hip": np.random.default_rng(3).normal(0.0, 2e-4, len(TIMES))}, {"noise"}),
 }
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_fault_has_its_diagnosis(tmp_path, name):
-    make, expected = FAULTS[name]
-    times, rows = make()
+    changes, expected = FAULTS[name]
+    times, rows = stream(**changes)
     found = diagnosed(arm(tmp_path), table(tmp_path / "path.csv", times, **rows))
     assert {fault.kind for fault in found.before.faults} == expected
     if name == "none":
@@ -212,10 +193,8 @@ def test_each_fault_has_its_diagnosis(tmp_path, name):
 def test_jitter_is_told_apart_from_the_motion(tmp_path):
     """At even times the robot does what it does on the set points before their stamps jittered."""
     rows = motion(averaged_step(np.array([0.6, 0.3])))
-    late = TIMES.copy()
-    _jitter(late)
     as_planned, found = (
-        diagnosed(arm(tmp_path), table(tmp_path / "path.csv", times, **rows)) for times in (TIMES, late)
+        diagnosed(arm(tmp_path), table(tmp_path / "path.csv", TIMES + late, **rows)) for late in (0.0, JITTER)
     )
     left = found.before.even.settling.residual
     assert left == pytest.approx(as_planned.before.residual, rel=0.05)
