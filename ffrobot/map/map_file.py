@@ -103,7 +103,7 @@ def _columns(poses: PoseMap, name: str, values: Array) -> dict[str, Array]:
 
 
 def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
-    """Turn of the tool (rad) with the largest stable depth (m) at each place of the other axes, by condition.
+    """Return, by condition, the tool's turn (rad) of the largest stable depth (m) at each place of the other axes.
 
     NaN where no turn is possible; empty for grids without turns, and without milling.
     """
@@ -148,14 +148,10 @@ class Quantity(NamedTuple):
         return f"{self.values[pose]:.4g}" if np.isfinite(self.values[pose]) else self.endless
 
     @property
-    def worst(self) -> int:
-        """The pose with the worst value."""
-        return int(np.nanargmin(self.values) if self.more_is_better else np.nanargmax(self.values))
-
-    @property
-    def best(self) -> int:
-        """Index of the pose with the best value."""
-        return int(np.nanargmax(self.values) if self.more_is_better else np.nanargmin(self.values))
+    def extremes(self) -> tuple[int, int]:
+        """Numbers of the poses with the worst and the best value."""
+        least, largest = int(np.nanargmin(self.values)), int(np.nanargmax(self.values))
+        return (least, largest) if self.more_is_better else (largest, least)
 
 
 def quantities(poses: PoseMap) -> dict[str, Quantity]:
@@ -193,7 +189,6 @@ def _beyond(round_off: float, values: Array) -> Array:
 
 
 def _largest(values: Array) -> Array:
-    """(P,) of (P, n), nan where all are."""
     known = np.isfinite(values)
     return as_floats(np.where(known.any(axis=1), np.where(known, values, -np.inf).max(axis=1), np.nan))
 
@@ -213,7 +208,7 @@ def _ranges(poses: PoseMap) -> Iterator[tuple[str, ...]]:
         if quantity.everywhere:
             yield quantity.title, quantity.everywhere, "everywhere", "", ""
         elif np.isfinite(quantity.values).any():
-            ends = ((quantity.text(k), _place(poses, k)) for k in (quantity.worst, quantity.best))
+            ends = ((quantity.text(k), _place(poses, k)) for k in quantity.extremes)
             yield quantity.title, *(cell for end in ends for cell in end)
 
 

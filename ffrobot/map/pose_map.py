@@ -15,7 +15,7 @@ from threading import local
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from ..batch.batch import Batch
 from ..common.arrays import Array, Booleans, Indices, as_floats
@@ -38,7 +38,6 @@ from ..scene.load import load_scene
 from ..scene.scene import Scene
 
 MOST_AXES = 3
-_number = TypeAdapter(Quantity)
 
 
 def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
@@ -73,25 +72,19 @@ def _axis(text: str, scene: Scene) -> GridAxis:
             f"--over: expected NAME=FIRST:LAST:COUNT of a joint ({quoted(joints)}) or of {quoted(places)}",
             f'"{shown(text)}"{did_you_mean(name, joints)}',
         )
-    return GridAxis(name, _values(values, text), name not in joints, units.get(name, "rad" if name == TURN else "m"))
-
-
-def _values(text: str, whole: str) -> Array:
-    pieces = text.split(":")
-    try:
-        if len(pieces) == 3:
-            count = int(pieces[2])
-            if not 1 <= count <= MOST_RUNS:
-                raise ValueError
-            return np.linspace(_number.validate_python(pieces[0]), _number.validate_python(pieces[1]), count)
-        if len(pieces) == 1:
-            return np.array([_number.validate_python(each) for each in text.split(",")])
-    except (ValueError, ValidationError):
-        pass
-    raise InputError(
-        "--over: expected NAME=FIRST:LAST:COUNT or NAME=VALUE,VALUE, such as shoulder=-90*deg:90*deg:31",
-        f'"{shown(whole)}"',
-    )
+    number, grid = TypeAdapter(Quantity).validate_python, None
+    with suppress(ValueError):  # pydantic's are, too
+        match values.split(":"):
+            case [first, last, count] if 1 <= int(count) <= MOST_RUNS:
+                grid = np.linspace(number(first), number(last), int(count))
+            case [listed]:
+                grid = np.array([number(each) for each in listed.split(",")])
+    if grid is None:
+        raise InputError(
+            "--over: expected NAME=FIRST:LAST:COUNT or NAME=VALUE,VALUE, such as shoulder=-90*deg:90*deg:31",
+            f'"{shown(text)}"',
+        )
+    return GridAxis(name, grid, name not in joints, units.get(name, "rad" if name == TURN else "m"))
 
 
 PLAN, POSTURES, PARTS = "plan.json", "postures.npz", "parts"
@@ -102,7 +95,7 @@ STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
 
 @dataclass(frozen=True)
 class MapPlan:
-    """Request of a map: scene, grid, point, number of frequencies, folder.
+    """Request of a map of a scene over `axes`, in a folder.
 
     Attributes:
         point: "BODY.POINT" whose stiffness and place it has.
@@ -136,9 +129,9 @@ class MapPlan:
 
 @dataclass(frozen=True)
 class PoseMap:
-    """A map: `values` by name, (P, …) with nan where a pose is none; `status` (P,) numbers of `STATUS`.
+    """A map: `values` (P, …) by name, in units of `map_file.UNITS`, NaN where there is no pose; `status` (P,).
 
-    `motors` have the unit "rad" or "m" of their coordinates in `units`.
+    `motors` have the unit "rad" or "m" of their coordinates in `units`, and `limits` (motors,), N·m or N. `q` (P, n_q).
     """
 
     plan: MapPlan
@@ -160,7 +153,10 @@ def plan_map(
     frequencies: Array | None = None,
     milling: Milling | None = None,
 ) -> MapPlan:
-    """Raises `InputError` for a scene, a grid or a point that is wrong, and for a folder of something else."""
+    """Return the plan of a map with responses at `frequencies` (F,), Hz.
+
+    Raises `InputError` for a wrong scene, grid or point, and for a folder of something else.
+    """
     check_folder(folder)
     loaded = load_scene(scene)
     axes = parse_grid(over, loaded)
@@ -169,17 +165,8 @@ def plan_map(
     keeps = orientation == "start"
     if orientation == "auto":
         keeps = any(axis.is_place for axis in axes) and any(path.orientation is not None for path in loaded.trajectory)
-    omega = np.zeros(0) if frequencies is None else frequencies
-    return MapPlan(
-        scene=scene,
-        axes=axes,
-        point=point or default_point(loaded),
-        keeps_orientation=keeps,
-        count=count,
-        frequencies=omega,
-        folder=folder,
-        milling=milling,
-    )
+    point, response = point or default_point(loaded), np.zeros(0) if frequencies is None else frequencies
+    return MapPlan(scene, axes, point, keeps, count, response, folder=folder, milling=milling)
 
 
 def default_point(scene: Scene) -> str:
@@ -208,20 +195,20 @@ def make_map(plan: MapPlan, batch: Batch, watcher: Watcher) -> PoseMap:
     request = _request(plan)
     kept = _kept_postures(plan, request)
     postures = kept or grid_postures(
-        solution.model,
-        plan.axes,
-        plan.point,
-        keeps_orientation=plan.keeps_orientation,
-        turned_about=plan.turned_about,
+        solution.model, plan.axes, plan.point, keeps_orientation=plan.keeps_orientation, turned_about=plan.turned_about
     )
     good = postures.reached & postures.within
     if not good.any():
         raise SolveError(f"{plan.scene}: no pose of the grid is within reach and the limits of the joints")
     first = tuple(postures.q[int(good.argmax())])
-    of = PosesOf(f"{request}{first}", replace(plan, scene=plan.scene.absolute()), allowed_python(), first)
+    of = _PosesOf(f"{request}{first}", replace(plan, scene=plan.scene.absolute()), allowed_python(), first)
     evaluator = of.evaluator(solution)
-    if kept is None:
-        _claim(plan, request, postures)
+    if kept is None:  # what was made from other input goes
+        for file in (plan.folder / POSTURES, *(plan.folder / PARTS).glob("*.npz")):
+            file.unlink(missing_ok=True)
+        content = json.dumps(request).encode()
+        write_atomically(plan.folder / PLAN, content, "plan of the map", make_folder=True, ours=True)
+        _write(plan.folder / POSTURES, postures._asdict())
     numbers = np.flatnonzero(good)
     parts = [numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART)]
     named = {hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24]: part for part in parts}
@@ -238,18 +225,16 @@ def check_point(solution: Solution, point: str, place: str = "--point") -> None:
 
 
 def _judged(
-    of: PosesOf, postures: Postures, parts: Mapping[str, Indices], batch: Batch, watcher: Watcher
+    of: _PosesOf, postures: Postures, parts: Mapping[str, Indices], batch: Batch, watcher: Watcher
 ) -> Mapping[str, Mapping[str, Array]]:
     """Findings by name of the part, from files or as jobs of `batch`."""
     files = {name: of.plan.folder / PARTS / f"{name}.npz" for name in parts}
     known = {name: columns for name, file in files.items() if (columns := _read(file)) is not None}
-    left = {name: part for name, part in parts.items() if name not in known}
-    watcher.stage(f"{sum(map(len, left.values()))} poses")
-    names, jobs = list(left), [(of, postures.q[part]) for part in left.values()]
-    for number, columns in batch.results(_judge, jobs):
-        name = names[number]
-        _write(files[name], columns)
-        known[name] = columns
+    left = [name for name in parts if name not in known]
+    watcher.stage(f"{sum(len(parts[name]) for name in left)} poses")
+    for number, columns in batch.results(_judge, [(of, postures.q[parts[name]]) for name in left]):
+        _write(files[left[number]], columns)
+        known[left[number]] = columns
         watcher.advance(len(known), len(parts))
     return known
 
@@ -258,10 +243,10 @@ _evaluators = local()  # which serves one thread
 
 
 @dataclass(frozen=True)
-class PosesOf:
+class _PosesOf:
     """What poses are judged with: the plan of a map, folders with allowed Python files, some posture q (n_q,).
 
-    `key`: another where any of them, or a file of the scene, is.
+    `key` differs where any of them, or a file of the scene, does.
     """
 
     key: str
@@ -270,37 +255,33 @@ class PosesOf:
     q: tuple[float, ...]
 
     def evaluator(self, solution: Solution | None = None) -> PoseEvaluator:
-        """Made once in each thread; processes forked from this one have it as it is."""
+        """Made once in each thread; processes forked from this one inherit it."""
         kept = vars(_evaluators)
         if self.key not in kept:
             kept.clear()
             with python_allowed(self.allowed):
                 model = (solution or prepare_scene(self.plan.scene)).model
+            judge = partial(stable_depths, self.plan.milling) if self.plan.milling else None
+            omega = 2 * np.pi * self.plan.frequencies
             kept[self.key] = PoseEvaluator(
-                model,
-                np.array(self.q),
-                self.plan.point,
-                count=self.plan.count,
-                omega=2 * np.pi * self.plan.frequencies,
-                judge=None if self.plan.milling is None else partial(stable_depths, self.plan.milling),
+                model, np.array(self.q), self.plan.point, count=self.plan.count, omega=omega, judge=judge
             )
         made: PoseEvaluator = kept[self.key]
         return made
 
 
-def _judge(job: tuple[PosesOf, Array]) -> dict[str, Array]:
+def _judge(job: tuple[_PosesOf, Array]) -> dict[str, Array]:
     """Findings of poses q (N, n_q) by name, (N, …); nan where there is no equilibrium."""
     evaluator = job[0].evaluator()
-    poses: list[dict[str, Array] | None] = []
+    poses = list[dict[str, Array]]()
     for each in job[1]:
-        try:
-            poses.append(evaluator.at(each))
-        except SolveError:
-            poses.append(None)
-    judged = next((one for one in poses if one is not None), {})
+        poses.append({})
+        with suppress(SolveError):
+            poses[-1] = evaluator.at(each)
+    judged = next(filter(None, poses), {})
     none = {name: np.full_like(value, np.nan) for name, value in judged.items()}
     table = {name: np.array([(one or none)[name] for one in poses]) for name in judged}
-    return {"stands": np.array([one is not None for one in poses]), **table}
+    return {"stands": np.array(list(map(bool, poses))), **table}
 
 
 def _read(path: Path) -> dict[str, Array] | None:
@@ -346,14 +327,6 @@ def _kept_postures(plan: MapPlan, request: Mapping[str, Any]) -> Postures | None
     return Postures(stored["q"], stored["reached"].astype(bool), stored["within"].astype(bool))
 
 
-def _claim(plan: MapPlan, request: Mapping[str, Any], postures: Postures) -> None:
-    """Start the folder; what was made from other input goes."""
-    for file in (plan.folder / POSTURES, *(plan.folder / PARTS).glob("*.npz")):
-        file.unlink(missing_ok=True)
-    write_atomically(plan.folder / PLAN, json.dumps(request).encode(), "plan of the map", make_folder=True, ours=True)
-    _write(plan.folder / POSTURES, postures._asdict())
-
-
 def _assembled(
     plan: MapPlan,
     solution: Solution,
@@ -370,18 +343,10 @@ def _assembled(
             if name != "stands":
                 whole = values.setdefault(name, np.full((len(status), *value.shape[1:]), np.nan))
                 whole[part] = value
-    names, limits, units = tuple(name.split("/")[1] for name in evaluator.motors), dict[str, float](), dict[str, str]()
+    names, about = tuple(name.split("/")[1] for name in evaluator.motors), dict[str, tuple[str, float]]()
     for joint in solution.scene.motor_joints:
         labels = [name.removeprefix("joint/") for name, _ in labelled(solution.model, joint.name)]
-        units |= zip(labels, joint.units, strict=True)
-        limits |= {label: limit.moment for label, limit in zip(labels, joint.motor_limits, strict=True)}
-    moments = np.array([limits[name] for name in names])
-    return PoseMap(
-        plan=plan,
-        motors=names,
-        units=tuple(units[name] for name in names),
-        limits=np.where(np.isfinite(moments), moments, np.nan),
-        status=status,
-        values=values,
-        q=postures.q,
-    )
+        about |= zip(labels, zip(joint.units, (limit.moment for limit in joint.motor_limits), strict=True), strict=True)
+    units, moments = zip(*(about[name] for name in names), strict=True)
+    limits = np.where(np.isfinite(moments), moments, np.nan)
+    return PoseMap(plan, names, units, limits, status, values=values, q=postures.q)

@@ -120,8 +120,7 @@ def _workspace(axes: Axes, pose_map: PoseMap, quantity: Quantity, *, has_bar: bo
 
 
 def _marks(quantity: Quantity) -> Iterator[tuple[int, str, str]]:
-    yield quantity.worst, WORST, "v"
-    yield quantity.best, BEST, "^"
+    return zip(quantity.extremes, (WORST, BEST), "v^", strict=True)
 
 
 def _in_units(axis: GridAxis) -> Array:
