@@ -11,7 +11,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from multiprocessing import get_context
 from types import FrameType
 from typing import Any, NoReturn, TypeVar
@@ -54,7 +54,10 @@ class Batch:
         left, broken = dict(enumerate(jobs)), 0
         while left:
             try:
-                for number, result in self._attempt(function, dict(left)):
+                self._executor = executor = self._executor or self._make()
+                self._futures = {executor.submit(_done, VERSION, function, job): n for n, job in left.items()}
+                for future in as_completed(self._futures):
+                    number, result = self._futures[future], future.result()
                     del left[number]
                     broken = 0
                     yield number, result
@@ -62,12 +65,6 @@ class Batch:
                 self._executor, broken = None, broken + 1
                 if broken == TRIES:
                     raise SolveError(f"the processes that do the jobs were ended {TRIES} times: {error}") from error
-
-    def _attempt(self, function: Callable[[J], R], jobs: dict[int, J]) -> Iterator[tuple[int, R]]:
-        self._executor = executor = self._executor or self._make()
-        self._futures = {executor.submit(_done, VERSION, function, job): number for number, job in jobs.items()}
-        for future in as_completed(self._futures):
-            yield self._futures[future], future.result()
 
 
 _is_busy = _is_stopping = False  # of a process of `Processes`
@@ -138,14 +135,10 @@ def batch_of(count: int | None = None, scheduler: str | None = None) -> Iterator
         )
     if count and scheduler:
         raise InputError("--processes: expected none with --scheduler, whose workers do the jobs", count)
-    kind = _of_mpi() if processes() > 1 else _of_dask(scheduler) if scheduler else _of_machine(count)
+    here = nullcontext(lambda: Processes(count or processors()))
+    kind = _of_mpi() if processes() > 1 else _of_dask(scheduler) if scheduler else here
     with kind as make, Batch(make) as batch:
         yield batch
-
-
-@contextmanager
-def _of_machine(count: int | None) -> Iterator[Callable[[], Executor]]:
-    yield lambda: Processes(count or processors())
 
 
 @contextmanager
@@ -170,7 +163,7 @@ def _of_dask(address: str) -> Iterator[Callable[[], Executor]]:
     for logger in ("distributed", "distributed.client"):  # it prints stacks of what is an error of ours below
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=10, set_as_default=False)  # s, for an answer
     except (OSError, ValueError) as error:
         raise InputError("--scheduler: expected the address of a dask scheduler", f'"{address}": {error}') from None
     with client:
@@ -179,6 +172,3 @@ def _of_dask(address: str) -> Iterator[Callable[[], Executor]]:
         except (CancelledError, CommClosedError, KilledWorker) as error:
             why = str(error) or "the scheduler has ended"
             raise SolveError(f"--scheduler {address}: {why}; the same command resumes what is done") from error
-
-
-PATIENCE = 10  # s, for an answer of a scheduler
