@@ -15,8 +15,8 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..sweep.sweep import Key
-from .designs import Point
-from .readings import Followed, Reading, Response
+from .designs import Point, moved
+from .readings import Reading, Response
 
 LEVELS = 3  # sizes of steps that one extrapolation takes at most
 NOISE = 3.0  # times what one divided difference says of it: with luck it says little
@@ -32,7 +32,7 @@ class Derivative(NamedTuple):
 
 
 def weights(offsets: Array) -> Array:
-    """Return weights w (n,) of f'(0) ≈ Σ w_i f(x_i): Σ w_i x_iᵏ is 1 for k = 1 and 0 for other k < n."""
+    """Return weights w (n,) of f'(0) ≈ Σ w_i f(x_i), 1/unit of x: Σ w_i x_iᵏ is 1 for k = 1 and 0 for other k < n."""
     size = np.abs(offsets).max()
     powers = np.vander(offsets / size, increasing=True).T
     first = np.zeros(len(offsets))
@@ -45,42 +45,31 @@ def derivative(offsets: Array, values: Array) -> Derivative:
 
     Steps are taken two and three sizes at a time; those whose estimate of the error is least make the derivative
     (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
+
+    The estimate has two parts. Truncation: how far the derivative without the largest steps is off, which is of lower
+    order. Noise of the values: by their divided difference of the highest order, 0 of polynomials of lower degree.
     """
     known = np.isfinite(values)
     offsets, values = offsets[known], values[known]
     sizes = np.unique(np.abs(offsets[offsets != 0.0]))[::-1]
     best = Derivative(np.nan, np.nan, np.nan)
     for first, last in combinations(range(sizes.size + 1), 2):
-        estimate = _of_window(offsets, values, sizes[first:last]) if last - first <= LEVELS else None
-        if estimate is not None and not estimate.error >= best.error:
-            best = estimate
+        if not 2 <= last - first <= LEVELS:
+            continue
+        largest = sizes[first]
+        taken = np.isin(np.abs(offsets), [0.0, *sizes[first:last]])
+        x, f = offsets[taken], values[taken]
+        inner = np.abs(x) < largest
+        f = f - f[np.argmin(np.abs(x))]  # round-off of differences, not of values
+        apart = (x[:, None] - x) / largest + np.eye(x.size)
+        w, highest = weights(x), 1.0 / np.prod(apart, axis=1)
+        whole, truncation = float(w @ f), abs(float(w @ f - weights(x[inner]) @ f[inner]))
+        noise = NOISE * abs(float(highest @ f)) / float(np.abs(highest).sum())
+        noise += ROUND_OFF * float(np.abs(values[taken]).max())
+        error = truncation + noise * float(np.abs(w).sum())
+        if not error >= best.error:
+            best = Derivative(whole, error, float(largest))
     return best
-
-
-def _of_window(offsets: Array, values: Array, sizes: Array) -> Derivative | None:
-    """With steps of these `sizes`, the largest first, and no step.
-
-    The estimate of the error has two parts. Truncation: how far the derivative without the largest steps is off, which
-    is of lower order. Noise of the values: by their divided difference of the highest order, which hardly knows of
-    anything else.
-    """
-    if sizes.size < 2:
-        return None
-    taken = np.isin(np.abs(offsets), [0.0, *sizes])
-    x, f = offsets[taken], values[taken]
-    inner = np.abs(x) < sizes[0]
-    f = f - f[np.argmin(np.abs(x))]  # round-off of differences, not of values
-    w, u = weights(x), _highest(x)
-    whole, truncation = float(w @ f), abs(float(w @ f - weights(x[inner]) @ f[inner]))
-    noise = NOISE * abs(float(u @ f)) / float(np.abs(u).sum()) + ROUND_OFF * float(np.abs(values[taken]).max())
-    return Derivative(whole, truncation + noise * float(np.abs(w).sum()), float(sizes[0]))
-
-
-def _highest(offsets: Array) -> Array:
-    """Weights (n,) of the divided difference of order n − 1: 0 of all polynomials of lower degree."""
-    x = offsets / np.abs(offsets).max()
-    apart = x[:, None] - x[None, :] + np.eye(x.size)
-    return as_floats(1.0 / np.prod(apart, axis=1))
 
 
 AIM = 1e-5  # estimated error, of the largest percent per percent of a response, or of 1, that needs no other steps
@@ -105,8 +94,8 @@ class Base:
     again: Mapping[Key, Any] = field(default_factory=dict)
 
     def moved(self, k: int, offset: float) -> Point:
-        """The point with one value changed."""
-        return (*self.point[:k], self.point[k] + offset, *self.point[k + 1 :])
+        """Return the point with entry k changed by `offset`."""
+        return moved(self.point, k, self.point[k] + offset)
 
 
 @dataclass(frozen=True)
@@ -115,12 +104,12 @@ class Sample:
 
     k: int
     offset: float
-    responses: tuple[Followed, ...]
+    responses: tuple[Reading, ...]
     failure: str = ""
 
 
 Method = Literal["differences", "repeated steps", "one-sided", "none"]
-"""How a derivative was found; "repeated steps": differences of runs with the same steps of integration."""
+"""Method of a derivative; "repeated steps": differences of runs with the same steps of integration."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +134,7 @@ def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], .
 
 
 def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
-    """Numbers of keys with an error above `AIM`, where the least error is that of the smallest (or largest) step."""
+    """Return numbers of keys with errors above `AIM` whose best derivative has the smallest (or largest) step."""
     rough, rows = set(), entries(base, samples)
     for g, row in enumerate(rows):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
@@ -168,20 +157,19 @@ def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
     size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
     slope = slope._replace(error=slope.error + unresolved + base.repeats * max(abs(slope.value), size))
-    notes = [*_notes(base, g, k, samples)]
-    if _is_rough(base, g, k, slope.error - unresolved, slope.value):
-        notes.append("not smooth, or noisy: half of the step yields another derivative")
-    if _is_rough(base, g, k, unresolved, slope.value):
-        notes.append("the peak lies between outputs that are too far apart: take a smaller output_step")
-    return Entry(*slope, _method(base, offsets, slope.value), tuple(notes), unresolved)
-
-
-def _method(base: Base, offsets: Array, value: float) -> Method:
-    if np.isnan(value):
-        return "none"
+    method: Method = "repeated steps" if base.repeats else "differences"
     if not offsets.min() < 0.0 < offsets.max():
-        return "one-sided"
-    return "repeated steps" if base.repeats else "differences"
+        method = "one-sided"
+    if np.isnan(slope.value):
+        method = "none"
+    notes = [*_notes(base, g, k, samples)]
+    for error, note in (
+        (slope.error - unresolved, "not smooth, or noisy: half of the step yields another derivative"),
+        (unresolved, "the peak lies between outputs that are too far apart: take a smaller output_step"),
+    ):
+        if _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(slope.value):
+            notes.append(note)
+    return Entry(*slope, method, tuple(notes), unresolved)
 
 
 def _notes(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Iterator[str]:
@@ -195,10 +183,6 @@ def _notes(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Iterator[st
         yield f"{at(failed)}: {failed.failure}"
     if jump := next((one for one in nearest if one.responses and one.responses[g].elsewhere), None):
         yield f"a kink: {at(jump)} the largest value is {jump.responses[g].elsewhere}"
-
-
-def _is_rough(base: Base, g: int, k: int, error: float, value: float) -> bool:
-    return _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(value)
 
 
 def _relative(error: float, base: Base, g: int, k: int) -> float:

@@ -28,11 +28,10 @@ from ..results.file import Results
 from ..run.inputs import changed, digest_of_file, files_of
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
-from ..scene.scene import Scene
 from ..sweep.files import Variation, run_files
 from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, run_sweep
-from .readings import Followed, Reading, Response
+from .readings import Reading, Response
 
 OUTPUTS = 1000  # at least, where responses are peaks or means over time: they do not depend on those of the scene
 ALGEBRAIC = ("static", "pcid")
@@ -42,13 +41,20 @@ ALGEBRAIC = ("static", "pcid")
 def changes_for(
     path: Path, responses: Sequence[Response], tolerance: float | None, *, keep_steps: bool = False
 ) -> dict[Key, Any]:
-    """Return changes of the scene at `path`: no analysis that no response needs, `tolerance` or less in the others.
+    """Return changes of the scene at `path`: only analyses that responses or these need, with `tolerance` or less.
 
-    Replays of inverse analyses on finer links, which change no result, are left out too. There are `OUTPUTS` at least.
-    `keep_steps`: of integrations.
+    Responses need the analysis that they name, by default the first. Replays of inverse analyses on finer links, which
+    change no result, are left out too. There are `OUTPUTS` at least. `keep_steps`: of integrations.
     """
     scene = load_scene(path)
-    needed = _needed(scene, responses)
+    names = [one.name for one in scene.analysis]
+    moving = next((one.name for one in scene.analysis if isinstance(one, TimedAnalysis)), names[0])
+    needed = {
+        one.analysis if one.analysis in names else moving if one.is_of_rest else names[0] for one in responses
+    } or {names[0]}
+    for record in reversed(scene.analysis):  # each rests on earlier ones only
+        if record.name in needed and record.source is not None:
+            needed.add(record.source)
     whole = run_files(path, {}, path.parent).scene["analysis"]
     tables = deepcopy([table for table in whole if table["name"] in needed])
     for table, record in zip(tables, (one for one in scene.analysis if one.name in needed), strict=True):
@@ -68,7 +74,7 @@ def may_repeat(keys: Sequence[Key]) -> bool:
 
 
 def repeated_steps(results: Results) -> dict[Key, Any] | None:
-    """Changes of a scene with which its integrations take the steps of a run again, whose `results` these are.
+    """Return changes of a scene with which its integrations take the steps of the run with these `results` again.
 
     None where one of them cannot be repeated; nothing where none is integrated, and differences are smooth anyway.
     """
@@ -81,22 +87,13 @@ def repeated_steps(results: Results) -> dict[Key, Any] | None:
     return {("analysis", name, "repeat_steps"): str(results.path.absolute()) for name in stepping}
 
 
-def _needed(scene: Scene, responses: Sequence[Response]) -> set[str]:
-    """Names of the analyses that responses name, by default the first, and of those that they rest on."""
-    names = [one.name for one in scene.analysis]
-    moving = next((one.name for one in scene.analysis if isinstance(one, TimedAnalysis)), names[0])
-    default = {False: names[0], True: moving}
-    named = {
-        response.analysis if response.analysis in names else default[response.is_of_rest] for response in responses
-    } or {names[0]}
-    for one in reversed(scene.analysis):  # each rests on earlier ones only
-        if one.name in named and one.source is not None:
-            named.add(one.source)
-    return {str(name) for name in named}
-
-
 Point = tuple[float, ...]
-"""A value for each key."""
+"""A value for each key, or a coordinate of the unit cube for each variable."""
+
+
+def moved(point: Point, k: int, value: float) -> Point:
+    """Return `point` with entry k replaced."""
+    return (*point[:k], value, *point[k + 1 :])
 
 
 def number(value: object) -> str:
@@ -141,11 +138,11 @@ def runs_of(
     """
     if executor is None and of_mpi() > 1:
         raise InputError("executor: expected one under mpirun, as of mpi4py.futures.MPICommExecutor", "none")
-    path, places = Path(scene), [Path(place) for place in allow_python]
+    path = Path(scene)
     with ExitStack() as stack:
         folder = output if output is not None else stack.enter_context(TemporaryDirectory())
         stack.enter_context(protected(files_of(path)))
-        stack.enter_context(python_allowed(places))
+        stack.enter_context(python_allowed([Path(place) for place in allow_python]))
         if executor is None:
             executor = stack.enter_context(batch_of(processes))
         batch = executor if isinstance(executor, Batch) else stack.enter_context(Batch(lambda: executor))
@@ -168,7 +165,7 @@ class Design:
 
     @property
     def failure(self) -> str:
-        """Why they are not; empty where they are."""
+        """Why its results are incomplete; empty if they are whole."""
         return "" if self.completed else f"{self.row.status}: {self.row.message}"
 
     def results(self) -> Results:
@@ -178,12 +175,12 @@ class Design:
         return results
 
     def read(self, responses: Iterable[Response]) -> tuple[Reading, ...]:
-        """The responses of a design that completed. Raises `InputError` where its results do not have them."""
+        """Responses of a completed design. Raises `InputError` where its results do not have them."""
         with self.results() as results:
             return tuple(response.read(results) for response in responses)
 
-    def follow(self, responses: Sequence[Response], readings: Sequence[Reading]) -> tuple[Followed, ...]:
-        """Responses computed besides those solved for, from a design's `readings`; empty where the design failed."""
+    def follow(self, responses: Sequence[Response], readings: Sequence[Reading]) -> tuple[Reading, ...]:
+        """Responses at the places that another design's `readings` have; empty where this design failed."""
         if not self.completed:
             return ()
         with self.results() as results:
@@ -226,7 +223,7 @@ class Designs:
 
     @property
     def failures(self) -> dict[Point, str]:
-        """Why designs failed, by their points."""
+        """Messages of failed designs by their points."""
         return {one.point: one.failure for one in self._designs.values() if not one.completed}
 
     def problem(self, *points: Point) -> str:
@@ -235,10 +232,9 @@ class Designs:
         for point in points:
             try:
                 check_point(self._sweep, point)
+                return ""
             except InputError as error:
                 text = str(error)
-            else:
-                return ""
         return text
 
     def run_first(self, point: Point) -> Design:
@@ -252,9 +248,8 @@ class Designs:
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
         """Solve the designs at `points` with `changes` in addition, failed ones included; none twice in one folder.
 
-        What is read of the first ones is all that the results of the others have.
-        Raises `InputError` where the scene or its files are others than at first, `SpentError` where designs would be
-        too many.
+        What is read of the first ones is all that the results of the others have. Raises `InputError` where the scene
+        or its files have changed since, `SpentError` where designs would be too many.
         """
         claim_folder(self._sweep)
         imported = {name: one.row.inputs[name] for one in self._designs.values() for name in one.row.imported}
@@ -271,9 +266,10 @@ class Designs:
             lot = replace(wanted, points=tuple(new.values()), earlier=earlier, wanted=tuple(sorted(self._asked)))
             if self._runs.retry:
                 forget_failures(lot)
-            rows = run_sweep(lot, self._runs.batch, self._runs.watcher)
-            triples = zip(new.items(), rows, strict=True)
-            self._designs |= {folder: Design(point, row, folder, self._asked) for (folder, point), row in triples}
+            for (folder, point), row in zip(
+                new.items(), run_sweep(lot, self._runs.batch, self._runs.watcher), strict=True
+            ):
+                self._designs[folder] = Design(point, row, folder, self._asked)
         return [self._designs[folder] for folder in folders]
 
     def whole(self, design: Design) -> Design:
@@ -287,7 +283,6 @@ class Designs:
 
 
 def _digests(path: Path) -> dict[str, str]:
-    """Of the scene and the files it is made from, by their names."""
     return {str(file): digest_of_file(file) for file in files_of(path)}
 
 

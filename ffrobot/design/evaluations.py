@@ -32,8 +32,8 @@ from ..common.files import write_atomically
 from ..common.tables import as_csv
 from ..sweep.sweep import Key
 from .derivatives import weights
-from .designs import Design, Designs, Point, in_words, repeated_steps
-from .readings import Followed, Reading
+from .designs import Design, Designs, Point, in_words, moved, repeated_steps
+from .readings import Reading
 from .responses import KEPT, DesignProblem
 from .variables import DesignSpace, Place
 
@@ -68,7 +68,7 @@ class Evaluations:
     def __init__(self, designs: Designs, space: DesignSpace, problem: DesignProblem) -> None:
         self.designs, self.space, self.problem = designs, space, problem
         self._searched: dict[Point, Evaluated] = {}
-        self._followed: dict[tuple[Place, Path], tuple[Followed, ...]] = {}
+        self._followed: dict[tuple[Place, Path], tuple[Reading, ...]] = {}
 
     @property
     def searched(self) -> list[Evaluated]:
@@ -77,13 +77,13 @@ class Evaluations:
 
     @property
     def failures(self) -> list[str]:
-        """Designs that failed, in words."""
+        """Values of keys and message of each failed design, as text."""
         unread = {one.design.point: one.failure for one in self.searched if not one.completed}
         failures = unread | self.designs.failures
         return [f"{in_words(self.space.keys, point)}: {why}" for point, why in failures.items()]
 
     def at(self, places: Sequence[Place]) -> list[Evaluated]:
-        """The designs there. Raises `SpentError` where that would be too many."""
+        """Return designs at places of the unit cube, run once. Raises `SpentError` if that would be too many."""
         points = [self.space.point(place) for place in places]
         new = {point: place for place, point in zip(places, points, strict=True) if point not in self._searched}
         for (point, place), design in zip(new.items(), self.designs.run(list(new)), strict=True):
@@ -92,13 +92,17 @@ class Evaluations:
 
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
-    ) -> list[tuple[Followed, ...]]:
+    ) -> list[tuple[Reading, ...]]:
         """Responses of neighbours of `base`, peaks taken at its peak times; empty where a design failed.
 
         `again`: changes with which runs take the steps of the base.
         """
-        points = [self.space.point(place) for place in places]
-        return [self._follow(base, design) for design in self.designs.run(points, again)]
+        designs = self.designs.run([self.space.point(place) for place in places], again)
+        known = [(base.place, design.folder) for design in designs]
+        for key, design in zip(known, designs, strict=True):
+            if key not in self._followed:
+                self._followed[key] = design.follow(self.problem.responses, base.readings)
+        return [self._followed[key] for key in known]
 
     def _read(self, place: Place, design: Design) -> Evaluated:
         if not design.completed:
@@ -116,29 +120,22 @@ class Evaluations:
             self.problem = replace(self.problem, scale=evaluated.values[0] or 1.0)
         return evaluated
 
-    def _follow(self, base: Evaluated, design: Design) -> tuple[Followed, ...]:
-        known = base.place, design.folder
-        if known not in self._followed:
-            self._followed[known] = design.follow(self.problem.responses, base.readings)
-        return self._followed[known]
-
 
 def write_designs(tried: Evaluations, path: Path) -> None:
-    """One line for each design of a search: values of keys and responses, the largest excess of a limit, its folder."""
+    """Write one line for each design of a search: values of keys and responses, largest excess of a limit, folder."""
     problem = tried.problem
     responses = [problem.objective.text, *(limit.text for limit in problem.limits)]
     columns = ["design", *map(".".join, tried.space.keys), "status", *responses, "violation", "folder", "message"]
     rows: list[list[object]] = []
     for k, one in enumerate(tried.searched):
         row = one.design.row
-        values = one.values if one.completed else ("",) * len(responses)
-        violation = problem.violation(one.readings) if one.completed else ""
-        status = row.status if one.completed or row.status != "completed" else "failed"
-        rows.append([k, *row.values, status, *values, violation, one.design.folder.name, one.failure])
+        status = "failed" if one.failure and row.status == "completed" else row.status
+        values = ("",) * (len(responses) + 1) if one.failure else (*one.values, problem.violation(one.readings))
+        rows.append([k, *row.values, status, *values, one.design.folder.name, one.failure])
     write_atomically(path, as_csv([columns, *rows]).encode(), "table of designs", ours=True)
 
 
-Beside = dict[float, Sequence[Followed]]
+Beside = dict[float, Sequence[Reading]]
 """Responses beside a design by the offset of one coordinate."""
 
 ROUND_OFF = 1e-11  # of responses: differs between runs with the same steps
@@ -184,39 +181,31 @@ class Differentiation:
             self._tried = True
             if self.repeats:
                 return slopes
-        return self._by_own_steps(base, wanted, pairs=judged or bool(np.isnan(self.curvature[:, wanted]).any()))
+        pairs = judged or bool(np.isnan(self.curvature[:, wanted]).any())  # else one design beside, and curvatures
+        offsets = {j: self._offsets(base, j, self.tolerance, pairs=pairs) for j in wanted}
+        return self._slopes(base, self._samples(base, offsets, None), self.tolerance, self.curvature)
 
     def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], *, judged: bool) -> Slopes:
-        """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
+        """One-sided differences; `judged`: by one run more, of which `repeats` may become false.
+
+        Its measure is |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h.
+        """
         offsets = {j: self._offsets(base, j, ROUND_OFF, pairs=False) for j in wanted}
         samples = self._samples(base, offsets, base.again)
         slopes = self._slopes(base, samples, ROUND_OFF, np.zeros_like(self.curvature))
         if judged and all(samples.values()):
-            left = self._left_of_sum(base, samples)
-            moved = sum(np.abs(slopes.gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
-            self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUND_OFF * np.abs(base.values)))
+            back = {j: -x for j, beside in samples.items() for x in beside if 0.0 <= base.place[j] - x <= 1.0}
+            place = tuple(u + back.get(j, 0.0) for j, u in enumerate(base.place))
+            (whole,) = self.evaluations.beside(base, [place], base.again)
+            own, left = np.array(base.values), np.zeros(len(base.values))
+            for values in [whole, *(next(iter(samples[j].values())) for j in back)] if whole else []:
+                left += np.array([one.value for one in values]) - own
+            left = np.abs(np.nan_to_num(left))
+            change = sum(np.abs(slopes.gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
+            self.repeats = bool(np.all(left <= DOUBTFUL * change + ROUND_OFF * np.abs(own)))
             for j, beside in samples.items():
                 slopes.error[:, j] += left / abs(next(iter(beside)))
         return slopes
-
-    def _left_of_sum(self, base: Evaluated, samples: Mapping[int, Beside]) -> Array:
-        """(r) |F(u − Σ h_j e_j) − F(u) + Σ (F(u + h_j e_j) − F(u))|, of second order in h; 0 if there is no run."""
-        back = {j: -x for j, beside in samples.items() for x in beside if 0.0 <= base.place[j] - x <= 1.0}
-        place = tuple(u + back.get(j, 0.0) for j, u in enumerate(base.place))
-        (whole,) = self.evaluations.beside(base, [place], base.again)
-        own = np.array(base.values)
-        if not whole:
-            return np.zeros_like(own)
-        left = np.array([one.value for one in whole]) - own
-        for j in back:
-            (values,) = samples[j].values()
-            left += np.array([one.value for one in values]) - own
-        return as_floats(np.abs(np.nan_to_num(left)))
-
-    def _by_own_steps(self, base: Evaluated, wanted: Sequence[int], *, pairs: bool) -> Slopes:
-        """With central `pairs`, or one design beside where curvatures are known."""
-        offsets = {j: self._offsets(base, j, self.tolerance, pairs=pairs) for j in wanted}
-        return self._slopes(base, self._samples(base, offsets, None), self.tolerance, self.curvature)
 
     def _samples(
         self, base: Evaluated, offsets: Mapping[int, list[float]], again: Mapping[Key, Any] | None
@@ -224,9 +213,9 @@ class Differentiation:
         """By variable: the responses beside the base by offset; other offsets where a design there has failed."""
         beside: dict[int, Beside] = {j: {} for j in offsets}
         for _ in range(2):
-            moved = [(j, offset) for j in offsets for offset in offsets[j]]
-            responses = self.evaluations.beside(base, [_moved(base.place, j, offset) for j, offset in moved], again)
-            for (j, offset), values in zip(moved, responses, strict=True):
+            pairs = [(j, offset) for j in offsets for offset in offsets[j]]
+            places = [moved(base.place, j, base.place[j] + offset) for j, offset in pairs]
+            for (j, offset), values in zip(pairs, self.evaluations.beside(base, places, again), strict=True):
                 if values and all(np.isfinite(one.value) for one in values):
                     beside[j][offset] = values
             left = {j: [-x for x in tried if -x not in tried] for j, tried in offsets.items() if not beside[j]}
@@ -252,9 +241,7 @@ class Differentiation:
             if not beside:
                 continue
             x = np.array([0.0, *beside])
-            f = np.array(
-                [base.values, *([one.value for one in values] for values in beside.values())]
-            )  # (x, responses)
+            f = np.array([base.values, *([one.value for one in values] for values in beside.values())])  # (x, r)
             h = float(np.abs(x).min(where=x != 0.0, initial=np.inf))
             slope, uncertain = weights(x) @ (f - f[0]), noise * np.abs(f).max(axis=0) / h
             if x.size == 3:
@@ -272,10 +259,6 @@ class Differentiation:
             if one.elsewhere
         )
         return Slopes(gradient, error, tuple(kinks))
-
-
-def _moved(place: Place, j: int, offset: float) -> Place:
-    return (*place[:j], place[j] + offset, *place[j + 1 :])
 
 
 ACTIVE = 1e-4  # of a limit, or of a number's range: what is nearer counts as reached

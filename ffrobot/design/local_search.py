@@ -1,7 +1,5 @@
 """Searches along gradients from one start; all rows of catalogs; differential evolution.
 
-What SLSQP and trust-constr of SciPy call in a search along gradients: values and gradients of objective and limits.
-
 A design that fails reads as far worse than the last one that did not, with its excesses: SLSQP's line search and
 trust-constr's radius then shorten the step towards that one.
 """
@@ -57,11 +55,11 @@ def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
     return (0, objective) if violation <= KEPT else (1, violation)
 
 
-class SearchFunctions:
-    """The functions that optimizers call, of the coordinates x that are no catalog's.
+class _Functions:
+    """The functions that optimizers call, of the unit cube's coordinates x (n,) that are no catalog's; all scaled.
 
     Rows whose largest is to be least are those of the objective, or with `excess` those of the limits. Where there are
-    several, x has one coordinate more, s: to be least, with rows − s ≤ 0.
+    several, x has one coordinate more, the level s: to be least, with rows − s ≤ 0. Excesses (m,) ≤ 0 are feasible.
     """
 
     def __init__(
@@ -86,42 +84,34 @@ class SearchFunctions:
 
     @property
     def has_level(self) -> bool:
-        """Whether x ends with s."""
         return len(self._tops) > 1
 
     @property
     def start(self) -> Array:
-        """Initial coordinates x (n,)."""
         x = as_floats(self._place[self._free])
         return as_floats(np.append(x, self._rows(x)[self._tops].max())) if self.has_level else x
 
     @property
     def bounds(self) -> Array:
-        """Lower and upper bounds (n, 2) of x."""
         sides = [(0.0, 1.0)] * len(self._free) + [(-np.inf, np.inf)] * self.has_level
         return np.array(sides)
 
     @property
     def has_limits(self) -> bool:
-        """Whether there are any."""
         return bool(self._limits) or self.has_level
 
     def objective(self, x: Array) -> float:
-        """Return the objective F at x, scaled."""
         return float(x[-1]) if self.has_level else float(self._rows(x)[self._tops[0]])
 
     def objective_gradient(self, x: Array) -> Array:
-        """Return ∂F/∂x (n,)."""
         return np.eye(x.size)[-1] if self.has_level else as_floats(self._row_gradients(x)[self._tops[0]])
 
     def excesses(self, x: Array) -> Array:
-        """Return constraints g (m,) at x; g ≤ 0 is feasible."""
         rows = self._rows(x)
         over = rows[self._tops] - x[-1] if self.has_level else np.zeros(0)
         return as_floats(np.concatenate([rows[self._limits], over]))
 
     def excess_gradients(self, x: Array) -> Array:
-        """Return ∂g/∂x (m, n)."""
         rows = self._row_gradients(x)
         if not self.has_level:
             return as_floats(rows[self._limits])
@@ -130,7 +120,6 @@ class SearchFunctions:
         return as_floats(np.column_stack([rows[chosen], level]))
 
     def _rows(self, x: Array) -> Array:
-        """(1 + m) responses, scaled."""
         evaluations = self._evaluations
         one = self._at(x)
         if not one.completed:
@@ -147,9 +136,12 @@ class SearchFunctions:
             if self._gradients and np.abs(np.subtract(one.place, self._good.place)).max() < self.shortest:
                 raise StalledError
             self._good = one
-            self._report(one)
-            factors = self._evaluations.problem.factors(one.values)
-            self._gradients[one.place] = self._gradients_at(one) * factors[:, None]
+            problem = self._evaluations.problem
+            violation = problem.violation(one.readings)
+            beyond = f", {100 * violation:.3g} % beyond a limit" if violation > KEPT else ""
+            runs = f"{self._evaluations.designs.count} runs"
+            self._tell(f"{problem.objective.text} {one.readings[0].value:.6g}{beyond}, {runs}")
+            self._gradients[one.place] = self._gradients_at(one) * problem.factors(one.values)[:, None]
         return self._gradients[one.place]
 
     def _gradients_at(self, one: Evaluated) -> Array:
@@ -164,67 +156,19 @@ class SearchFunctions:
             if stands.residual > DOWN * self._residual:
                 break
             self._residual = stands.residual
-        self._watch(one)
+        if stands.violation <= max(FAR, NEARER * self._violation):
+            self._violation, self._waited = stands.violation if stands.violation > FAR else np.inf, 0
+        else:
+            self._waited += 1
+            if self._waited >= PATIENCE and not self._excess:
+                raise StalledError
         return slopes.gradient[:, self._free]
-
-    def _watch(self, one: Evaluated) -> None:
-        """Whether limits that are exceeded come nearer. Raises `StalledError` where not."""
-        violation = self._evaluations.problem.violation(one.readings)
-        if violation <= max(FAR, NEARER * self._violation):
-            self._violation, self._waited = violation if violation > FAR else np.inf, 0
-            return
-        self._waited += 1
-        if self._waited >= PATIENCE and not self._excess:
-            raise StalledError
 
     def _at(self, x: Array) -> Evaluated:
         place = self._place.copy()
         place[self._free] = np.clip(x[: len(self._free)], 0.0, 1.0)
         (one,) = self._evaluations.at([tuple(map(float, place))])
         return one
-
-    def _report(self, one: Evaluated) -> None:
-        problem = self._evaluations.problem
-        violation = problem.violation(one.readings)
-        beyond = f", {100 * violation:.3g} % beyond a limit" if violation > KEPT else ""
-        self._tell(
-            f"{problem.objective.text} {one.readings[0].value:.6g}{beyond}, {self._evaluations.designs.count} runs"
-        )
-
-
-def _slsqp(steps: SearchFunctions) -> str:
-    """Sequential quadratic programming (Kraft 1988)."""
-    steps.shortest = SHORTEST
-    limits = {"type": "ineq", "fun": lambda x: -steps.excesses(x), "jac": lambda x: -steps.excess_gradients(x)}
-    done = minimize(
-        steps.objective,
-        steps.start,
-        jac=steps.objective_gradient,
-        method="SLSQP",
-        bounds=steps.bounds,
-        constraints=[limits] if steps.has_limits else [],
-        options={"ftol": FTOL, "maxiter": ITERATIONS},
-    )
-    return "" if done.success else f"SLSQP: {done.message}"
-
-
-def _trust_constr(steps: SearchFunctions) -> str:
-    """A trust region with an interior point (Byrd, Hribar & Nocedal 1999)."""
-    limits = NonlinearConstraint(steps.excesses, -np.inf, 0.0, jac=steps.excess_gradients)
-    low, high = steps.bounds.T
-    done = minimize(
-        steps.objective,
-        steps.start,
-        jac=steps.objective_gradient,
-        method="trust-constr",
-        bounds=Bounds(low, high, keep_feasible=np.isfinite(low)),
-        constraints=[limits] if steps.has_limits else [],
-        options={"gtol": GTOL, "xtol": XTOL, "maxiter": ITERATIONS},
-    )
-    return "" if done.status in (1, 2) else f"trust-constr: {done.message}"
-
-
-OPTIMISERS = {"slsqp": _slsqp, "trust-constr": _trust_constr}
 
 
 KINK = "peaks switch here as the largest: --method differential-evolution does without gradients"
@@ -259,6 +203,9 @@ def search_from(
     def tell(text: str) -> None:
         watcher.stage(title + text)
 
+    def stands(design: Evaluated) -> Optimality:
+        return optimality(evaluations, design, differentiation.slopes(design, judged=True))
+
     (first,) = evaluations.at([start])
     if not first.completed:
         return Local(first, first, None, first.failure)
@@ -266,15 +213,15 @@ def search_from(
     try:
         for optimizer, judged in ((method, False), (method, True), ("trust-constr", True)):
             best, message = _pass(optimizer, differentiation, best, tell, judged=judged)
-            optimum = _stands(differentiation, best)
+            optimum = stands(best)
             if optimum.reached(AIM):
                 return Local(first, best, optimum)
             if optimum.violation > KEPT:
                 best, _ = _pass("slsqp", differentiation, best, tell, judged=judged, excess=True)
-                optimum = _stands(differentiation, best)
+                optimum = stands(best)
                 if judged and optimum.violation > KEPT:
                     return Local(first, best, optimum, BEYOND)
-        message = KINK if optimum is not None and optimum.kinks else message
+        message = KINK if optimum and optimum.kinks else message
     except (SpentError, StuckError) as error:
         spent = isinstance(error, SpentError)
         message = f"ended after {evaluations.designs.count} runs, as many as were allowed" if spent else str(error)
@@ -292,20 +239,32 @@ def _pass(
     judged: bool,
     excess: bool = False,
 ) -> tuple[Evaluated, str]:
-    """The best design that an optimizer comes to from `best`, and why it ended where that is not at an optimum."""
-    steps = SearchFunctions(differentiation, best, tell, judged=judged, excess=excess)
-    message = ""
+    """The best design that an optimizer comes to from `best`, and why it ended where that is not at an optimum.
+
+    "slsqp" is sequential quadratic programming (Kraft 1988), "trust-constr" a trust region with an interior point
+    (Byrd, Hribar & Nocedal 1999).
+    """
+    steps, is_slsqp = _Functions(differentiation, best, tell, judged=judged, excess=excess), optimizer == "slsqp"
+    steps.shortest = SHORTEST if is_slsqp else 0.0
+    low, high = steps.bounds.T
+    limits = NonlinearConstraint(steps.excesses, -np.inf, 0.0, jac=steps.excess_gradients)
     with suppress(ReachedError, StalledError):
-        message = OPTIMISERS[optimizer](steps)
-    return steps.best, message
-
-
-def _stands(differentiation: Differentiation, best: Evaluated) -> Optimality:
-    return optimality(differentiation.evaluations, best, differentiation.slopes(best, judged=True))
+        done = minimize(
+            steps.objective,
+            steps.start,
+            jac=steps.objective_gradient,
+            method=optimizer,
+            bounds=Bounds(low, high, keep_feasible=np.isfinite(low)),
+            constraints=[limits] if steps.has_limits else [],
+            options={"maxiter": ITERATIONS, **({"ftol": FTOL} if is_slsqp else {"gtol": GTOL, "xtol": XTOL})},
+        )
+        has_ended_well = done.success if is_slsqp else done.status in (1, 2)
+        return steps.best, "" if has_ended_well else f"{optimizer}: {done.message}"
+    return steps.best, ""
 
 
 def best_of(evaluations: Evaluations, designs: Sequence[Evaluated]) -> Evaluated:
-    """The first of the best."""
+    """Return the first of the best designs by `rank`."""
     return min(designs, key=lambda one: rank(evaluations, one))
 
 
@@ -321,19 +280,15 @@ def combinations(space: DesignSpace) -> int:
 
 
 def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Callable[[str], None]) -> str:
-    """Differential evolution, a generation side by side; why it ended early, empty where it did not."""
+    """Search by differential evolution, a generation in parallel. Returns why it ended early, or an empty text."""
     space, problem = evaluations.space, evaluations.problem
     count = len(space.variables)
 
     def values(places: Array) -> Array:
         """Return scaled responses (1 + m, S) of S places (n, S), or of one (n); infinite where designs fail."""
         designs = evaluations.at([tuple(map(float, place)) for place in places.reshape(count, -1).T])
-        failed = [np.inf] * len(problem.responses)
-        return (
-            np.array([problem.scaled(one.values) if one.completed else failed for one in designs])
-            .reshape(-1, len(problem.responses))
-            .T
-        )
+        failed = np.full(len(problem.responses), np.inf)
+        return np.column_stack([problem.scaled(one.values) if one.completed else failed for one in designs])
 
     def on_improvement(x: Array, convergence: float) -> None:
         tell(f"differential evolution, {evaluations.designs.count} runs")

@@ -20,16 +20,16 @@ from pathlib import Path
 import numpy as np
 from scipy.stats.qmc import LatinHypercube
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs, Runs, SpentError, changes_for, may_repeat, number
+from .designs import Designs, Runs, SpentError, changes_for, may_repeat, moved, number
 from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
 from .finding import CsvFile, Finding, TextTable, floats, with_unit
 from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
-from .optimum_record import Optimum, parallel, states_of
+from .optimum_record import Optimum, parallel
 from .readings import Reading, Response
 from .responses import KEPT, DesignProblem, Limit, parse_response, read_problem, with_motors
 from .variables import DesignSpace, Place, read_space
@@ -57,9 +57,12 @@ def find_optimum(
     chosen = _method(space, method, runs)
     check_start(path, space, chosen)
     evaluations = Evaluations(_designs(runner, space, problem.responses, tolerance, runs), space, problem)
-    differentiation = Differentiation(evaluations, tolerance)
+    places = [] if space.start_place is None else [space.start_place]
+    if starts > 1:
+        sample = LatinHypercube(len(space.variables), seed=seed).random(starts - 1)
+        places += [tuple(map(float, row)) for row in sample]
     try:
-        searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
+        searches = _search(chosen, Differentiation(evaluations, tolerance), places, seed, runner.watcher)
     finally:
         if evaluations.searched:
             write_designs(evaluations, runner.folder / "designs.csv")
@@ -105,30 +108,24 @@ def _designs(runner: Runs, space: DesignSpace, responses: Sequence[Response], to
     for j, variable in enumerate(space.variables):
         ends = () if variable.is_catalogue else ((0.0, variable.low), (1.0, variable.high))
         for end, bound in ends:
-            points = (space.point((*place[:j], end, *place[j + 1 :])) for place in others)
-            if problem := designs.problem(*points):
+            if problem := designs.problem(*(space.point(moved(place, j, end)) for place in others)):
                 raise InputError(
                     "--vary: expected bounds that designs can have", f"{variable.name} = {bound:g}:\n{problem}"
                 )
     return designs
 
 
-def _starts(space: DesignSpace, count: int, seed: int) -> list[Place]:
-    """The scene itself, where it is in all bounds and catalogs, and places of a Latin hypercube."""
-    places = [] if space.start_place is None else [space.start_place]
-    if count > 1:
-        sample = LatinHypercube(len(space.variables), seed=seed).random(count - 1)
-        places += [tuple(map(float, row)) for row in sample]
-    return places
-
-
 def _search(
     method: str, differentiation: Differentiation, starts: Sequence[Place], seed: int, watcher: Watcher
 ) -> list[Local]:
     """The searches that `method` means; of catalogs one, which goes on along gradients of numbers."""
-    evaluations = differentiation.evaluations
+    evaluations, optima = differentiation.evaluations, list[Local]()
     if method in ("slsqp", "trust-constr"):
-        return _from_starts(method, differentiation, starts, watcher)
+        for k, place in enumerate(starts):
+            title = f"start {k + 1} of {len(starts)}: " if len(starts) > 1 else ""
+            with suppress(SpentError):
+                optima.append(search_from(place, method, differentiation, watcher, title))
+        return optima
     message = ""
     if method == "all":
         evaluations.at(list(product(*(map(float, range(len(v.rows))) for v in evaluations.space.variables))))
@@ -140,17 +137,6 @@ def _search(
     local = search_from(best.place, "slsqp", differentiation, watcher)
     words = "; ".join(text for text in (message, local.message) if text)
     return [Local(first, local.best, local.optimality, words)]
-
-
-def _from_starts(
-    method: str, differentiation: Differentiation, starts: Sequence[Place], watcher: Watcher
-) -> list[Local]:
-    optima: list[Local] = []
-    for k, place in enumerate(starts):
-        title = f"start {k + 1} of {len(starts)}: " if len(starts) > 1 else ""
-        with suppress(SpentError):
-            optima.append(search_from(place, method, differentiation, watcher, title))
-    return optima
 
 
 def _optimum(
@@ -247,12 +233,12 @@ class Front(Finding):
         """Table with a line for each design: both responses, shadow price, keys."""
         price = " per ".join(unit or "1" for unit in self.units)
         heading = (*map(with_unit, self.responses, self.units), f"price ({price})", *self.keys, "")
-        yield TextTable(heading, self._rows())
-
-    def _rows(self) -> Iterator[tuple[str, ...]]:
+        rows = []
         for one in self.points:
             cost = f"{-one.price:.4g}" if np.isfinite(one.price) else ""
-            yield (f"{one.response:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
+            state = "beyond a limit" if not one.feasible else "" if one.converged else "not converged"
+            rows.append((f"{one.response:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), state))
+        yield TextTable(heading, rows)
 
     def remarks(self) -> Iterator[str]:
         """Lines with the method and notes on the accuracy."""
@@ -265,24 +251,18 @@ class Front(Finding):
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV table with one line for each design; `price` is ∂response/∂against along the front."""
         columns = [*self.responses, "price", *self.keys, "converged", "feasible", "message"]
-        yield CsvFile("front.csv", "table of the front", columns, self._numbers())
-
-    def _numbers(self) -> Iterator[list[object]]:
+        rows = []
         for one in self.points:
             price = one.price if np.isfinite(one.price) else ""
             states = ("yes" if state else "no" for state in (one.converged, one.feasible))
-            yield [one.response, one.against, price, *one.point, *states, one.message]
+            rows.append([one.response, one.against, price, *one.point, *states, one.message])
+        yield CsvFile("front.csv", "table of the front", columns, rows)
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the front and of all designs."""
-        states = states_of(self.problem, self.tried, [one.design for one in self.points])
-        limits = [(limit.response.text, limit) for limit in self.problem.limits]
-        responses = [(self.responses[0], None), *limits, (self.responses[1], None)]
-        return [self._curve(), parallel(self.space, responses, self.tried, states, "on the curve")]
-
-    def _curve(self) -> Points:
+        best = [one.design for one in self.points]
         response, against = self.values.T
-        return Points(
+        curve = Points(
             name="front",
             title=f"{self.responses[0]} against {self.responses[1]}",
             x_label=with_unit(self.responses[1], self.units[1]),
@@ -291,10 +271,7 @@ class Front(Finding):
             y=floats(response),
             sure=tuple(bool(one.converged and one.feasible) for one in self.points),
         )
-
-
-def _state(one: FrontPoint) -> str:
-    return "beyond a limit" if not one.feasible else "" if one.converged else "not converged"
+        return [curve, parallel(self.space, self.problem, self.tried, best, "on the curve", self.responses[1])]
 
 
 SAME = 1e-6  # of the second response: ends of a front that are one design
@@ -343,10 +320,15 @@ class _Searches:
                 f' least, "{self.against.text}" is too'
             )
         points = [first]
-        for k, bound in enumerate(_between(high, low, count), start=2):
+        spaced = np.geomspace if low * high > 0.0 else np.linspace  # equal ratios, or steps where the signs differ
+        for k, bound in enumerate(map(float, spaced(high, low, count)[1:-1]), start=2):
             limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
             points.append(self._least(replace(self.problem, limits=limits), points[-1].design.place, f"{k} of {count}"))
         unit, other = (one.unit for one in self._both(first.design))
+        responses = (*self.problem.responses, self.against)
+        tried = (
+            replace(one, readings=one.design.read(responses)) if one.completed else one for one in self.tried.values()
+        )
         return Front(
             scene=self.runner.path,
             responses=(self.problem.objective.text, self.against.text),
@@ -357,7 +339,7 @@ class _Searches:
             tolerance=self.tolerance,
             space=self.space,
             problem=self.problem,
-            tried=tuple(map(self._with_both, self.tried.values())),
+            tried=tuple(tried),
         )
 
     def _least(self, problem: DesignProblem, start: Place, title: str) -> FrontPoint:
@@ -390,16 +372,5 @@ class _Searches:
         scale = problem.limits[0].scale * problem.factors(local.best.values)[0]
         return float(-np.nan_to_num(local.optimality.limits[0]) / scale)
 
-    def _with_both(self, one: Evaluated) -> Evaluated:
-        """With readings of all responses, those of the limits, and the second one."""
-        responses = (*self.problem.responses, self.against)
-        return replace(one, readings=one.design.read(responses)) if one.completed else one
-
     def _both(self, one: Evaluated) -> tuple[Reading, ...]:
         return one.design.read((self.problem.objective, self.against))
-
-
-def _between(high: float, low: float, count: int) -> Array:
-    """Limits from `high` down to `low` without these: in equal ratios, or steps where the signs differ."""
-    spaced = np.geomspace if low * high > 0.0 else np.linspace
-    return as_floats(spaced(high, low, count)[1:-1])

@@ -13,7 +13,6 @@ from ..common.arrays import Array, as_floats
 from ..pictures.studies.study import (
     DesignAxis,
     Diagram,
-    Numbers,
     Parallel,
     Progress,
     State,
@@ -25,12 +24,22 @@ from .designs import number
 from .evaluations import Evaluated, Optimality
 from .finding import CsvFile, Finding, TextTable, failed_runs, numbers, with_unit
 from .local_search import AIM, Local
-from .responses import KEPT, DesignProblem, Limit
+from .responses import KEPT, DesignProblem
 from .variables import DesignSpace, DesignVariable
 
 
-def states_of(problem: DesignProblem, designs: Sequence[Evaluated], best: Sequence[Evaluated]) -> tuple[State, ...]:
-    """Return the state of each design; its readings begin with the responses of `problem`."""
+def parallel(
+    space: DesignSpace,
+    problem: DesignProblem,
+    designs: Sequence[Evaluated],
+    best: Sequence[Evaluated],
+    best_label: str,
+    *more: str,
+) -> Parallel:
+    """Return a line for each design over the variables of `space`, the responses of `problem` with limits, and `more`.
+
+    Readings of designs are in this order; `best` are the designs that `best_label` names.
+    """
     chosen = {one.design.folder for one in best}
 
     def state(one: Evaluated) -> State:
@@ -40,53 +49,39 @@ def states_of(problem: DesignProblem, designs: Sequence[Evaluated], best: Sequen
             return "best"
         return "kept" if problem.violation(one.readings[: len(problem.responses)]) <= KEPT else "exceeded"
 
-    return tuple(map(state, designs))
-
-
-def parallel(
-    space: DesignSpace,
-    responses: Sequence[tuple[str, Limit | None]],
-    designs: Sequence[Evaluated],
-    states: tuple[State, ...],
-    best_label: str,
-) -> Parallel:
-    """Return a line for each design over the variables of `space` and the `responses` that are known, with limits."""
+    texts, limits = [*(one.text for one in problem.responses), *more], [None, *problem.limits, *(None for _ in more)]
     points = [space.point(one.place) for one in designs]
     axes: list[DesignAxis] = []
     for variable in space.variables:
         first = space.keys.index(variable.keys[0])
         for k in range(len(variable.keys) if variable.is_catalogue else 1):
             axes.append(_axis(variable, k, [point[first + k] for point in points]))
-    for g, (text, limit) in enumerate(responses):
+    for g, (text, limit) in enumerate(zip(texts, limits, strict=True)):
         unit = next((one.readings[g].unit for one in designs if one.completed), "")
         values = numbers(one.values[g] if one.completed else np.nan for one in designs)
         bound, sense = (limit.bound, limit.sense) if limit is not None else (None, 1.0)
         axes.append(axis_of_response(with_unit(text, unit), values, bound, 1 if sense > 0 else -1))
-    title = f"{len(designs)} designs"
+    title, states = f"{len(designs)} designs", tuple(map(state, designs))
     return Parallel(name="designs", title=title, axes=tuple(axes), states=states, best_label=best_label)
 
 
 def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple[State, ...]) -> Progress:
     """The response of each design in the order of the search."""
-    values = [one.values[0] if one.completed else np.nan for one in designs]
+    values = numbers(one.values[0] if one.completed else np.nan for one in designs)
     unit = next((one.readings[0].unit for one in designs if one.completed), "")
+    kept = [
+        problem.sense * one.values[0] if one.completed and problem.violation(one.readings) <= KEPT else np.inf
+        for one in designs
+    ]
     return Progress(
         name="convergence",
         title=f"{problem.objective.text}, design by design",
         y_label=with_unit(problem.objective.text, unit),
-        values=numbers(values),
+        values=values,
         states=states,
-        best=_best_so_far(problem, designs, values),
-        logarithmic=axis_of_response("", numbers(values)).logarithmic,
+        best=numbers(problem.sense * np.minimum.accumulate(kept)),
+        logarithmic=axis_of_response("", values).logarithmic,
     )
-
-
-def _best_so_far(problem: DesignProblem, designs: Sequence[Evaluated], values: Sequence[float]) -> Numbers:
-    kept = [
-        problem.sense * value if one.completed and problem.violation(one.readings) <= KEPT else np.inf
-        for one, value in zip(designs, values, strict=True)
-    ]
-    return numbers(problem.sense * np.minimum.accumulate(kept))
 
 
 def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> DesignAxis:
@@ -95,9 +90,8 @@ def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> DesignAxis
         return DesignAxis(label=variable.name, values=tuple(map(float, values)), **keys)
     name, column = ".".join(variable.keys[k]), list(dict.fromkeys(row[k] for row in variable.rows))
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in column):
-        return axis_of_response(name, tuple(map(float, column))).model_copy(
-            update={"values": tuple(map(float, values))}
-        )
+        axis = axis_of_response(name, tuple(map(float, column)))
+        return axis.model_copy(update={"values": tuple(map(float, values))})
     numbered = tuple(float(column.index(value)) for value in values)
     return DesignAxis(label=name, values=numbered, low=-0.5, high=len(column) - 0.5, names=tuple(map(str, column)))
 
@@ -203,7 +197,12 @@ class Optimum(Finding):
 
     def sections(self) -> Iterator[TextTable]:
         """Tables of keys and limits, at the start and in the best design."""
-        yield TextTable(("key", "start", "best", "bounds"), self._key_rows(), line=self.headline())
+        owners = [variable for variable in self.space.variables for _ in variable.keys]
+        rows = []
+        for name, *values, of in zip(self.keys, self.space.point(self.start.place), self.values, owners, strict=True):
+            bounds = f"{len(of.rows)} rows" if of.is_catalogue else f"{of.low:g} to {of.high:g}"
+            rows.append((name, *map(number, values), bounds))
+        yield TextTable(("key", "start", "best", "bounds"), rows, line=self.headline())
         if self.problem.limits:
             yield TextTable(("limit", "start", "best", ""), [row[:4] for row in self._limit_rows()])
 
@@ -230,7 +229,17 @@ class Optimum(Finding):
         for variable, u in zip(self.space.variables, self.best.place, strict=True):
             if variable.motors:
                 yield f"motor      {variable.keys[0][1]}: {variable.motors[round(u)].name}, 1:{variable.values(u)[0]:g}"
-        yield from (f"price      {text}" for text in self._prices_in_words())
+        trades = []
+        for limit, price, reading in zip(self.problem.limits, self.prices, self.best.readings[1:], strict=True):
+            room = limit.sense * SHARE * limit.scale
+            trades.append((limit.response.text, limit.bound, room, price, reading.unit))
+        for variable, price, u in zip(self.space.variables, self.bound_prices, self.best.place, strict=True):
+            bound = variable.low if u < 0.5 else variable.high
+            room = (-1.0 if u < 0.5 else 1.0) * SHARE * (abs(bound) or variable.high - variable.low)
+            trades.append((variable.name, bound, room, price, ""))
+        for name, *trade in trades:
+            if self.feasible and np.isfinite(trade[2]):
+                yield f"price      {name}: {self._trade(*trade)}"
         if self.optimality is not None:
             yield from (f"note       {text}" for text in self.optimality.kinks)
         for response, reading in zip(self.problem.responses, self.best.readings, strict=False):
@@ -241,24 +250,17 @@ class Optimum(Finding):
         if len(self.searches) > 1:
             yield f"starts     {self._starts()}"
         yield from failed_runs(self.failures, self.runs)
+        how = "the best of the designs that were tried"
+        if (stands := self.optimality) and self.feasible:
+            how = (
+                f"{'converged' if self.converged else 'not converged'}: the gradient of the Lagrangian is"
+                f" {stands.residual:.1g} of the objective over the range of a parameter,"
+                f" known to {stands.gradient_error:.1g}"
+            )
         runs = f"{self.runs} runs with a tolerance of at most {self.tolerance:g}"
-        yield f"how        {self.method}, {runs}; {self._standing()}"
+        yield f"how        {self.method}, {runs}; {how}"
         yield ""
         yield from self.verdict.lines()
-
-    def _prices_in_words(self) -> Iterator[str]:
-        if not self.feasible:
-            return
-        for limit, price in zip(self.problem.limits, self.prices, strict=True):
-            if np.isfinite(price):
-                unit = self.best.readings[1 + self.problem.limits.index(limit)].unit
-                room = limit.sense * SHARE * limit.scale
-                yield f"{limit.response.text}: {self._trade(limit.bound, room, price, unit)}"
-        for variable, price, u in zip(self.space.variables, self.bound_prices, self.best.place, strict=True):
-            if np.isfinite(price):
-                bound = variable.low if u < 0.5 else variable.high
-                room = (-1.0 if u < 0.5 else 1.0) * SHARE * (abs(bound) or variable.high - variable.low)
-                yield f"{variable.name}: {self._trade(bound, room, price, '')}"
 
     def write_tables(self, folder: Path) -> Iterator[Path]:
         """Write the CSV tables next to the files of the search; yields the written files."""
@@ -267,45 +269,34 @@ class Optimum(Finding):
 
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV table of the objective, keys and limits with their shadow prices."""
-        yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, self._numbers())
-
-    def _numbers(self) -> Iterator[list[object]]:
         problem, starts = self.problem, self.start.values or (np.nan,) * len(self.best.values)
-        yield ["objective", problem.objective.text, starts[0], self.value, "", "", "", ""]
+        rows: list[list[object]] = [["objective", problem.objective.text, starts[0], self.value, "", "", "", ""]]
+        own = dict(zip(self.space.keys, self.space.point(self.start.place), strict=True))
+        best = dict(zip(self.space.keys, self.values, strict=True))
         for variable, price in zip(self.space.variables, self.bound_prices, strict=True):
             bounds = ("", "") if variable.is_catalogue else (variable.low, variable.high)
-            for key in variable.keys:
-                k = self.space.keys.index(key)
-                start = self.space.point(self.start.place)[k]
-                yield ["key", self.keys[k], start, self.values[k], *bounds, *_reached(price)]
+            rows += [["key", ".".join(key), own[key], best[key], *bounds, *_reached(price)] for key in variable.keys]
         for k, (limit, price) in enumerate(zip(problem.limits, self.prices, strict=True)):
             within = ("", limit.bound) if limit.sense > 0 else (limit.bound, "")
-            yield ["limit", limit.response.text, starts[k + 1], self.limits[k], *within, *_reached(price)]
+            rows.append(["limit", limit.response.text, starts[k + 1], self.limits[k], *within, *_reached(price)])
+        yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, rows)
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of all designs and of the convergence."""
-        problem = self.problem
-        states = states_of(problem, self.tried, [self.best])
-        responses = [(problem.objective.text, None), *((limit.response.text, limit) for limit in problem.limits)]
-        best = "best" if self.feasible else "nearest"
-        return [parallel(self.space, responses, self.tried, states, best), progress(problem, self.tried, states)]
-
-    def _key_rows(self) -> Iterator[tuple[str, str, str, str]]:
-        owners = [variable for variable in self.space.variables for _ in variable.keys]
-        start = self.space.point(self.start.place)
-        for name, begin, best, of in zip(self.keys, start, self.values, owners, strict=True):
-            bounds = f"{len(of.rows)} rows" if of.is_catalogue else f"{of.low:g} to {of.high:g}"
-            yield name, number(begin), number(best), bounds
+        label = "best" if self.feasible else "nearest"
+        designs = parallel(self.space, self.problem, self.tried, [self.best], label)
+        return [designs, progress(self.problem, self.tried, designs.states)]
 
     def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         for k, (limit, price) in enumerate(zip(self.problem.limits, self.prices, strict=True)):
             cost = f"{price:.4g}" if self.feasible and np.isfinite(price) else ""
-            yield limit.text, _at(self.start, k + 1), _at(self.best, k + 1), self._state(k), cost
-
-    def _state(self, k: int) -> str:
-        if (excess := self.problem.limits[k].excess(self.limits[k])) > KEPT:
-            return f"exceeded by {100 * excess:.3g} %"
-        return "active" if self.optimality is not None and np.isfinite(self.optimality.limits[k]) else "satisfied"
+            start, best = (
+                of.readings[k + 1].in_words() if of.completed else "failed" for of in (self.start, self.best)
+            )
+            state = "active" if np.isfinite(price) else "satisfied"
+            if (excess := limit.excess(self.limits[k])) > KEPT:
+                state = f"exceeded by {100 * excess:.3g} %"
+            yield limit.text, start, best, state, cost
 
     def _trade(self, bound: float, room: float, price: float, unit: str) -> str:
         """`20.2 N in place of 20 saves 0.012 kg (0.5 %)`."""
@@ -321,20 +312,6 @@ class Optimum(Finding):
         worst = max((self.problem.sense * end for end in ends), default=np.nan) * self.problem.sense
         return f"{near} of {len(self.searches)} end at this value, within {AIM:g}; the worst at {worst:.6g}"
 
-    def _standing(self) -> str:
-        stands = self.optimality
-        if stands is None or not self.feasible:
-            return "the best of the designs that were tried"
-        return (
-            f"{'converged' if self.converged else 'not converged'}: the gradient of the Lagrangian is"
-            f" {stands.residual:.1g} of the objective over the range of a parameter,"
-            f" known to {stands.gradient_error:.1g}"
-        )
-
 
 def _reached(price: float) -> tuple[str, object]:
     return ("yes", price) if np.isfinite(price) else ("no", "")
-
-
-def _at(design: Evaluated, k: int) -> str:
-    return design.readings[k].in_words() if design.completed else "failed"

@@ -30,8 +30,7 @@ class Reading:
     """A response's value by results. Of a peak also where it is.
 
     Attributes:
-        value: of the response.
-        unit: empty where it is not known.
+        value: of the response, in `unit`, which is empty where it is not known.
         time: of a peak, s; NaN of all else.
         edge: "first" or "last" where that is an end of the run, which may move.
         column, sign: of its history, and of the value there.
@@ -39,6 +38,7 @@ class Reading:
         coarse: of a peak, its value by every second output; NaN of all else.
         missed_by: of a peak or mean that outputs miss, its value by outputs alone; NaN of all else.
         doubt: why the value is uncertain; empty where it is not.
+        elsewhere: of a peak followed at its own place, where the largest value is now; empty where it is there.
     """
 
     value: float
@@ -51,6 +51,7 @@ class Reading:
     coarse: float = float("nan")
     missed_by: float = float("nan")
     doubt: str = ""
+    elsewhere: str = ""
 
     def in_words(self, digits: int = 6) -> str:
         """The value with its unit."""
@@ -58,7 +59,7 @@ class Reading:
 
     @property
     def is_between(self) -> bool:
-        """Whether outputs miss it: it has no place, and is compared with those of other runs."""
+        """Whether outputs miss the value: it has no time and column, and is compared as it is between runs."""
         return bool(np.isfinite(self.missed_by))
 
     @property
@@ -70,28 +71,19 @@ class Reading:
         return f"{values}: with a smaller output_step histories have it, too"
 
 
-@dataclass(frozen=True)
-class Followed:
-    """The value of a response by other results, a peak at its own place; `elsewhere`: where the largest value is now.
-
-    `coarse`: as of `Reading`.
-    """
-
-    value: float
-    elsewhere: str = ""
-    coarse: float = float("nan")
-
-
 class Response:
-    """One scalar result to optimize or limit; `text` is the user's name for it."""
+    """One scalar result to optimize or limit; `text` is the user's name for it.
+
+    Attributes:
+        name: of its history, if it has one.
+        needs_motion: whether an analysis has to be run for it.
+        is_of_rest: whether that is by default the first which follows paths, rather than the first of all.
+    """
 
     text: str
     name: str = ""
-    """Of its history, if it has one."""
     needs_motion = True
-    """Whether an analysis has to be run for it."""
     is_of_rest = False
-    """Whether that is by default the first which follows paths, rather than the first of all."""
 
     @property
     def analysis(self) -> str:
@@ -102,9 +94,9 @@ class Response:
         """Return the response in `results`. Raises `InputError` if they do not contain it."""
         raise NotImplementedError
 
-    def follow(self, results: Results, nominal: Reading) -> Followed:
-        """Return the response in results of a changed scene."""
-        return Followed(self.read(results).value)
+    def follow(self, results: Results, nominal: Reading) -> Reading:
+        """Return the response in `results` of a changed scene, at the place of the `nominal` one."""
+        return self.read(results)
 
 
 JOINT = re.compile(r"(?P<analysis>[^/]+)/joints/(?P<joint>[^/]+)")
@@ -135,7 +127,7 @@ class History:
     is_in_doubt: bool = False
 
     def at(self, t: float, column: int, every: int = 1) -> float:
-        """The value at t: that of an output, or of the polynomial through the six nearest (Lagrange).
+        """Value at t (s), in `unit`: that of an output, or of the polynomial through the six nearest (Lagrange).
 
         With `every` = 2 every second of those about t alone is known, without the one next to it.
         """
@@ -161,9 +153,10 @@ def read_history(results: Results, name: str, option: str) -> History:
     """
     match = COLUMN.fullmatch(name)
     wanted = match["dataset"] if match else name
-    dataset = _known(results).get(wanted.replace("/", "."))
+    datasets = _known(results)
+    dataset = datasets.get(wanted.replace("/", "."))
     if dataset is None:
-        known = sorted((key for key in _known(results) if "." in key), key=lambda key: not key.startswith("joints."))
+        known = sorted((key for key in datasets if "." in key), key=lambda key: not key.startswith("joints."))
         raise InputError(
             f'{option}: expected the name of a history, such as "{next(iter(known), "tip_error")}"',
             f'"{wanted}"{did_you_mean(wanted.replace("/", "."), known)}',
@@ -188,16 +181,8 @@ def read_history(results: Results, name: str, option: str) -> History:
     elif is_vector(results, dataset, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
     largest, rms, mean = (float(one.max()) for one in sizes)
-    return History(
-        name,
-        _unit(results, dataset).replace(" ", "·"),
-        time,
-        as_floats(values),
-        largest,
-        rms,
-        mean=mean,
-        is_in_doubt=in_doubt,
-    )
+    unit = _unit(results, dataset).replace(" ", "·")
+    return History(name, unit, time, as_floats(values), largest, rms, mean=mean, is_in_doubt=in_doubt)
 
 
 def read_column(results: Results, name: str, option: str) -> History:
@@ -209,18 +194,15 @@ def read_column(results: Results, name: str, option: str) -> History:
 
 
 def _known(results: Results) -> dict[str, str]:
-    """Datasets over time by the names they go by."""
-    names = [f"{analysis}/{name}" for analysis in results.analyses for name in _histories(results, analysis)]
-    names += [f"{m[0]}/{POWER}" for m in map(JOINT.match, names) if m and f"{m[0]}/moment" in results]
-    return by_dots(results, names)
-
-
-def _histories(results: Results, analysis: str) -> list[str]:
-    """Those over the outputs, and of closed loops those over the samples."""
-    control = results.names(f"{analysis}/control")
-    samples = len(results[f"{analysis}/control/time"]) if control else 0
-    of_loop = [f"control/{name}" for name in control if len(results[f"{analysis}/control/{name}"]) == samples]
-    return list(dict.fromkeys([*results.histories(analysis), *of_loop]))
+    """Datasets over outputs, and of closed loops over samples, by the names they go by."""
+    names: dict[str, None] = {}
+    for analysis in results.analyses:
+        control = results.names(f"{analysis}/control")
+        samples = len(results[f"{analysis}/control/time"]) if control else 0
+        of_loop = [f"control/{name}" for name in control if len(results[f"{analysis}/control/{name}"]) == samples]
+        names |= dict.fromkeys(f"{analysis}/{name}" for name in (*results.histories(analysis), *of_loop))
+    powers = [f"{m[0]}/{POWER}" for m in map(JOINT.match, names) if m and f"{m[0]}/moment" in results]
+    return by_dots(results, [*names, *powers])
 
 
 def _power(results: Results, name: str) -> Array:
@@ -260,7 +242,7 @@ class Peak(Response):
 
     def read(self, results: Results) -> Reading:
         """The value, when it is reached, and in which column."""
-        history = self._history(results)
+        history = read_history(results, self.name, f'"{self.text}"')
         k, column = _largest(history.values)
         sign = -1.0 if history.values[k, column] < 0.0 else 1.0
         _, time = top_at(history.time, history.values[:, column], k)
@@ -271,36 +253,28 @@ class Peak(Response):
         doubt = UNCERTAIN if history.is_in_doubt else ""
         return Reading(value, history.unit, time, edge, column, sign, coarse=coarse, doubt=doubt)
 
-    def follow(self, results: Results, nominal: Reading) -> Followed:
+    def follow(self, results: Results, nominal: Reading) -> Reading:
         """Return the value at time, column and sign of the `nominal` peak; of one between outputs the largest value."""
-        history = self._history(results)
+        history = read_history(results, self.name, f'"{self.text}"')
         if nominal.is_between:
-            return Followed(float(np.fmax(history.largest, np.abs(history.values).max())))
-        time = {"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time)
+            return Reading(float(np.fmax(history.largest, np.abs(history.values).max())))
+        time = float({"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time))
         if not history.time[0] <= time <= history.time[-1]:
-            return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
-        value, coarse = (nominal.sign * history.at(float(time), nominal.column, every) for every in (1, COARSE))
-        return Followed(value, _overtaken(history, nominal, float(time), value), coarse)
-
-    def _history(self, results: Results) -> History:
-        return read_history(results, self.name, f'"{self.text}"')
+            return Reading(float("nan"), elsewhere=f"the run ends at t = {history.time[-1]:g} s")
+        value, coarse = (nominal.sign * history.at(time, nominal.column, every) for every in (1, COARSE))
+        k, column = _largest(history.values)
+        now = history.values[k, column]
+        between = (history.time - time) * (history.time - history.time[k]) <= 0.0
+        valley = float(np.min(nominal.sign * history.values[between, nominal.column], initial=np.inf))
+        moves = column == nominal.column and now * nominal.sign > 0.0 and valley >= value * (1.0 - NOISE)
+        if abs(now) <= value * (1.0 + NOISE) or moves:  # the same peak
+            return Reading(value, coarse=coarse)
+        where = f", column {column}" if history.values.shape[1] > 1 else ""
+        elsewhere = f"{abs(now):.6g} at t = {history.time[k]:g} s{where}"
+        return Reading(value, coarse=coarse, elsewhere=elsewhere)
 
 
 def _largest(values: Array) -> tuple[int, int]:
     """Output and column of the largest absolute value, the first one."""
     k, column = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     return int(k), int(column)
-
-
-def _overtaken(history: History, nominal: Reading, time: float, value: float) -> str:
-    """Where the largest value is, if that is another peak: in another column, of the other sign, or past a valley."""
-    k, column = _largest(history.values)
-    now = history.values[k, column]
-    if abs(now) <= value * (1.0 + NOISE):
-        return ""
-    between = (history.time - time) * (history.time - history.time[k]) <= 0.0
-    same = column == nominal.column and now * nominal.sign > 0.0
-    if same and np.min(nominal.sign * history.values[between, column]) >= value * (1.0 - NOISE):
-        return ""  # the same peak, which moves
-    where = f", column {column}" if history.values.shape[1] > 1 else ""
-    return f"{abs(now):.6g} at t = {history.time[k]:g} s{where}"

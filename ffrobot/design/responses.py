@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..fe_models.modal_body import ModalBody
 from ..present.feasibility import joint_tasks
 from ..results.file import Results
 from ..sweep.files import value_of
-from .readings import MISSED, POWER, UNCERTAIN, Followed, History, Peak, Reading, Response, read_column
+from .readings import MISSED, POWER, UNCERTAIN, History, Peak, Reading, Response, read_column
 from .variables import DesignSpace, DesignVariable
 
 
@@ -37,15 +37,17 @@ class OfMotors(Response):
         """Return the response for the motors in the scene of `results`; shares also depend on the motion there."""
         if not self.chosen:
             raise InputError(f'"{self.text}": expected `optimise` with --vary "motor JOINT in CATALOG"', "none")
-        motors = {variable.keys[0][1]: _of_scene(results, variable) for variable in self.chosen}
-        if self.what == "share":
-            return Reading(max(self._share(results, joint, *motor) for joint, motor in motors.items()), "")
         values = []
-        for motor, _ in motors.values():
-            if (value := getattr(motor, self.what)) is None:
+        for variable in self.chosen:
+            row = tuple(value_of(results.scene, key) for key in variable.keys)
+            motor = variable.motors[variable.rows.index(row)]
+            if self.what == "share":
+                values.append(self._share(results, variable.keys[0][1], motor, row[0]))
+            elif (value := getattr(motor, self.what)) is None:
                 raise InputError(f'"{self.text}": expected a {self.what} of motor "{motor.name}"', "none")
-            values.append(value)
-        return Reading(sum(values), "kg" if self.what == "mass" else "")
+            else:
+                values.append(value)
+        return Reading(max(values)) if self.what == "share" else Reading(sum(values), "kg" * (self.what == "mass"))
 
     def _share(self, results: Results, joint: str, motor: CatalogMotor, ratio: float) -> float:
         tasks = (task for name in results.analyses for of, task in joint_tasks(results, name) if of == joint)
@@ -53,11 +55,6 @@ class OfMotors(Response):
         if not shares:
             raise InputError(f'"{self.text}": expected a motion of joint "{joint}" with its torque', "none")
         return max(shares)
-
-
-def _of_scene(results: Results, variable: DesignVariable) -> tuple[CatalogMotor, float]:
-    row = tuple(value_of(results.scene, key) for key in variable.keys)
-    return variable.motors[variable.rows.index(row)], row[0]
 
 
 FORMS = (
@@ -72,29 +69,39 @@ ROUND_OFF = 1e-9  # of a history: by so much means of nothing may differ
 
 @dataclass(frozen=True)
 class OfHistory(Response):
-    """A mean of some kind of a history of one column, or its value at a time."""
+    """The "rms", "mean" or "integral" of a history of one column, or its value "at" t, s."""
 
     text: str
-    reduce: Callable[[History, bool], float]  # with True by all times that the run looked at, NaN if not known
+    word: str
     name: str
-    times: str = ""  # what its unit is that of the history times
+    t: float = np.nan
 
     def read(self, results: Results) -> Reading:
-        """Return the response of the single column of the history."""
-        history = self._history(results)
-        joined = "·".join(part for part in (history.unit, self.times) if part) if history.unit else ""
-        unit = {"W·s": "J"}.get(joined, joined)
-        value, by_all = self.reduce(history, False), self.reduce(history, True)
+        """Return the response in the unit of the history, of integrals times s."""
+        history = read_column(results, self.name, f'"{self.text}"')
+        unit = f"{history.unit}·s" if history.unit and self.word == "integral" else history.unit
+        unit = {"W·s": "J"}.get(unit, unit)
+        value, by_all = self._value(history, by_all=False), self._value(history, by_all=True)
         if abs(by_all - value) > MISSED * max(abs(by_all), abs(value)) + ROUND_OFF * history.rms:
             return Reading(by_all, unit, missed_by=value)
         return Reading(value, unit, doubt=UNCERTAIN if history.is_in_doubt else "")
 
-    def follow(self, results: Results, nominal: Reading) -> Followed:
+    def follow(self, results: Results, nominal: Reading) -> Reading:
         """Return the value in the results of a changed scene."""
-        return Followed(self.reduce(self._history(results), nominal.is_between))
+        history = read_column(results, self.name, f'"{self.text}"')
+        return Reading(self._value(history, by_all=nominal.is_between))
 
-    def _history(self, results: Results) -> History:
-        return read_column(results, self.name, f'"{self.text}"')
+    def _value(self, history: History, *, by_all: bool) -> float:
+        """By outputs, or by all times that the run looked at: NaN where that is not known."""
+        time, values = history.time, history.values[:, 0]
+        if self.word == "at":
+            if not time[0] <= self.t <= time[-1]:
+                raise InputError(f'"{self.text}": expected a time from {time[0]:g} to {time[-1]:g} s', f"{self.t:g}")
+            return history.at(self.t, 0)
+        if self.word == "rms":
+            return history.rms if by_all else root_mean_square(time, values)
+        mean = history.mean if by_all else float(shares(time) @ values)
+        return mean * float(np.ptp(time)) if self.word == "integral" else mean
 
 
 @dataclass(frozen=True)
@@ -140,13 +147,13 @@ class OfFrequency(Response):
             )
         return Reading(float(body.frequency[self.number - 1]), "Hz", mode=_modes(body)[self.number - 1])
 
-    def follow(self, results: Results, nominal: Reading) -> Followed:
+    def follow(self, results: Results, nominal: Reading) -> Reading:
         """Return the frequency (Hz) of the same mode of its family, even if its number has changed."""
         body = self._body(results)
         modes = _modes(body)
         if nominal.mode not in modes:
-            return Followed(float("nan"), f"the link file has too few modes for {nominal.mode}")
-        return Followed(float(body.frequency[modes.index(nominal.mode)]))
+            return Reading(float("nan"), elsewhere=f"the link file has too few modes for {nominal.mode}")
+        return Reading(float(body.frequency[modes.index(nominal.mode)]))
 
     def _body(self, results: Results) -> ModalBody:
         known = results.modal_files
@@ -167,8 +174,13 @@ class OfMass(Response):
         bodies = {str(body["name"]): body for body in results.scene["body"]}
         if self.body:
             check_known(self.body, bodies, f'"{self.text}": expected a body ({quoted(bodies)})')
-        wanted = [self.body] if self.body else list(bodies)
-        return Reading(sum(_mass(results, bodies[name]) for name in wanted), "kg")
+        mass = 0.0
+        for name in [self.body] if self.body else list(bodies):
+            if name in results.modal_files:
+                mass += results.modal_mass(name)
+            elif isinstance(rigid := bodies[name].get("rigid"), dict):
+                mass += float(rigid.get("mass", 0.0))
+        return Reading(mass, "kg")
 
 
 @dataclass(frozen=True)
@@ -192,64 +204,33 @@ class OfValue(Response):
 def parse_response(text: str, option: str = "--of") -> Response:
     """Return the response that `text`, one of `FORMS`, names. Raises `InputError` if it is none of them."""
     word, *rest = text.split() or [""]
-    match word, rest:
-        case "peak", [name]:
-            return Peak(text, name)
-        case "at", [time, name] if (t := _number(time)) is not None:
-            return OfHistory(text, partial(_value_at, t, text), name)
-        case "energy", [joint]:
-            return OfHistory(text, partial(_reduced, "integral"), f"{joint}.{POWER}", "s")
-        case (("rms" | "mean" | "integral"), [name]):
-            return OfHistory(text, partial(_reduced, word), name, "s" if word == "integral" else "")
-        case (("residual" | "settling"), [point]):
-            return OfSettling(text, word, point)
-        case "frequency", [number, body] if number.isdecimal():
-            return OfFrequency(text, int(number), body)
-        case "mass", []:
-            return OfMass(text)
-        case "mass", [body]:
-            return OfMass(text, body)
-        case "motors", [what] if what in ("mass", "cost", "share"):
-            return OfMotors(text, what)
-        case "value", [key] if all(key.split(".")):
-            return OfValue(text, key)
+    with suppress(ValueError):
+        match word, rest:
+            case "peak", [name]:
+                return Peak(text, name)
+            case "at", [time, name]:
+                return OfHistory(text, word, name, float(time))
+            case "energy", [joint]:
+                return OfHistory(text, "integral", f"{joint}.{POWER}")
+            case (("rms" | "mean" | "integral"), [name]):
+                return OfHistory(text, word, name)
+            case (("residual" | "settling"), [point]):
+                return OfSettling(text, word, point)
+            case "frequency", [number, body] if number.isdecimal():
+                return OfFrequency(text, int(number), body)
+            case "mass", [] | [_]:
+                return OfMass(text, *rest)
+            case "motors", [("mass" | "cost" | "share") as what]:
+                return OfMotors(text, what)
+            case "value", [key] if all(key.split(".")):
+                return OfValue(text, key)
     raise InputError(f"{option}: expected {either(FORMS)}", f'"{text}"')
-
-
-def _reduced(word: str, history: History, by_all: bool) -> float:
-    time, values = history.time, history.values[:, 0]
-    if word == "rms":
-        return history.rms if by_all else root_mean_square(time, values)
-    mean = history.mean if by_all else float(shares(time) @ values)
-    return mean * float(np.ptp(time)) if word == "integral" else mean
-
-
-def _value_at(t: float, text: str, history: History, _: bool) -> float:
-    first, last = history.time[[0, -1]]
-    if not first <= t <= last:
-        raise InputError(f'"{text}": expected a time from {first:g} to {last:g} s', f"{t:g}")
-    return history.at(t, 0)
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 def _modes(body: ModalBody) -> list[str]:
     """Family and number in it, from 1, of the eigenmodes."""
     families = body.family[: body.eigenmode_count]
     return [f"{family} {families[: k + 1].count(family)}" for k, family in enumerate(families)]
-
-
-def _mass(results: Results, body: Mapping[str, object]) -> float:
-    name = str(body["name"])
-    if name in results.modal_files:
-        return results.modal_mass(name)
-    rigid = body.get("rigid")
-    return float(rigid.get("mass", 0.0)) if isinstance(rigid, Mapping) else 0.0
 
 
 LIMIT = re.compile(r"(?P<response>.*\S)\s*(?P<sense><=|>=)\s*(?P<bound>\S+)\s*")
@@ -300,33 +281,24 @@ class DesignProblem:
 
         Powers of lengths, as masses and deflections are, become linear in the logarithms of these.
         """
-        logarithms, _ = self._logarithms(values)
-        return as_floats(logarithms * self._senses)
+        return self._scaled(values)[0]
 
     def factors(self, values: Sequence[float]) -> Array:
-        """Return (1 + m,) derivatives of `scaled` with respect to the unscaled responses."""
-        _, slopes = self._logarithms(values)
-        return as_floats(slopes * self._senses / self._sizes)
+        """Return derivatives (1 + m,) of `scaled` by the unscaled responses, 1/their units."""
+        return self._scaled(values)[1]
 
-    @property
-    def _senses(self) -> Array:
-        objective = self.sense * np.sign(self.scale)
-        limits = (limit.sense * (np.sign(limit.bound) or 1.0) for limit in self.limits)
-        return np.array([objective, *limits])
-
-    @property
-    def _sizes(self) -> Array:
-        return np.array([self.scale, *(limit.bound or 1.0 for limit in self.limits)])
-
-    def _logarithms(self, values: Sequence[float]) -> tuple[Array, Array]:
+    def _scaled(self, values: Sequence[float]) -> tuple[Array, Array]:
         """Logarithms of ratios, and their derivatives; below `LINEAR`, and where a bound is 0, on a tangent."""
-        of_zero = np.array([False, *(limit.bound == 0.0 for limit in self.limits)])
-        ratios = np.array(values) / self._sizes + of_zero
+        bounds = np.array([self.scale, *(limit.bound for limit in self.limits)])
+        of_zero = bounds == 0.0
+        sizes = bounds + of_zero
+        senses = np.array([self.sense, *(limit.sense for limit in self.limits)]) * np.sign(sizes)
+        ratios = np.array(values) / sizes + of_zero
         place = np.where(of_zero, 1.0, np.maximum(ratios, LINEAR))
-        return np.log(place) + (ratios - place) / place, 1.0 / place
+        return as_floats(senses * (np.log(place) + (ratios - place) / place)), as_floats(senses / place / sizes)
 
     def violation(self, readings: Sequence[Reading]) -> float:
-        """The largest excess, of its limit; 0 where none is exceeded."""
+        """Return the largest excess, relative to its limit; 0 if none is exceeded."""
         excesses = (limit.excess(one.value) for limit, one in zip(self.limits, readings[1:], strict=True))
         return max((0.0, *excesses))
 
@@ -336,10 +308,8 @@ def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequenc
     if (minimise is None) == (maximise is None):
         objectives = "both" if minimise is not None else "none"
         raise InputError("optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE", objectives)
-    objective = (
-        parse_response(minimise, "--minimise") if minimise is not None else parse_response(maximise or "", "--maximise")
-    )
-    return DesignProblem(objective, 1.0 if minimise is not None else -1.0, tuple(map(parse_limit, subject_to)))
+    sense, option, text = (-1.0, "--maximise", maximise or "") if minimise is None else (1.0, "--minimise", minimise)
+    return DesignProblem(parse_response(text, option), sense, tuple(map(parse_limit, subject_to)))
 
 
 def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:

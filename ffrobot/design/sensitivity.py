@@ -31,19 +31,9 @@ from .readings import Reading, Response
 from .responses import parse_response
 
 COLUMNS = (
-    "response",
-    "value",
-    "unit",
-    "time",
-    "key",
-    "key_value",
-    "derivative",
-    "error",
-    "percent_per_percent",
-    "method",
-    "step",
-    "notes",
-)
+    "response", "value", "unit", "time", "key", "key_value",
+    "derivative", "error", "percent_per_percent", "method", "step", "notes",
+)  # fmt: skip
 HEADING = ("key", "value", "% per %", "derivative", "error", "by")
 HOW = {
     "repeated steps": "repeated steps: differences of runs with the same time steps",
@@ -117,46 +107,44 @@ class Sensitivity(Finding):
     def sections(self) -> Iterator[TextTable]:
         """Tables, one for each response, the most influential key first."""
         for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
-            rows = [self._row(g, k) for k in self.ranked(g)]
+            rows = []
+            for k in self.ranked(g):
+                one = self.entries[g][k]
+                pairs = ((self.logarithmic[g, k], "+.5f"), (one.derivative, ".8g"), (one.error, ".1e"))
+                cells = ("" if np.isnan(value) else format(value, form) for value, form in pairs)
+                rows.append((self.keys[k], f"{self.values[k]:.6g}", *cells, one.method))
             when = "" if np.isnan(reading.time) else f" at t = {reading.time:g} s"
             yield TextTable(HEADING, rows, line=f"{response}: {reading.in_words(8)}{when}", of=response)
 
-    def _row(self, g: int, k: int) -> tuple[str, ...]:
-        one = self.entries[g][k]
-        return (
-            self.keys[k], f"{self.values[k]:.6g}", _number(self.logarithmic[g, k], "+.5f"),
-            _number(one.derivative, ".8g"), _number(one.error, ".1e"), one.method,
-        )  # fmt: skip
-
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV tables with one line for each response and key."""
-        yield CsvFile("sensitivity.csv", "table of sensitivities", COLUMNS, self._numbers())
-
-    def _numbers(self) -> Iterator[list[object]]:
+        rows: list[list[object]] = []
         for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
-            time = "" if np.isnan(reading.time) else reading.time
-            for k, (key, value) in enumerate(zip(self.keys, self.values, strict=True)):
-                one = self.entries[g][k]
-                yield [
-                    response, reading.value, reading.unit, time, key, float(value), one.derivative, one.error,
-                    self.logarithmic[g, k], one.method, one.step, "; ".join(one.notes),
-                ]  # fmt: skip
+            about = [response, reading.value, reading.unit, "" if np.isnan(reading.time) else reading.time]
+            for k, one in enumerate(self.entries[g]):
+                values = [float(self.values[k]), one.derivative, one.error, self.logarithmic[g, k]]
+                rows.append([*about, self.keys[k], *values, one.method, one.step, "; ".join(one.notes)])
+        yield CsvFile("sensitivity.csv", "table of sensitivities", COLUMNS, rows)
 
     def diagrams(self) -> list[Bars]:
-        """Tornado diagrams, one for each response."""
-        return [self._tornado(g) for g in range(len(self.responses))]
+        """Tornado diagrams, one for each response: percent per percent of each key, the largest on top.
 
-    def _tornado(self, g: int) -> Bars:
-        """Percent of response g per percent of each key, the largest on top; keys without a number are left out."""
-        known = [k for k in self.ranked(g) if np.isfinite(self.logarithmic[g, k])]
-        return Bars(
-            name=f"tornado_{file_name(self.responses[g])}",
-            title=f"{self.responses[g]}: {self.readings[g].in_words(5)}",
-            x_label="% per % of the parameter",
-            labels=tuple(self.keys[k] for k in known),
-            series=(Series(values=numbers(self.logarithmic[g, known])),),
-            signed=True,
-        )
+        Keys without a number are left out.
+        """
+        bars = []
+        for g, response in enumerate(self.responses):
+            known = [k for k in self.ranked(g) if np.isfinite(self.logarithmic[g, k])]
+            bars.append(
+                Bars(
+                    name=f"tornado_{file_name(response)}",
+                    title=f"{response}: {self.readings[g].in_words(5)}",
+                    x_label="% per % of the parameter",
+                    labels=tuple(self.keys[k] for k in known),
+                    series=(Series(values=numbers(self.logarithmic[g, known])),),
+                    signed=True,
+                )
+            )
+        return bars
 
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
@@ -172,10 +160,6 @@ class Sensitivity(Finding):
             f"how        {self.runs} run{'s' if self.runs > 1 else ''} with a tolerance of at most {self.tolerance:g};"
             f" {'; '.join([*texts, ERRORS])}"
         )
-
-
-def _number(value: float, form: str) -> str:
-    return "" if np.isnan(value) else format(value, form)
 
 
 THREE = (-1e-3, 1e-3, 2e-3)  # of the largest step: where runs take the same steps
@@ -195,8 +179,13 @@ def find_sensitivity(
     if not responses or not keys:
         raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
     designs, base = _start(runs, responses, keys, step, tolerance)
-    _check_steps(designs, base)
-    samples = _all_samples(designs, base)
+    samples, wanted = list[Sample](), list(range(len(keys)))
+    for parts in (THREE, *OTHERS) if base.repeats else ():
+        samples += _beside(designs, base, samples, wanted, parts)
+        wanted = rough_keys(base, samples, smaller=False)
+    samples += _beside(designs, base, samples, wanted, BOTH_SIDES)
+    for parts in () if base.repeats else FINER:
+        samples += _beside(designs, base, samples, rough_keys(base, samples, smaller=True), parts)
     failures = tuple(
         f"{'.'.join(keys[one.k])} = {base.point[one.k] + one.offset:.6g}: {one.failure}"
         for one in samples
@@ -221,7 +210,8 @@ def _start(
 ) -> tuple[Designs, Base]:
     """The place where derivatives are taken, with the responses of the scene's own design, and designs beside it.
 
-    These take its steps again where they can; else runs have a tighter tolerance.
+    These take its steps again where they can; else runs have a tighter tolerance. Raises `InputError` for a key that
+    may be neither larger nor smaller, such as a count.
     """
     point = tuple(number_at(runs.path, key, "--to") for key in keys)
     steps = tuple(step * (abs(value) or 1.0) for value in point)  # of keys that are 0, in their unit
@@ -233,29 +223,13 @@ def _start(
             again = repeated_steps(results) if repeats else None
         if again:
             break
-    return designs, Base(responses, readings, keys, point, steps, repeats=repeats if again else 0.0, again=again or {})
-
-
-def _check_steps(designs: Designs, base: Base) -> None:
-    """Raise `InputError` for a key that may be neither larger nor smaller, such as a count, before any run."""
-    for k, key in enumerate(base.keys):
-        if not base.point[k].is_integer():
-            continue
-        if problem := designs.problem(base.moved(k, base.steps[k]), base.moved(k, -base.steps[k])):
+    base = Base(responses, readings, keys, point, steps, repeats=repeats if again else 0.0, again=again or {})
+    for k, key in enumerate(keys):
+        sides = [base.moved(k, sign * steps[k]) for sign in (1.0, -1.0)]
+        if point[k].is_integer() and (problem := designs.problem(*sides)):
             name = ".".join(key)
             raise InputError("--to: expected keys that may be a little larger or smaller", f"{name}:\n{problem}")
-
-
-def _all_samples(designs: Designs, base: Base) -> list[Sample]:
-    """All that derivatives need, with other steps where the first ones are not good enough."""
-    samples, wanted = list[Sample](), list(range(len(base.keys)))
-    for parts in (THREE, *OTHERS) if base.repeats else ():
-        samples += _beside(designs, base, samples, wanted, parts)
-        wanted = rough_keys(base, samples, smaller=False)
-    samples += _beside(designs, base, samples, wanted, BOTH_SIDES)
-    for parts in () if base.repeats else FINER:
-        samples += _beside(designs, base, samples, rough_keys(base, samples, smaller=True), parts)
-    return samples
+    return designs, base
 
 
 def _beside(

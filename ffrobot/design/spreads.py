@@ -23,7 +23,7 @@ from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.tables import shown
 from ..sweep.files import number_at
-from ..sweep.sweep import Key, check_once
+from ..sweep.sweep import Key
 from .designs import parse_key
 
 LEVELS = (0.05, 0.5, 0.95)
@@ -50,7 +50,7 @@ class SpreadStatistics:
 
     @property
     def named(self) -> dict[str, tuple[Array, Array]]:
-        """Mean, deviation and quantiles by name, each with its standard error."""
+        """Mean, deviation and quantiles (…) by name, each with its standard error, in the unit of the quantity."""
         quantiles = dict(zip(NAMES, zip(self.quantiles, self.quantile_errors, strict=True), strict=True))
         return {"mean": (self.mean, self.mean_error), "deviation": (self.deviation, self.deviation_error), **quantiles}
 
@@ -60,13 +60,13 @@ class SpreadStatistics:
         return [*(f"{name}{error}" for name in self.named for error in ("", "_error")), "lowest", "highest"]
 
     def numbers(self, k: int) -> list[float]:
-        """All of quantity k."""
+        """Return the statistics of quantity k in the order of `columns`."""
         values = [value for pair in self.named.values() for value in pair]
         return [float(one[k]) for one in (*values, self.lowest, self.highest)]
 
 
 def statistics(values: Array) -> SpreadStatistics:
-    """Return statistics of samples (n, …), n > 1.
+    """Return statistics of samples (n, …), n > 1, in their unit.
 
     The error of s is √((m₄ − s⁴ (n − 3)/(n − 1))/n)/2s with the fourth central moment m₄; that of a quantile half the
     distance between the order statistics one standard deviation of the binomial distribution below and above it.
@@ -75,22 +75,25 @@ def statistics(values: Array) -> SpreadStatistics:
     mean, s = values.mean(axis=0), values.std(axis=0, ddof=1)
     fourth = np.mean((values - mean) ** 4, axis=0)
     spread = np.sqrt(np.maximum(0.0, fourth - s**4 * (n - 3) / (n - 1)) / n)
-    deviation_error = np.divide(spread, 2.0 * s, out=np.zeros_like(s), where=s > 0.0)
     p = np.array(LEVELS)
     step = np.sqrt(p * (1.0 - p) / n)
     low, high = (np.quantile(values, np.clip(p + sign * step, 0.0, 1.0), axis=0) for sign in (-1.0, 1.0))
-    quantiles = np.quantile(values, p, axis=0)
-    errors = as_floats(0.5 * (high - low))
-    least, largest = values.min(axis=0), values.max(axis=0)
     return SpreadStatistics(
-        mean, s / np.sqrt(n), s, deviation_error, quantiles, quantile_errors=errors, lowest=least, highest=largest
+        mean=mean,
+        mean_error=s / np.sqrt(n),
+        deviation=s,
+        deviation_error=np.divide(spread, 2.0 * s, out=np.zeros_like(s), where=s > 0.0),
+        quantiles=np.quantile(values, p, axis=0),
+        quantile_errors=as_floats(0.5 * (high - low)),
+        lowest=values.min(axis=0),
+        highest=values.max(axis=0),
     )
 
 
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
-    """Squared standardized regression coefficients (g, k) of outputs (n, g) by inputs (n, k), and R² (g,).
+    """Return squared standardized regression coefficients (g, k) and R² (g,) of outputs (n, g) by inputs (n, k).
 
-    Where R² is near one, coefficients are shares of the variance; where it is not, the responses are not linear.
+    Both are dimensionless. Near R² = 1 coefficients are shares of the variance; else the responses are not linear.
     """
     x = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
     size = outputs.std(axis=0)
@@ -165,7 +168,7 @@ class Spread:
         return self.mean - far, self.mean + far
 
     def values(self, u: Array) -> Array:
-        """Return values of the key at probabilities u (n,) in (0, 1)."""
+        """Return values (n,) of the key, in its unit, at probabilities u (n,) in (0, 1)."""
         if self.kind == "uniform":
             return as_floats(self.mean + self.half * (2.0 * u - 1.0))
         return as_floats(self.mean + self.deviation * ndtri(u))
@@ -197,12 +200,6 @@ def parse_spread(text: str, path: Path) -> Spread:
     )
 
 
-def spread_points(spreads: Sequence[Spread], u: Array) -> list[tuple[float, ...]]:
-    """Return n values of the k keys whose cumulative probabilities are u (n, k)."""
-    columns = np.column_stack([spread.values(u[:, k]) for k, spread in enumerate(spreads)])
-    return [tuple(map(float, row)) for row in columns]
-
-
 def _size(text: str, own: float, whole: str) -> float:
     """A positive number, or so many percent of the key's value. Raises `ValueError` for what is neither."""
     percent = text.strip().endswith("%")
@@ -232,7 +229,7 @@ class LinearSpread:
 
     @staticmethod
     def through(spreads: Sequence[Spread], middle: Array, sides: Array) -> LinearSpread:
-        """Fit the model to values `sides` (k, 2, …) one standard deviation above and below the middle."""
+        """Fit the model to values `middle` (…) and `sides` (k, 2, …), one standard deviation above and below it."""
         above, below = sides[:, 0], sides[:, 1]
         return LinearSpread(tuple(spreads), middle, 0.5 * (above - below), above - 2.0 * middle + below)
 
@@ -268,10 +265,3 @@ class LinearSpread:
             lowest=as_floats(self.middle - reach),
             highest=as_floats(self.middle + reach),
         )
-
-
-def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:
-    """Return distributions of keys of the scene file at `path`. Raises `InputError` also for repeated keys."""
-    spreads = tuple(parse_spread(text, path) for text in texts)
-    check_once([one.key for one in spreads], "--spread")
-    return spreads

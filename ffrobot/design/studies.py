@@ -71,25 +71,19 @@ def _checked(function: Callable[P, R]) -> Callable[P, R]:
             kind, *about = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
             if get_origin(kind) is Sequence:
                 check_texts(value, label)
-            if problem := _problem(kind, about, value):
-                raise InputError(f"{label}: {problem}")
+            if get_origin(kind) is Literal and value not in get_args(kind):
+                raise InputError(f"{label}: expected {either(get_args(kind))}, found {value!r}")
+            if isinstance(value, float) and kind is int:
+                raise InputError(f"{label}: expected a whole number, found {value:g}")
+            for one in about:
+                try:
+                    if isinstance(one, ParamType) and value is not None:
+                        one.convert(value, None, None)
+                except BadParameter as error:
+                    raise InputError(f"{label}: {error.message}") from None
         return function(*args, **given)
 
     return call
-
-
-def _problem(kind: object, about: Sequence[object], value: object) -> str:
-    if get_origin(kind) is Literal and value not in get_args(kind):
-        return f"expected {either(get_args(kind))}, found {value!r}"
-    if isinstance(value, float) and kind is int:
-        return f"expected a whole number, found {value:g}"
-    for one in about:
-        try:
-            if isinstance(one, ParamType) and value is not None:
-                one.convert(value, None, None)
-        except BadParameter as error:
-            return error.message
-    return ""
 
 
 Responses = Annotated[Sequence[str], "RESPONSE"]

@@ -13,12 +13,7 @@ from ..common.arrays import Array
 from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
 from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
 from .readings import Reading
-from .spreads import (
-    NAMES,
-    Indices,
-    Spread,
-    SpreadStatistics,
-)
+from .spreads import NAMES, Indices, Spread, SpreadStatistics
 
 LinearOrSampled = Literal["samples", "gradients"]
 ROUND_OFF = 1e-13  # of a response: smaller deviations are none
@@ -93,8 +88,7 @@ class Uncertainty(Finding):
             nominal = f"{response}: {reading.in_words()} with all parameters at nominal values"
             yield TextTable(heading, [self._statistics_row(g)], line=nominal)
             yield self._parts(g)
-        if self.bands:
-            yield TextTable(BAND_HEADINGS, self._band_rows())
+        yield from self._bands()
 
     def report_tables(self) -> Iterator[StudyTable]:
         """The statistics of all responses in one table."""
@@ -105,9 +99,7 @@ class Uncertainty(Finding):
             ]
             heading = ("response", "unit", "nominal", *self.statistics.named, "worst case")
             yield TextTable(heading, rows).for_report()
-        yield from (self._parts(g).for_report() for g in range(len(self.responses)))
-        if self.bands:
-            yield TextTable(BAND_HEADINGS, self._band_rows()).for_report()
+        yield from (table.for_report() for table in (*map(self._parts, range(len(self.responses))), *self._bands()))
 
     def _statistics_row(self, g: int) -> tuple[str, ...]:
         s = self.statistics
@@ -132,14 +124,17 @@ class Uncertainty(Finding):
         by = self.indices.total[g] if self.indices else self.shares[g]
         return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
 
-    def _band_rows(self) -> Iterator[tuple[str, ...]]:
+    def _bands(self) -> Iterator[TextTable]:
+        rows = []
         for band in self.bands:
             width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
-            cells: list[str] = []
+            cells = [band.name, band.unit]
             for values in (band.statistics.deviation, width):
                 k = int(np.argmax(values))
                 cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
-            yield (band.name, band.unit, *cells)
+            rows.append(cells)
+        if rows:
+            yield TextTable(BAND_HEADINGS, rows)
 
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
@@ -170,57 +165,55 @@ class Uncertainty(Finding):
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV tables with one line for each response, and for each time of a history."""
         if self.responses:
-            yield CsvFile("uncertainty.csv", "table of uncertainties", self._response_columns(), self._response_rows())
+            keys, i = [".".join(one.key) for one in self.spreads], self.indices
+            parts = {"share": self.shares}
+            if i:
+                parts |= {"first": i.first, "first_error": i.first_error}
+                parts |= {"total": i.total, "total_error": i.total_error}
+            of_keys = [f"{word} {key}" for word in parts for key in keys]
+            columns = ["response", "unit", "middle", *self.statistics.columns, "linear", *of_keys]
+            rows = [
+                [response, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g],
+                 *(value for part in parts.values() for value in part[g])]
+                for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True))
+            ]  # fmt: skip
+            yield CsvFile("uncertainty.csv", "table of uncertainties", columns, rows)
         for band in self.bands:
             lines = ([t, band.nominal[k], *band.statistics.numbers(k)] for k, t in enumerate(band.time))
-            columns = ("time", "nominal", *band.statistics.columns)
-            yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", columns, lines)
-
-    def _response_columns(self) -> list[str]:
-        keys = [".".join(one.key) for one in self.spreads]
-        parts = [f"share {key}" for key in keys]
-        if self.indices:
-            parts += [f"{word} {key}" for word in ("first", "first_error", "total", "total_error") for key in keys]
-        return ["response", "unit", "middle", *self.statistics.columns, "linear", *parts]
-
-    def _response_rows(self) -> Iterator[list[object]]:
-        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
-            parts = list(self.shares[g])
-            if i := self.indices:
-                parts += [*i.first[g], *i.first_error[g], *i.total[g], *i.total_error[g]]
-            yield [response, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g], *parts]
+            of_times = ["time", "nominal", *band.statistics.columns]
+            yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", of_times, lines)
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the ranking of keys for each response, and of the bands."""
-        return [*(self._ranking(g) for g in range(len(self.responses))), *map(self._band, self.bands)]
-
-    def _ranking(self, g: int) -> Bars:
-        order = self.ranked(g)
-        if i := self.indices:
-            pairs = {"alone": (i.first, i.first_error), "with others": (i.total, i.total_error)}
-            series = [
-                Series(label=label, values=numbers(100.0 * value[g, order]), errors=floats(100.0 * error[g, order]))
-                for label, (value, error) in pairs.items()
-            ]
-        else:
+        found: list[Diagram] = []
+        for g, response in enumerate(self.responses):
+            order = self.ranked(g)
             series = [Series(values=numbers(100.0 * self.shares[g, order]))]
-        return Bars(
-            name=f"ranking_{file_name(self.responses[g])}",
-            title=self.responses[g],
-            x_label="Sobol index (%)" if self.indices else "share of the variance (%)",
-            labels=tuple(".".join(self.spreads[k].key) for k in order),
-            series=tuple(series),
-        )
-
-    def _band(self, band: HistoryBand) -> Band:
-        low, median, high = band.statistics.quantiles
-        return Band(
-            name=f"band_{file_name(band.name)}", title=band.name,
-            y_label=with_unit(band.name.rpartition(".")[2], band.unit),
-            time=floats(band.time), nominal=floats(band.nominal), median=floats(median), low=floats(low),
-            high=floats(high), lowest=floats(band.statistics.lowest), highest=floats(band.statistics.highest),
-            band_label=f"{NAMES[0]} to {NAMES[-1]}", worst_label=WORST[self.method],
-        )  # fmt: skip
+            if i := self.indices:
+                pairs = {"alone": (i.first, i.first_error), "with others": (i.total, i.total_error)}
+                series = [
+                    Series(label=label, values=numbers(100.0 * value[g, order]), errors=floats(100.0 * error[g, order]))
+                    for label, (value, error) in pairs.items()
+                ]
+            bars = Bars(
+                name=f"ranking_{file_name(response)}",
+                title=response,
+                x_label="Sobol index (%)" if self.indices else "share of the variance (%)",
+                labels=tuple(".".join(self.spreads[k].key) for k in order),
+                series=tuple(series),
+            )
+            found.append(bars)
+        for one in self.bands:
+            low, median, high = one.statistics.quantiles
+            band = Band(
+                name=f"band_{file_name(one.name)}", title=one.name,
+                y_label=with_unit(one.name.rpartition(".")[2], one.unit),
+                time=floats(one.time), nominal=floats(one.nominal), median=floats(median), low=floats(low),
+                high=floats(high), lowest=floats(one.statistics.lowest), highest=floats(one.statistics.highest),
+                band_label=f"{NAMES[0]} to {NAMES[-1]}", worst_label=WORST[self.method],
+            )  # fmt: skip
+            found.append(band)
+        return found
 
 
 def with_error(value: float, error: float) -> str:

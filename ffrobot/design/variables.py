@@ -80,19 +80,18 @@ class DesignVariable:
         return float(np.log(x / a) / np.log(b / a)) if self.logarithmic else (x - a) / (b - a)
 
     def slope(self, u: float) -> float:
-        """dx/du of a number."""
+        """Return dx/du of the number x at coordinate u."""
         if self.logarithmic:
             return float(self.values(u)[0] * np.log(self.high / self.low))
         return self.high - self.low
 
     def step(self, u: float, relative: float) -> float:
-        """A step of u that changes the number x by `relative` of itself, or of the range where that is smaller."""
+        """Return a step of u that changes the number x by `relative` of itself, or of the range if that is smaller.
+
+        Near x = 0 it changes x by that of a thousandth of the range.
+        """
         span = self.high - self.low
-        scale = np.clip(abs(self.values(u)[0]), SMALL * span, span)
-        return float(relative * scale / self.slope(u))
-
-
-SMALL = 1e-3  # of the range: numbers near 0 take steps of this times the relative one
+        return float(relative * np.clip(abs(self.values(u)[0]), 1e-3 * span, span) / self.slope(u))
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ class DesignSpace:
 
     @property
     def start_place(self) -> Place | None:
-        """Coordinates of the scene itself; None if it is out of bounds or in no catalog."""
+        """Coordinates of the scene itself; None if one of `start` is."""
         own = [u for u in self.start() if u is not None]
         return tuple(own) if len(own) == len(self.variables) else None
 
@@ -175,14 +174,14 @@ def _motors(joint: str, mass: str | None, catalog: Path) -> DesignVariable:
             raise InputError(f'{catalog}: expected a mass of motor "{motor.name}", for {mass}', "none")
         for N in motor.gear_ratio:
             limits = N * motor.peak_torque * motor.efficiency, motor.max_speed / N
-            row = (N, motor.rotor_inertia, *limits, *(() if mass is None else (motor.mass,)))
+            row = (N, motor.rotor_inertia, *limits, motor.mass)[: 5 if mass else 4]
             if row in rows:
                 raise InputError(
                     f"{catalog}: expected motors that differ in inertia, peak torque or speed",
                     f'"{rows[row].name}" and "{motor.name}"',
                 )
             rows[row] = motor
-    more = () if mass is None else (parse_key(mass, "--vary"),)
+    more = (parse_key(mass, "--vary"),) if mass else ()
     return DesignVariable((*keys, *more), rows=tuple(rows), motors=tuple(rows.values()))
 
 
