@@ -1,6 +1,15 @@
 """What designs are sought for in these tests: a tube that swings, a cantilever under a force, a rigid arm."""
 
+import csv
+
 from beam_links import beam_link, rectangle, tube
+
+
+def rows(path):
+    """Of a table in CSV, by column."""
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
 
 MODES = {"count": 2, "family": "in-plane-bending"}
 FREE = MODES | {"attachment_modes": False}

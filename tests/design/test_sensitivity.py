@@ -1,13 +1,17 @@
 """`ffrobot sensitivity`: closed forms, differences by hand, peaks with kinks, failed designs, mistakes."""
 
-import csv
 from copy import deepcopy
 
 import numpy as np
 import pytest
-from small_robots import ARM, SWING, TUBE
+from small_robots import ARM, SWING, TUBE, rows
 
 import ffrobot
+from ffrobot.batch.batch import Batch, Processes
+from ffrobot.design.designs import Designs, Runs, changes_for
+from ffrobot.design.evaluations import Differentiation, Evaluations
+from ffrobot.design.responses import read_problem
+from ffrobot.design.variables import read_space
 from ffrobot.sweep.files import set_key, value_of
 
 PLANE = SWING | {
@@ -197,11 +201,10 @@ def test_a_design_that_fails_is_kept_and_told(write, tmp_path):
     assert len(found.failures) == 1
     assert "expected a number of at least 0, found -1e-05" in found.failures[0]
     assert any("viscous_friction = -" in note for note in entry.notes)
-    with (folder / "table.csv").open(encoding="utf-8") as file:
-        assert sorted(row["status"] for row in csv.DictReader(file)) == ["completed"] * 3 + ["wrong input"]
-    rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
+    assert sorted(row["status"] for row in rows(folder / "table.csv")) == ["completed"] * 3 + ["wrong input"]
+    done = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
     again = ffrobot.sensitivity(write(scene), of, to, folder)  # nothing is run again
-    assert {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")} == rows
+    assert {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")} == done
     assert again.derivative == found.derivative
 
 
@@ -213,8 +216,7 @@ def test_command(ffrobot, write):
     assert "payload.0.mass" in done.stdout
     assert "4 runs" in done.stdout
     folder = scene.with_suffix(".sensitivity")
-    with (folder / "sensitivity.csv").open(encoding="utf-8") as file:
-        (row,) = csv.DictReader(file)
+    (row,) = rows(folder / "sensitivity.csv")
     assert float(row["derivative"]) == pytest.approx(2 * 0.36 + 0.6 * 9.81, rel=1e-9)
     assert float(row["percent_per_percent"]) == pytest.approx(0.5 * float(row["derivative"]) / float(row["value"]))
     assert (folder / "tornado_peak_joints_shoulder_moment.png").exists()
@@ -279,3 +281,26 @@ def test_means_that_outputs_miss_have_their_closed_forms(write, kind):
         found = ffrobot.sensitivity(write(ARM | keys | {"analysis": [of]}), of=list(expected), to=["payload.0.mass"])
         assert found.value == pytest.approx(list(expected.values()), rel=1e-5)
         assert sum("between them, which counts" in line for line in found.remarks()) == len(expected)
+
+
+def test_gradients_of_a_search_take_one_run_for_each_number(write, tmp_path):
+    """Steps of 6e-6 of a number: truncation is 1e-5 of the derivative or so, and the estimate says so."""
+    keys = ["links.arm.geometry.section.outer", "payload.0.mass"]
+    goals = ["rms joints.shoulder.moment", "rms points.arm.tip.deflection"]
+    path, problem = write(SWING), read_problem(goals[0], None, [f"{goals[1]} <= 1"])
+    space = read_space(path, [f"{keys[0]}=0.018:0.03", f"{keys[1]}=0.1:1:log"])
+    fixed = changes_for(path, problem.responses, 1e-7, keep_steps=True)
+    designs = Designs(Runs(path, tmp_path / "runs", Batch(lambda: Processes(2))), space.keys, space.own, fixed)
+    evaluations = Evaluations(designs, space, problem)
+    (first,) = evaluations.at([space.start_place])
+    found = Differentiation(evaluations, 1e-7)
+    slopes = found.slopes(first)
+    assert designs.count == 1 + 2 + 1
+    by_keys = [variable.slope(u) for variable, u in zip(space.variables, first.place, strict=True)]
+    expected = ffrobot.sensitivity(path, goals, keys, processes=2).derivative * by_keys
+    difference, scale = np.abs(slopes.gradient - expected), np.abs(expected)
+    assert np.all(difference <= 1e-4 * scale)
+    assert np.all(difference <= slopes.error + 1e-6 * scale)
+    assert np.all(slopes.error <= 1e-3 * scale)
+    assert found.slopes(first).gradient == pytest.approx(slopes.gradient, rel=0, abs=0)
+    assert designs.count == 4

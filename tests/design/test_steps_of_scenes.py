@@ -4,7 +4,6 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-import tomli_w
 from small_robots import SWING, TUBE
 
 import ffrobot
@@ -35,9 +34,7 @@ def kept(tmp_path):
 
 
 def histories(results):
-    names = [f"{analysis}/points/arm.tip/position" for analysis in results.analyses] + [
-        "inverse/joints/shoulder/moment"
-    ]
+    names = ["inverse/joints/shoulder/moment", *(f"{name}/points/arm.tip/position" for name in results.analyses)]
     return np.hstack([results[name].reshape(len(results[name]), -1) for name in names])
 
 
@@ -66,20 +63,16 @@ def test_the_same_run_again(tmp_path, more):
         ({"repeat_steps": "kept.hdf"}, 'did you mean "kept.h5"?'),
     ],
 )
-def test_mistakes(tmp_path, kept, changes, message):
+def test_mistakes(write, kept, changes, message):
     keys = SCENE | {"analysis": [SCENE["analysis"][0] | {"repeat_steps": "kept.h5"} | changes]}
-    path = tmp_path / "scene.toml"
-    path.write_text(tomli_w.dumps(keys), encoding="utf-8")
     with pytest.raises(ffrobot.InputError) as told:
-        ffrobot.solve(path)
+        ffrobot.solve(write(keys))
     assert message in str(told.value)
 
 
-def test_runs_that_cannot_be_repeated_choose_their_own_steps(tmp_path):
+def test_runs_that_cannot_be_repeated_choose_their_own_steps(write):
     """With the implicit integrator: differences as they are of any runs, at the tolerance of those."""
     keys = SCENE | {"analysis": [SCENE["analysis"][0] | {"integrator": "radau", "end": 0.02}]}
-    path = tmp_path / "scene.toml"
-    path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-    found = ffrobot.sensitivity(path, ["rms joints.shoulder.moment"], ["payload.0.mass"])
+    found = ffrobot.sensitivity(write(keys), ["rms joints.shoulder.moment"], ["payload.0.mass"])
     assert {entry.method for row in found.entries for entry in row} == {"differences"}
     assert found.tolerance == 1e-9

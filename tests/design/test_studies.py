@@ -1,23 +1,15 @@
 """What design commands leave for the report: axes of parallel coordinates, states of designs, bands, files."""
 
-import csv
 import html
 
 import numpy as np
 import pytest
 import tomli_w
-from small_robots import SWING
+from small_robots import SWING, rows
 
 import ffrobot
 from ffrobot.design.responses import parse_response
-from ffrobot.pictures.studies.study import (
-    Band,
-    Bars,
-    Parallel,
-    Progress,
-    read_study,
-    study_files,
-)
+from ffrobot.pictures.studies.study import Band, Bars, Parallel, Progress, read_study, study_files
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene
@@ -88,8 +80,7 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
     axes = diagrams(study)["designs"].axes
     assert (axes[0].logarithmic, axes[0].low, axes[0].high) == (True, 0.017, 0.03)
     assert any("frequency 1 arm: 59.4 Hz instead of 60 saves" in fact for fact in study.facts)
-    with (folder / "designs.csv").open(encoding="utf-8") as table:
-        masses = [float(row["mass"]) for row in csv.DictReader(table)]
+    masses = [float(row["mass"]) for row in rows(folder / "designs.csv")]
     np.testing.assert_allclose(axes[1].values, masses, rtol=1e-12)
     ffrobot.ok("report", folder)
     page = (tmp_path / "found.html").read_text(encoding="utf-8")
@@ -134,20 +125,14 @@ def test_tornado_and_bands(scene, tmp_path):
             "expected format_version 1, found 7: run the command again",
         ),
         ('{"format": "ffrobot-study", "format_version": 1, "name": "sensitivity"}', "study.json: ffrobot_version"),
+        (None, "expected a folder of ffrobot sensitivity, optimise or uncertainty"),
     ],
 )
-def test_files_that_are_no_studies(ffrobot, tmp_path, content, message):
-    (tmp_path / "study.json").write_text(content, encoding="utf-8")
-    done = ffrobot("report", tmp_path / "study.json")
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert not (tmp_path / "study.html").exists()
-
-
-def test_a_folder_without_a_study(ffrobot, tmp_path):
-    done = ffrobot("report", tmp_path)
-    assert done.returncode == 2
-    assert "expected a folder of ffrobot sensitivity, optimise or uncertainty" in done.stderr
+def test_files_that_are_no_studies(refused, tmp_path, content, message):
+    """Nor a folder without any."""
+    if content:
+        (tmp_path / "study.json").write_text(content, encoding="utf-8")
+    assert message in refused(tmp_path, "report", "study.json" if content else ".")
 
 
 PATCHES = {

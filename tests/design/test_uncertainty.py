@@ -1,31 +1,19 @@
 """`ffrobot uncertainty`: closed forms, functions with known Sobol indices, bands two ways, failed samples."""
 
-import csv
 from math import sqrt
 
 import numpy as np
 import pytest
 from scipy.stats import norm, qmc
-from small_robots import ARM, MASS, PAYLOAD
+from small_robots import ARM, MASS, PAYLOAD, rows
 
 import ffrobot
-from ffrobot.design.spreads import (
-    LEVELS,
-    LinearSpread,
-    Spread,
-    parse_spread,
-    sobol_indices,
-    statistics,
-)
+from ffrobot.design.spreads import LEVELS, LinearSpread, Spread, parse_spread, sobol_indices, statistics
 from ffrobot.design.uncertainty_record import with_error
 
 MOMENT = "joints.shoulder.moment"
 SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
 """Of the moment at the start, level and with 2 rad/s², by both masses."""
-
-
-def spread(kind, deviation, mean=0.0):
-    return Spread(("key",), "", mean, kind, mean, deviation)
 
 
 @pytest.mark.parametrize(
@@ -89,9 +77,8 @@ def test_sobol_indices_of_a_known_function():
 
 def test_gradients_of_a_quadratic_tell_how_far_they_are_off():
     """f = x + x²/10, x normal: the mean is 1/10, the variance 1 + 2/100."""
-    one = spread("normal", 1.0)
-    middle, sides = np.array(0.0), np.array([[1.1, -0.9]])
-    found = LinearSpread.through((one,), middle, sides).statistics()
+    one = Spread(("key",), "", 0.0, "normal", 0.0, 1.0)
+    found = LinearSpread.through((one,), np.array(0.0), np.array([[1.1, -0.9]])).statistics()
     assert found.mean == 0.0
     assert found.mean_error == pytest.approx(0.1, rel=1e-2)
     assert found.deviation == pytest.approx(1.0, rel=1e-14)
@@ -120,9 +107,7 @@ def test_linear_responses(write, tmp_path):
     (band,) = sampled.bands
     np.testing.assert_allclose(band.statistics.deviation, exact.bands[0].statistics.deviation, rtol=0.03)
     assert band.statistics.deviation[0] == pytest.approx(sampled.statistics.deviation[1], rel=1e-12)
-    with (tmp_path / "runs" / "table.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))[-40:]
-    masses = np.array([[float(row[MASS]), float(row[PAYLOAD])] for row in rows])
+    masses = np.array([[float(row[MASS]), float(row[PAYLOAD])] for row in rows(tmp_path / "runs" / "table.csv")[-40:]])
     np.testing.assert_allclose(sampled.samples[:, 0], masses[:, 0], rtol=1e-14)
     np.testing.assert_allclose(sampled.samples[:, 1], masses @ SLOPES + 2.0 * 0.05, rtol=1e-9)
 
@@ -155,18 +140,16 @@ def test_failed_samples_are_told_and_left_out(write, ffrobot, tmp_path):
     done = ffrobot.ok(*command)
     assert "failed     1 of 47 runs, left out: body.arm.rigid.mass = -" in done.stdout
     assert "expected a number greater than 0" in done.stdout
-    runs = tmp_path / "scene.uncertainty" / "runs"
-    rows = sorted(runs.glob("*/row.json"))
-    before = [row.stat().st_mtime_ns for row in rows]
-    rows[7].unlink()
+    folder = tmp_path / "scene.uncertainty"
+    files = sorted(folder.glob("runs/*/row.json"))
+    before = [file.stat().st_mtime_ns for file in files]
+    files[7].unlink()
     again = ffrobot(*command)
     assert again.stdout == done.stdout
-    after = [row.stat().st_mtime_ns for row in rows]
+    after = [file.stat().st_mtime_ns for file in files]
     assert [k for k, (old, new) in enumerate(zip(before, after, strict=True)) if old != new] == [7]
-    with (tmp_path / "scene.uncertainty" / "uncertainty.csv").open(encoding="utf-8") as file:
-        (row,) = csv.DictReader(file)
-    with (tmp_path / "scene.uncertainty" / "table.csv").open(encoding="utf-8") as file:
-        masses = np.array([float(one[MASS]) for one in list(csv.DictReader(file))[1:]])
+    (row,) = rows(folder / "uncertainty.csv")
+    masses = np.array([float(one[MASS]) for one in rows(folder / "table.csv")[1:]])
     assert float(row["mean"]) == pytest.approx(masses[masses > 0.0].mean(), rel=1e-12)
     assert float(row["deviation"]) == pytest.approx(masses[masses > 0.0].std(ddof=1), rel=1e-12)
 
