@@ -9,6 +9,7 @@ import pytest
 import tomli_w
 from beam_links import beam_link, rectangle
 from rich.console import Console
+from tables_3d import ORIGIN, Y, Z, joint, revolute, rigid, scene
 
 from ffrobot import solve
 from ffrobot.batch.batch import batch_of
@@ -57,9 +58,23 @@ def arm(tmp_path_factory):
     return folder / "scene.toml"
 
 
+REST = {"name": "rest", "kind": "static"}
+
+
 def mapped(scene, folder, *over, **keys):
     with batch_of(1) as batch:
         return make_map(plan_map(scene, over, folder, **keys), batch, Watcher())
+
+
+def written(folder, tables, name="scene"):
+    path = folder / f"{name}.toml"
+    path.write_text(tomli_w.dumps(tables))
+    return path
+
+
+def two_dimensional(name, mass, inertia, length):
+    points = {"root": [0.0, 0.0], "tip": [length, 0.0]}
+    return {"name": name, "rigid": {"mass": mass, "inertia": inertia, "center": [length / 2, 0.0], "points": points}}
 
 
 def test_a_pose_is_what_static_finds_there(arm, tmp_path):
@@ -208,19 +223,13 @@ def test_a_wrong_point_and_a_folder_of_something_else(arm, tmp_path):
 
 def test_the_tool_of_a_robot_without_path_is_on_its_last_body(tmp_path):
     """Where a payload is, its "tip", or its last point, whatever its name."""
-    last = 'name = "hand"\nrigid = { mass = 1.0, inertia = 0.1, center = [0.1, 0.0], points = { root = [0.0, 0.0], %s'
-    joint = '[[joint]]\nname = "wrist"\ntype = "revolute"\nbetween = ["ground", "hand.root"]\n'
-    for points, more, expected in (
-        ("flange = [0.2, 0.0]", "", "hand.flange"),
-        ("tip = [0.1, 0.0], flange = [0.2, 0.0]", "", "hand.tip"),
-        ("tip = [0.1, 0.0], flange = [0.2, 0.0]", '[[payload]]\npoint = "hand.flange"\nmass = 1.0\n', "hand.flange"),
-    ):
-        path = tmp_path / "scene.toml"
-        text = (
-            'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\n' + last % points + " } }\n" + joint + more
-        )
-        path.write_text(text + '[[analysis]]\nname = "rest"\nkind = "static"\n')
-        assert plan_map(path, ("wrist=0:1:2",), tmp_path / "map").point == expected
+    flange = {"flange": [0.2, 0.0, 0.0]}
+    payload = [{"point": "hand.flange", "mass": 1.0}]
+    for points, payloads, expected in (
+        (flange, [], "flange"), ({"tip": ORIGIN} | flange, [], "tip"), ({"tip": ORIGIN} | flange, payload, "flange")
+    ):  # fmt: skip
+        hand = scene([rigid("hand", **points)], [revolute("wrist", "ground", "hand.root")], REST, payload=payloads)
+        assert plan_map(written(tmp_path, hand), ("wrist=0:1:2",), tmp_path / "map").point == f"hand.{expected}"
 
 
 def test_poses_that_no_motor_keeps_are_refused(arm, tmp_path):
@@ -233,25 +242,16 @@ def test_poses_that_no_motor_keeps_are_refused(arm, tmp_path):
         mapped(limp, tmp_path / "map", "shoulder=0.3")
 
 
-STRAIGHT = """name = "straight"
-gravity = [0.0, -9.81]
-body = [
- { name = "a", rigid = { mass = 2.0, inertia = 0.05, center = [0.3, 0], points = { o = [0, 0], e = [0.6, 0] } } },
- { name = "b", rigid = { mass = 1.0, inertia = 0.02, center = [0.2, 0], points = { o = [0, 0], e = [0.4, 0] } } },
-]
-joint = [{ name = "s", type = "revolute", between = ["ground", "a.o"] },
- { name = "e", type = "revolute", between = ["a.e", "b.o"], position_limit = [-3.2, 0.1] }]
-analysis = [{ name = "rest", kind = "static" }]
-"""
-
-
 @pytest.mark.parametrize(
     "over", [("x=-1.23:1.23:13", "y=-1.23:1.23:13"), ("x=-0.95:0.95:9", "y=0"), ("x=0.3:1:8", "y=0")]
 )
 def test_a_straight_arm_reaches_what_its_links_reach(tmp_path, over):
     """Places from 0.2 to 1 m, from a start that is straight, or that no neighbor leads from across the hole."""
-    (tmp_path / "scene.toml").write_text(STRAIGHT)
-    found = mapped(tmp_path / "scene.toml", tmp_path / "map", *over)
+    bodies = [two_dimensional("a", 2.0, 0.05, 0.6), two_dimensional("b", 1.0, 0.02, 0.4)]
+    limit = {"position_limit": [-3.2, 0.1]}
+    joints = [joint("s", "revolute", "ground", "a.root"), joint("e", "revolute", "a.tip", "b.root", **limit)]
+    path = written(tmp_path, scene(bodies, joints, REST, space="planar", gravity=[0.0, -9.81]))
+    found = mapped(path, tmp_path / "map", *over)
     x, y = np.meshgrid(*(axis.values for axis in found.plan.axes), indexing="ij")
     distance = np.hypot(x, y).ravel()
     assert (found.status == np.where((distance > 0.2 - 1e-9) & (distance < 1.0 + 1e-9), 0, 1)).all()
@@ -261,47 +261,23 @@ def test_a_straight_arm_reaches_what_its_links_reach(tmp_path, over):
 
 def test_names_with_blanks_and_limits_of_each_coordinate(tmp_path):
     """Weights times levers about y, none about z, against the limit of each; a range of each coordinate."""
-    scene = """name = "arm"
-space = "spatial"
-gravity = [0.0, 0.0, -9.81]
-initial = { joints = { s = [0.0, 0.5] } }
-analysis = [{ name = "rest", kind = "static" }]
-[[body]]
-name = "a"
-rigid = { mass = 2.0, center = [0.3, 0, 0], inertia = [0.01, 0.05, 0.05], points = { o = [0, 0, 0], e = [0.6, 0, 0] } }
-[[body]]
-name = "b"
-rigid = { mass = 1.0, center = [0.2, 0, 0], inertia = [0.01, 0.02, 0.02], points = { o = [0, 0, 0], e = [0.4, 0, 0] } }
-[[joint]]
-name = "s"
-type = "universal"
-between = ["ground", "a.o"]
-axis = [0, 0, 1]
-second_axis = [0, 1, 0]
-motor = true
-moment_limit = [100.0, 5.0]
-position_limit = [[-1.0, 1.0], LIMIT]
-[[joint]]
-name = "elbow 1"
-type = "revolute"
-between = ["a.e", "b.o"]
-axis = [0, 1, 0]
-moment_limit = 3.0
-"""
-    for limit, status in (("[-1.0, 1.0]", 0), ("[-1.0, 0.4]", 2)):
-        path = tmp_path / str(status) / "scene.toml"
-        path.parent.mkdir()
-        path.write_text(scene.replace("LIMIT", limit))
-        if status:
-            with pytest.raises(SolveError, match="within reach and the limits of the joints"):
-                mapped(path, path.parent / "map", "elbow 1=0:1:3")
-            continue
-        found = mapped(path, path.parent / "map", "elbow 1=0:1:3")
-        assert found.motors == ("s 1", "s 2", "elbow 1")
-        elbow = 9.81 * 0.2 * np.cos(0.5 + np.linspace(0, 1, 3))
-        second = 9.81 * (2.0 * 0.3 + 0.6) * np.cos(0.5) + elbow
-        np.testing.assert_allclose(found.values["torque"].T, [0 * elbow, -second, -elbow], atol=1e-9)
-        np.testing.assert_allclose(torque_share(found).T, [0 * elbow, second / 5.0, elbow / 3.0], atol=1e-9)
+    bodies = [rigid("a", 2.0, [0.01, 0.05, 0.05], [0.3, 0.0, 0.0], e=[0.6, 0.0, 0.0]),
+              rigid("b", 1.0, [0.01, 0.02, 0.02], [0.2, 0.0, 0.0], e=[0.4, 0.0, 0.0])]  # fmt: skip
+    both = {"axis": Z, "second_axis": Y, "motor": True, "moment_limit": [100.0, 5.0]}
+    elbow = revolute("elbow 1", "a.e", "b.root", Y, moment_limit=3.0)
+    start, paths = {"joints": {"s": [0.0, 0.5]}}, []
+    for highest in (1.0, 0.4):
+        ranges = {"position_limit": [[-1.0, 1.0], [-1.0, highest]]}
+        joints = [joint("s", "universal", "ground", "a.root", **both, **ranges), elbow]
+        paths.append(written(tmp_path, scene(bodies, joints, REST, initial=start), f"to_{highest:g}"))
+    with pytest.raises(SolveError, match="within reach and the limits of the joints"):
+        mapped(paths[1], tmp_path / "none", "elbow 1=0:1:3")
+    found = mapped(paths[0], tmp_path / "map", "elbow 1=0:1:3")
+    assert found.motors == ("s 1", "s 2", "elbow 1")
+    third = 9.81 * 0.2 * np.cos(0.5 + np.linspace(0, 1, 3))
+    second = 9.81 * (2.0 * 0.3 + 0.6) * np.cos(0.5) + third
+    np.testing.assert_allclose(found.values["torque"].T, [0 * third, -second, -third], atol=1e-9)
+    np.testing.assert_allclose(torque_share(found).T, [0 * third, second / 5.0, third / 3.0], atol=1e-9)
 
 
 def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
@@ -327,32 +303,23 @@ def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
     assert "milling_compliant" in quantities(found)
 
 
-SLIDE = """name = "slide"
-space = "spatial"
-gravity = [0.0, 0.0, -10.0]
-analysis = [{ name = "rest", kind = "static" }]
-[[body]]
-name = "box"
-rigid = { mass = 2.0, center = [0, 0, 0], inertia = [0.1, 0.1, 0.1], points = { o = [0, 0, 0] } }
-[[joint]]
-name = "lift"
-type = "prismatic"
-between = ["ground", "box.o"]
-axis = [0, 0, 1]
-rotor_inertia = 1e-3
-stiffness = 5e3
-"""
+GEAR = {"stiffness": 5e3, "rotor_inertia": 1e-3}
 
 
-@pytest.mark.parametrize("scene", [SLIDE, SLIDE.replace('"ground", "box.o"', '"box.o", "ground"')])
-def test_a_slide_behind_a_spring_needs_a_force(tmp_path, scene):
+def box(kind, *between, center=ORIGIN, **gear):
+    """Of 2 kg on the ground by one joint."""
+    inner, outer = between or ("ground", "box.root")
+    lift = joint("lift", kind, inner, outer, axis=Z if kind == "prismatic" else Y, **GEAR | gear)
+    return scene([rigid("box", 2.0, center=center)], [lift], REST, gravity=[0.0, 0.0, -10.0])
+
+
+@pytest.mark.parametrize("between", [("ground", "box.root"), ("box.root", "ground")])
+def test_a_slide_behind_a_spring_needs_a_force(tmp_path, between):
     """m g in N, m g/k below the motor; a process whose cutter no mode below its highest frequency moves."""
-    (tmp_path / "slide.toml").write_text(scene)
+    path = written(tmp_path, box("prismatic", *between))
     keys = {"teeth": 2, "tangential": 6e8, "radial": 2e8, "entry": 0.0, "exit": 2.0, "highest": 1.0}
     (tmp_path / "cutter.toml").write_text(tomli_w.dumps(keys))
-    found = mapped(
-        tmp_path / "slide.toml", tmp_path / "map", "lift=0.1:0.2:2", milling=read_milling(tmp_path / "cutter.toml")
-    )
+    found = mapped(path, tmp_path / "map", "lift=0.1:0.2:2", milling=read_milling(tmp_path / "cutter.toml"))
     np.testing.assert_allclose(np.abs(found.values["torque"]), 20.0)
     np.testing.assert_allclose(found.values["sag"][:, 2], -20.0 / 5e3)
     titles = {name: (one.title, one.everywhere) for name, one in quantities(found).items()}
@@ -362,19 +329,16 @@ def test_a_slide_behind_a_spring_needs_a_force(tmp_path, scene):
 
 def test_a_map_of_poses_that_all_fall_says_so(tmp_path):
     """An upright pendulum of weight m g l = 10 N·m/rad falls on a spring of 9, and stands on one of 11."""
-    for stiffness in (9.0, 11.0):
-        joint = f'type = "revolute"\nbetween = ["ground", "box.o"]\naxis = [0, 1, 0]\nstiffness = {stiffness}'
-        text = SLIDE.partition("[[joint]]")[0].replace("center = [0, 0, 0]", "center = [0, 0, 0.5]")
-        (tmp_path / "up.toml").write_text(f'{text}[[joint]]\nname = "lift"\nrotor_inertia = 1e-3\n{joint}\n')
-        if stiffness < 10.0:
-            with pytest.raises(SolveError, match="no pose of the grid has a stable equilibrium"):
-                mapped(tmp_path / "up.toml", tmp_path / "map", "lift=0.0")
-    found = mapped(tmp_path / "up.toml", tmp_path / "map", "lift=0.0")
+    falls, stands = (
+        written(tmp_path, box("revolute", center=[0.0, 0.0, 0.5], stiffness=k), f"spring_{k:g}") for k in (9.0, 11.0)
+    )
+    with pytest.raises(SolveError, match="no pose of the grid has a stable equilibrium"):
+        mapped(falls, tmp_path / "none", "lift=0.0")
+    found = mapped(stands, tmp_path / "map", "lift=0.0")
     hertz = np.sqrt((11.0 - 10.0) / (0.1 + 2.0 * 0.5**2)) / (2 * np.pi)
     assert found.values["joints_compliant/frequency"][0, 0] == pytest.approx(hertz)
 
 
 def test_force_that_a_slide_without_motor_leaves(tmp_path):
-    (tmp_path / "slide.toml").write_text(SLIDE)
     with pytest.raises(SolveError, match=r'20 N are left at joint "lift"'):
-        solve(tmp_path / "slide.toml")
+        solve(written(tmp_path, box("prismatic")))
