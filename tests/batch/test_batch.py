@@ -12,6 +12,7 @@ from threading import Timer
 
 import pytest
 import tomli_w
+from beam_links import beam_link, tube
 
 import ffrobot as library
 from ffrobot.batch.batch import Batch, Processes, _done, batch_of
@@ -19,29 +20,17 @@ from ffrobot.batch.worker import own_worker
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
 
+RIGID = {"mass": 2.0, "inertia": 0.05, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
 ARM = {
     "name": "arm",
     "gravity": [0.0, -9.81],
-    "body": [
-        {
-            "name": "arm",
-            "rigid": {
-                "mass": 2.0, "inertia": 0.05, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]},
-            },
-        }
-    ],
+    "body": [{"name": "arm", "rigid": RIGID}],
     "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
     "payload": [{"point": "arm.tip", "mass": 0.5}],
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005}],
-}  # fmt: skip
-BEAM = {
-    "material": {"youngs_modulus": 70e9, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 10},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 3, "family": "in-plane-bending"},
 }
+BEAM = beam_link(0.6, tube(0.02, 0.016), 10, nu=None, modes={"count": 3, "family": "in-plane-bending"})
 OF = "rms joints.shoulder.moment"
 STUDIES = {
     "uncertainty": ["--of", OF, "--of", "joints.shoulder.moment", "--spread", "payload.0.mass=±5%", "--samples", "8"],

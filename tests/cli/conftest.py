@@ -3,6 +3,7 @@
 import subprocess
 
 import pytest
+from mistakes import edited
 
 
 @pytest.fixture
@@ -12,11 +13,7 @@ def two_link_copy(case_copy):
     def copy(edits=None):
         folder = case_copy("two_link").parent
         for name, replacements in (edits or {}).items():
-            text = (folder / name).read_text(encoding="utf-8")
-            for old, new in replacements.items():
-                assert old in text, f"{name} has no {old!r}"
-                text = text.replace(old, new)
-            (folder / name).write_text(text, encoding="utf-8")
+            edited(folder, name, replacements)
         return folder
 
     return copy

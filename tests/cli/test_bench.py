@@ -14,33 +14,17 @@ from ffrobot.cli import cli
 
 MODES = {"count": 2, "family": "in-plane-bending", "attachment_modes": False}
 LINK = beam_link(0.5, rectangle(0.01, 0.02), 4, nu=None, name="arm", modes=MODES)
-SCENE = """
-name = "arm"
-gravity = [0.0, -9.81]
-body = [{ name = "arm", link = "arm.toml" }]
-joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
-trajectory = [{ name = "lift", point = "arm.tip", y = "0.1*sin(t)" }]
-
-[[pzt]]
-body = "arm"
-count = 2
-length = 0.1
-width = 0.02
-thickness = 1e-3
-modulus = 63e9
-d31 = 110e-12
-structural = false
-
-[[analysis]]
-name = "held"
-kind = "static"
-
-[[analysis]]
-name = "inverse"
-kind = "pcid"
-end = 0.02
-output_step = 0.001
-"""
+PATCHES = {"length": 0.1, "width": 0.02, "thickness": 1e-3, "modulus": 63e9, "d31": 110e-12, "structural": False}
+HELD = {"name": "held", "kind": "static"}
+SCENE = {
+    "name": "arm",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "link": "arm.toml"}],
+    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
+    "trajectory": [{"name": "lift", "point": "arm.tip", "y": "0.1*sin(t)"}],
+    "pzt": [{"body": "arm", "count": 2} | PATCHES],
+    "analysis": [HELD, {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001}],
+}
 RUN = ("--tolerances", "1e-3,1e-6", "--integrators", "dopri5,dop853", "--repeat", "2")
 INTEGRATES = "expected one that integrates over time, pcid or forward, found"
 
@@ -49,7 +33,7 @@ INTEGRATES = "expected one that integrates over time, pcid or forward, found"
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     (folder / "arm.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
-    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    (folder / "scene.toml").write_text(tomli_w.dumps(SCENE), encoding="utf-8")
     return folder
 
 
@@ -140,5 +124,5 @@ def test_refused(folder, monkeypatch, arguments, named):
 
 def test_nothing_to_integrate_is_refused(tmp_path, refused):
     (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
-    (tmp_path / "scene.toml").write_text(SCENE[: SCENE.index('[[analysis]]\nname = "inverse"')], encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps(SCENE | {"analysis": [HELD]}), encoding="utf-8")
     assert f'scene.toml: analysis: {INTEGRATES} "static"' in refused(tmp_path, "bench", "scene.toml")

@@ -225,15 +225,7 @@ def test_python_files_run_from_below_the_scene_only(two_link_copy, ffrobot, refu
     scene = folder / "scene.toml"
     text = scene.read_text(encoding="utf-8")
     for name in (str(elsewhere / "own.py"), "../elsewhere/own.py", "link.py"):
-        loop = f"""
-[[analysis]]
-name = "loop"
-kind = "closed-loop"
-actuation = "inverse"
-sample_time = 0.001
-controller = [{{ kind = "python", python = "{name}:controller" }}]
-"""
-        scene.write_text(text + loop, encoding="utf-8")
+        scene.write_text(text + OWN_CONTROLLER.replace("own.py", name), encoding="utf-8")
         message = refused(folder, "solve", "scene.toml")
         assert "expected a Python file below the scene's folder" in message
         assert f"--allow-python {elsewhere}" in message

@@ -54,23 +54,9 @@ def test_every_dataset_of_a_modal_body_has_a_meaning(ffrobot, solid_arm, tmp_pat
 
 
 WHOLE = (
-    Energies,
-    Evaluation,
-    MeasuredValues,
-    Metrics,
-    MotorFeasibility,
-    OutlinedPatches,
-    PatchFeasibility,
-    PictureMesh,
-    Remedies,
-    SectionLoads,
-    Settling,
-    Stations,
-    StressPoint,
-    StructureEffect,
-    Unsupplied,
-    Interface,
-)
+    Energies, Evaluation, Interface, MeasuredValues, Metrics, MotorFeasibility, OutlinedPatches, PatchFeasibility,
+    PictureMesh, Remedies, SectionLoads, Settling, Stations, StressPoint, StructureEffect, Unsupplied,
+)  # fmt: skip
 OTHERWISE = {"find_remedies", "coupling"}  # fields that are written by hand, or not at all
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mistakes import edited
 
 from ffrobot.results.file import Results
 
@@ -27,14 +28,10 @@ INERTIA, WEIGHT = 0.3 + 2.0 * 0.5**2, 2.0 * 9.81 * 0.5
 def scene(tmp_path):
     """Write the scene, parts of its text exchanged."""
 
-    def write(**edits):
-        text = SCENE
-        for old, new in edits.get("edits", {}).items():
-            assert old in text
-            text = text.replace(old, new)
-        path = tmp_path / "scene.toml"
-        path.write_text(text, encoding="utf-8")
-        return path
+    def write(edits=None):
+        (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
+        edited(tmp_path, "scene.toml", edits or {})
+        return tmp_path / "scene.toml"
 
     return write
 
@@ -104,7 +101,7 @@ MISTAKES = {
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_bad_input(ffrobot, scene, mistake):
     edits, expected = MISTAKES[mistake]
-    done = ffrobot("solve", scene(edits=edits))
+    done = ffrobot("solve", scene(edits))
     assert done.returncode == 2
     for part in expected:
         assert part in done.stderr
@@ -113,7 +110,7 @@ def test_bad_input(ffrobot, scene, mistake):
 
 def test_what_no_motor_does_is_not_judged(ffrobot, scene):
     linear = SCENE[SCENE.index('    { name = "held"') : SCENE.index("]\n[[body]]")]
-    path = scene(edits={'"arm.root"]': '"arm.root"], motor = false', linear: ""})
+    path = scene({'"arm.root"]': '"arm.root"], motor = false', linear: ""})
     assert ffrobot("solve", path).returncode == 0
     done = ffrobot("feasibility", path.with_suffix(".results.h5"))
     assert done.returncode == 2

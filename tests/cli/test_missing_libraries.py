@@ -6,7 +6,7 @@ import sys
 
 import pytest
 import tomli_w
-from beam_links import beam_link, tube
+from beam_links import beam_link, link_keys, rectangle, tube
 
 WITHOUT = """
 import sys
@@ -17,10 +17,8 @@ main()
 """
 
 
-def solid(**geometry):
-    material = {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0}
-    keys = {"name": "part", "geometry": {"kind": "solid", "length": 0.1, **geometry}, "material": material}
-    return tomli_w.dumps(keys | {"modes": {"count": 2}, "reference": {"condition": "cantilever"}})
+PART = link_keys("solid", 0.1, rectangle(0.01, 0.02), {"cell": "hexahedron"}, name="part", modes={"count": 2})
+FILE = PART | {"geometry": {"kind": "solid", "length": 0.1, "file": "part.step", "unit": "mm"}, "mesh": {}}
 
 
 @pytest.mark.parametrize("words", [("part.step", "--inspect"), ("part.msh", "--inspect"), ("part.toml",)])
@@ -28,7 +26,7 @@ def test_without_gmsh(words, tmp_path):
     """What is sound and what is not alike: the library is missed before the file is read."""
     (tmp_path / "part.step").write_text("ISO-10303-21;\nSI_UNIT(.MILLI.,.METRE.)")
     (tmp_path / "part.msh").write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n")
-    (tmp_path / "part.toml").write_text(solid(file="part.step", unit="mm"))
+    (tmp_path / "part.toml").write_text(tomli_w.dumps(FILE))
     command = [sys.executable, "-c", WITHOUT, "link", *words]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1), done.stderr
@@ -40,8 +38,7 @@ def test_finite_elements_that_cannot_be_loaded(tmp_path):
     (tmp_path / "dolfinx").mkdir()
     error = "libmpi.so.12: cannot open shared object file: No such file or directory"
     (tmp_path / "dolfinx" / "__init__.py").write_text(f"raise ImportError({error!r})")
-    box = {"section": {"shape": "rectangle", "height": 0.01, "width": 0.02}}
-    (tmp_path / "arm.toml").write_text(solid(**box) + '[mesh]\ncell = "hexahedron"\n')
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(PART))
     command = [sys.executable, "-m", "ffrobot", "link", "arm.toml"]
     environment = os.environ | {"PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)

@@ -18,6 +18,13 @@ BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.
 LINK = beam_link(0.6, tube(0.02, 0.016), 4, nu=None, name="arm", modes={"count": 1, "family": "in-plane-bending"})
 
 
+def check(found, expected):
+    """One remark with the expected text, or none where that is None."""
+    found = list(found)
+    assert len(found) == (expected is not None)
+    assert expected is None or expected in found[0]
+
+
 def arm(end=1.0, body=BAR, payload=(), tool=(), joint=(), gravity=-9.81, **path):
     return program.make_scene(
         name="arm",
@@ -69,9 +76,7 @@ def arm(end=1.0, body=BAR, payload=(), tool=(), joint=(), gravity=-9.81, **path)
     ],
 )
 def test_scenes(path, expected):
-    found = list(remarks(arm(**path)))
-    assert len(found) == (expected is not None)
-    assert expected is None or expected in found[0]
+    check(remarks(arm(**path)), expected)
 
 
 @pytest.mark.parametrize(
@@ -139,9 +144,7 @@ def test_waypoints_before_and_after_the_run(tmp_path):
     ],
 )
 def test_links(keys, expected, tmp_path):
-    found = list(remarks_on_link(read_link(LinkTable({**LINK, **keys}, tmp_path / "arm.toml")), "arm"))
-    assert len(found) == (expected is not None)
-    assert expected is None or expected in found[0]
+    check(remarks_on_link(read_link(LinkTable({**LINK, **keys}, tmp_path / "arm.toml")), "arm"), expected)
 
 
 PATCH = {"body": "arm", "count": 2, "length": 0.05, "thickness": 3e-4, "width": 0.01, "modulus": 63e9, "d31": 110e-12}
@@ -176,9 +179,7 @@ def test_flexible_scenes_in_3d(patch, interface, joints, expected):
         trajectory=[{"name": "turn", "joint": "hub", "value": "t"}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
     )
-    found = list(remarks(scene))
-    assert len(found) == (expected is not None)
-    assert expected is None or expected in found[0]
+    check(remarks(scene), expected)
 
 
 @pytest.mark.parametrize(

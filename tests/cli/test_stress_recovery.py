@@ -15,25 +15,19 @@ LINK = beam_link(
 SCENE = {
     "name": "sag",
     "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "link": "arm.toml"}],
+    "body": [{"name": "arm", "link": LINK}],
     "joint": [{"name": "wall", "type": "weld", "between": ["ground", "arm.root"]}],
     "analysis": [{"name": "rest", "kind": "static"}],
 }
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK))
-    (tmp_path / "scene.toml").write_text(tomli_w.dumps(SCENE))
-    return tmp_path
-
-
-def test_a_cantilever_under_its_weight_and_a_mass(folder, ffrobot):
+def test_a_cantilever_under_its_weight_and_a_mass(tmp_path, ffrobot):
     """M(x) = ρA g (L − x)²/2 + m g (L − x), pulling the upper side; V(0) = ρA g L + m g, in three modes."""
-    done = ffrobot.ok("solve", "scene.toml", "--verbose", cwd=folder)
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps(SCENE))
+    done = ffrobot.ok("solve", tmp_path / "scene.toml", "--verbose")
     weight, load, resistance = 7800.0 * 0.04 * 0.02 * 9.81, 3.0 * 9.81, 0.02 * 0.04**2 / 6
     moments = [weight * (2.0 - x) ** 2 / 2 + load * (2.0 - x) for x in (0.0, 1.0)]
-    with h5py.File(folder / "scene.results.h5") as file:
+    with h5py.File(tmp_path / "scene.results.h5") as file:
         points = file["rest/stress/arm/points"]
         assert points["root_top/stress"].shape == (1, 6)
         assert points["root_top/stress"][0, 0] == pytest.approx(moments[0] / resistance, rel=1e-6)

@@ -11,24 +11,18 @@ import tomli_w
 HEIGHTS = "links.rod.geometry.section.diameter=0.004:0.008:3"
 MASSES = "body.crank.rigid.mass=0.03,0.04"
 
-PENDULUM = """
-name = "pendulum"
-gravity = [0.0, -9.81]
-joint = [
-  { name = "A", type = "revolute", between = ["ground", "upper.root"] },
-  { name = "B", type = "revolute", between = ["upper.tip", "lower.root"] },
-]
-initial = { angles = { upper = "-90*deg", lower = "-90*deg" } }
-analysis = [{ name = "at_rest", kind = "linear" }]
-
-[[body]]
-name = "upper"
-rigid = { mass = 1.0, inertia = 1e-9, center = [0.5, 0.0], points = { root = [0.0, 0.0], tip = [0.5, 0.0] } }
-
-[[body]]
-name = "lower"
-rigid = { mass = 1.0, inertia = 1e-9, center = [0.5, 0.0], points = { root = [0.0, 0.0], tip = [0.5, 0.0] } }
-"""
+ROD = {"mass": 1.0, "inertia": 1e-9, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
+PENDULUM = {
+    "name": "pendulum",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": name, "rigid": ROD} for name in ("upper", "lower")],
+    "joint": [
+        {"name": "A", "type": "revolute", "between": ["ground", "upper.root"]},
+        {"name": "B", "type": "revolute", "between": ["upper.tip", "lower.root"]},
+    ],
+    "initial": {"angles": {"upper": "-90*deg", "lower": "-90*deg"}},
+    "analysis": [{"name": "at_rest", "kind": "linear"}],
+}
 
 
 @pytest.fixture
@@ -239,7 +233,7 @@ def test_spectra(ffrobot, tmp_path):
 
     Two point masses m on massless rods l that hang down: ω² = (2 ∓ √2) g/l. Rods of mass would have other numbers.
     """
-    (tmp_path / "scene.toml").write_text(PENDULUM, encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps(PENDULUM), encoding="utf-8")
     asked = [f"at_rest/linear/frequency{one}" for one in (":first", ":last", ":rms", ":max", "[0]:first", "[1]:first")]
     collect = [word for one in asked for word in ("--collect", one)]
     ffrobot.ok("sweep", tmp_path / "scene.toml", "--vary", "gravity.1=-9.81,-1.62", *collect)
