@@ -8,7 +8,6 @@ measured (docs/benchmarks.md); an alarm is half as much again. Repetitions go on
 machine, at most `MOST` rounds: only what is slower rings, not what else the machine does.
 """
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -28,15 +27,8 @@ MOST = 40
 
 
 @pytest.fixture(scope="module")
-def two_link(case_folder):
-    return prepare_scene(case_folder / "scene.toml", Watcher()).model
-
-
-@pytest.fixture(scope="module")
-def case_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("hand_written") / "two_link"
-    shutil.copytree(ROOT / "cases" / "two_link", folder, ignore=shutil.ignore_patterns("*.h5", "*.figures"))
-    return folder
+def two_link(case_copy_of_module):
+    return prepare_scene(case_copy_of_module("two_link"), Watcher()).model
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from scipy.optimize import brentq
 
 from ffrobot.common.errors import SolveError
@@ -20,22 +21,17 @@ AREA, SECOND_MOMENT = HEIGHT * WIDTH, WIDTH * HEIGHT**3 / 12
 G = E / (2 * (1 + NU))
 BENDING_SPEED = np.sqrt(E * SECOND_MOMENT / (RHO * AREA))
 
-RECTANGLE = {"shape": "rectangle", "height": HEIGHT, "width": WIDTH}
+RECTANGLE = rectangle(HEIGHT, WIDTH)
 MESHES = ["uniform", "random"]
 CONDITIONS = ["simply-supported", "cantilever"]
+THEORIES = ["timoshenko", "euler-bernoulli"]
 
 
-def beam(condition, theory="euler-bernoulli", geometry=None):
-    data = {
-        "name": "beam",
-        "material": {"youngs_modulus": E, "poissons_ratio": NU, "density": RHO},
-        "geometry": {"kind": "beam", "length": LENGTH, **(geometry or {"section": RECTANGLE})},
-        "mesh": {"elements": 10},
-        "model": {"theory": theory},
-        "reference": {"condition": condition},
-        "modes": {"count": 3},
-    }
-    return validate(BeamLink, data, Path("beam.toml"))
+def beam(condition, theory="euler-bernoulli", section=RECTANGLE, **geometry):
+    more = {"name": "beam", "model": {"theory": theory}, "modes": {"count": 3}}
+    keys = beam_link(LENGTH, section, 10, E=E, nu=NU, rho=RHO, condition=condition, **more)
+    keys["geometry"] = {key: value for key, value in (keys["geometry"] | geometry).items() if value is not None}
+    return validate(BeamLink, keys, Path("beam.toml"))
 
 
 def nodes_of(kind, elements, breakpoints=(0.0, LENGTH)):
@@ -84,13 +80,9 @@ def test_euler_bernoulli_bending_is_of_order_four(condition, kind):
 
 
 def test_out_of_plane_bending_is_in_plane_bending_of_the_turned_section():
-    mesh = nodes_of("random", 12)
-    turned = {"section": {"shape": "rectangle", "height": WIDTH, "width": HEIGHT}}
-    np.testing.assert_allclose(
-        frequencies(beam("cantilever"), "out-of-plane-bending", mesh),
-        frequencies(beam("cantilever", geometry=turned), "in-plane-bending", mesh),
-        rtol=1e-12,
-    )
+    mesh, turned = nodes_of("random", 12), beam("cantilever", section=rectangle(WIDTH, HEIGHT))
+    expected = frequencies(turned, "in-plane-bending", mesh)
+    np.testing.assert_allclose(frequencies(beam("cantilever"), "out-of-plane-bending", mesh), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", MESHES)
@@ -130,12 +122,11 @@ def test_timoshenko_simply_supported(kind):
 def test_timoshenko_tends_to_euler_bernoulli_as_the_beam_gets_slender():
     differences = []
     for thickness in (0.02, 0.01, 0.005):
-        geometry = {"section": {"shape": "rectangle", "height": thickness, "width": WIDTH}}
-        mesh = nodes_of("uniform", 40)
-        timoshenko = frequencies(beam("cantilever", "timoshenko", geometry), "in-plane-bending", mesh)
-        differences.append(
-            1 - timoshenko / frequencies(beam("cantilever", geometry=geometry), "in-plane-bending", mesh)
+        links = (
+            beam("cantilever", theory, rectangle(thickness, WIDTH)) for theory in ("timoshenko", "euler-bernoulli")
         )
+        timoshenko, bernoulli = (frequencies(link, "in-plane-bending", nodes_of("uniform", 40)) for link in links)
+        differences.append(1 - timoshenko / bernoulli)
     ratios = np.divide(differences[:-1], differences[1:])
     np.testing.assert_allclose(ratios, 4.0, rtol=0.05)  # like thickness²; no locking
 
@@ -188,13 +179,8 @@ def test_stepped_section_against_its_characteristic_equation(kind):
     values = np.array([stepped_cantilever_determinant(omega) for omega in samples])
     signs = np.flatnonzero(np.sign(values[:-1]) != np.sign(values[1:]))[:3]
     exact = np.array([brentq(stepped_cantilever_determinant, samples[i], samples[i + 1], xtol=1e-11) for i in signs])
-    geometry = {
-        "segment": [
-            {"until": STEP, "section": {"shape": "rectangle", "height": THICK, "width": WIDTH}},
-            {"until": LENGTH, "section": RECTANGLE},
-        ]
-    }
-    link = beam("cantilever", geometry=geometry)
+    segments = [{"until": STEP, "section": rectangle(THICK, WIDTH)}, {"until": LENGTH, "section": RECTANGLE}]
+    link = beam("cantilever", section=None, segment=segments)
     order = observed_order(link, "in-plane-bending", exact, kind, coarsest=20, breakpoints=(0.0, STEP, LENGTH))
     assert np.all(order > 3.9), order
 
