@@ -109,8 +109,8 @@ def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
     if not integrated:
         kinds = quoted(sorted({analysis.kind for analysis in scene.analysis}))
         raise InputError(f"{scene.path}: analysis: {wanted}", kinds)
-    if found := next((one for one in integrated if name in (None, one.name)), None):
-        return found
+    if chosen := next((one for one in integrated if name in (None, one.name)), None):
+        return chosen
     if other := next((one for one in scene.analysis if one.name == name), None):
         raise InputError(f'{scene.path}: analysis "{name}": {wanted}', f'kind = "{other.kind}"')
     names = [analysis.name for analysis in integrated]

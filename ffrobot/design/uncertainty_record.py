@@ -185,7 +185,7 @@ class Uncertainty(Finding):
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the ranking of keys for each response, and of the bands."""
-        found: list[Diagram] = []
+        pictures: list[Diagram] = []
         for g, response in enumerate(self.responses):
             order = self.ranked(g)
             series = [Series(values=numbers(100.0 * self.shares[g, order]))]
@@ -202,7 +202,7 @@ class Uncertainty(Finding):
                 labels=tuple(".".join(self.spreads[k].key) for k in order),
                 series=tuple(series),
             )
-            found.append(bars)
+            pictures.append(bars)
         for one in self.bands:
             low, median, high = one.statistics.quantiles
             band = Band(
@@ -212,8 +212,8 @@ class Uncertainty(Finding):
                 high=floats(high), lowest=floats(one.statistics.lowest), highest=floats(one.statistics.highest),
                 band_label=f"{NAMES[0]} to {NAMES[-1]}", worst_label=WORST[self.method],
             )  # fmt: skip
-            found.append(band)
-        return found
+            pictures.append(band)
+        return pictures
 
 
 def with_error(value: float, error: float) -> str:

@@ -110,13 +110,13 @@ def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
     plan = poses.plan
     if plan.turned_about is None:
         return {}
-    angles, found = plan.axes[_turn_axis(poses)].values, {}
+    angles, turns = plan.axes[_turn_axis(poses)].values, {}
     for name in (name for name in poses.values if name.endswith("/milling_depth")):
         depth = np.moveaxis(poses.values[name].reshape(plan.shape), _turn_axis(poses), -1)
         best = np.where(np.isnan(depth), -1.0, depth).argmax(axis=-1)
         largest = np.take_along_axis(depth, best[..., None], axis=-1)[..., 0]
-        found[name.partition("/")[0]] = as_floats(np.where(np.isnan(largest), np.nan, angles[best])), largest
-    return found
+        turns[name.partition("/")[0]] = as_floats(np.where(np.isnan(largest), np.nan, angles[best])), largest
+    return turns
 
 
 CONDITIONS = {"compliant": "compliant gears", "locked": "joints locked"}

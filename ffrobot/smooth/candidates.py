@@ -77,12 +77,12 @@ def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float, kin
     That is the one which settles first of those that keep the limits; where none settles, that which vibrates least.
     """
     search = _Search(robot, before, limits, step)
-    found = [search.simulated(*motion) for motion in search.motions()]
+    made = [search.simulated(*motion) for motion in search.motions()]
 
     def rank(one: Candidate) -> tuple[bool, bool, float, float]:
         return not one.name.startswith(kind), max(one.excess, one.torque) > 1.0, one.settled, one.residual
 
-    return sorted(found, key=rank)
+    return sorted(made, key=rank)
 
 
 Motion = tuple[str, Array, Array, Array | None]
@@ -171,12 +171,12 @@ class _Search:
         self, motions: Sequence[tuple[T, Array]], left: Callable[[Array], float] | None = None
     ) -> tuple[T, Array]:
         """The first that the linear models find good enough; else the best of all."""
-        found = list[float]()
+        residuals = list[float]()
         for motion in motions:
-            found.append((left or self._left)(motion[1]))
-            if found[-1] <= SHARE * self.tolerance:
+            residuals.append((left or self._left)(motion[1]))
+            if residuals[-1] <= SHARE * self.tolerance:
                 return motion
-        return motions[int(np.argmin(found))]
+        return motions[int(np.argmin(residuals))]
 
     def _left(self, values: Array) -> float:
         """Residual vibration (m, peak to peak) by the linear models of all postures, the worst of them."""

@@ -27,30 +27,30 @@ STUBBORN = "controllers have zeros that decay too slowly for inversion"
 COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "at most, by it alone (mm)", "share")
 
 
-def print_smooth(found: Smoothed, console: Console) -> None:
+def print_smooth(smoothed: Smoothed, console: Console) -> None:
     """Lines on the motion as it is, faults, a table of joints, the verdict."""
-    for name, text in _lines(found):
+    for name, text in _lines(smoothed):
         console.print(f"{name:<10} {text}", soft_wrap=True, markup=False)
-    joints, *motions = _tables(found)
+    joints, *motions = _tables(smoothed)
     print_table(console, *joints)
-    console.print(f"verdict    {found.verdict}", soft_wrap=True, markup=False)
+    console.print(f"verdict    {smoothed.verdict}", soft_wrap=True, markup=False)
     for table in motions:
         console.print()
         print_table(console, *table)
 
 
-def write_page(found: Smoothed, motion: Path | None, path: Path) -> None:
+def write_page(smoothed: Smoothed, motion: Path | None, path: Path) -> None:
     """One HTML file: the verdict, faults, tables, the picture."""
-    used = [found.robot.file, *([motion] if motion else [])]
+    used = [smoothed.robot.file, *([motion] if motion else [])]
     part = {
-        "title": f"{found.robot.file.name}: {motion.name if motion else 'trajectories of the scene'}",
-        "mood": "bad" if found.before.residual > found.robot.tolerance else "good",
+        "title": f"{smoothed.robot.file.name}: {motion.name if motion else 'trajectories of the scene'}",
+        "mood": "bad" if smoothed.before.residual > smoothed.robot.tolerance else "good",
         "study": {
-            "headline": found.verdict,
-            "facts": [f"{name}: {text}" for name, text in sorted(_lines(found), key=lambda line: line[0] != "fault")],
-            "tables": _tables(found),
+            "headline": smoothed.verdict,
+            "facts": [": ".join(line) for line in sorted(_lines(smoothed), key=lambda line: line[0] != "fault")],
+            "tables": _tables(smoothed),
         },
-        "pictures": [("the motion before and after", b64encode(picture(found, "svg")).decode())],
+        "pictures": [("the motion before and after", b64encode(picture(smoothed, "svg")).decode())],
     }
     origins = [(str(file), sha256(file.read_bytes()).hexdigest() if file.is_file() else "") for file in used]
     content = {
@@ -61,19 +61,19 @@ def write_page(found: Smoothed, motion: Path | None, path: Path) -> None:
     write_atomically(path, page_of(content).encode(), "report")
 
 
-def _tables(found: Smoothed) -> list[Table]:
-    joints = Table(COLUMNS, list(_rows(found.before)))
-    columns = (*MOTIONS, f"off the path ({found.robot.units()})", "of a limit", "torque")
-    return [joints, *([Table(columns, list(_motions(found)))] if found.candidates else [])]
+def _tables(smoothed: Smoothed) -> list[Table]:
+    joints = Table(COLUMNS, list(_rows(smoothed.before)))
+    columns = (*MOTIONS, f"off the path ({smoothed.robot.units()})", "of a limit", "torque")
+    return [joints, *([Table(columns, list(_motions(smoothed)))] if smoothed.candidates else [])]
 
 
-def _lines(found: Smoothed) -> list[tuple[str, str]]:
-    before, joints = found.before, len(found.before.recording.joints)
-    words = [axis.words for axis in found.robot.servo.axes]
-    each = [f"{joint}: {of}" for joint, of in zip(found.robot.joints, words, strict=True)]
+def _lines(smoothed: Smoothed) -> list[tuple[str, str]]:
+    before, joints = smoothed.before, len(smoothed.before.recording.joints)
+    words = [axis.words for axis in smoothed.robot.servo.axes]
+    each = [f"{joint}: {of}" for joint, of in zip(smoothed.robot.joints, words, strict=True)]
     settling = "no place of rest"
     if of := before.ride.settling:
-        settling = Settled(found.robot.point, before.residual, of.frequency, of.time_to, of.tolerance).in_words
+        settling = Settled(smoothed.robot.point, before.residual, of.frequency, of.time_to, of.tolerance).in_words
     return [
         ("motion", f"{len(before.recording.times)} set points of {joints} joint{'s' * (joints > 1)} over"
          f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
@@ -82,18 +82,18 @@ def _lines(found: Smoothed) -> list[tuple[str, str]]:
         *(("note", remark) for remark in before.recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
         *([("settling", settling)] if before.frequencies.size else []),
-        *([] if found.robot.servo.is_invertible else [("note", STUBBORN)]),
+        *([] if smoothed.robot.servo.is_invertible else [("note", STUBBORN)]),
     ]  # fmt: skip
 
 
-def _motions(found: Smoothed) -> Iterator[tuple[str, ...]]:
-    before = found.before
+def _motions(smoothed: Smoothed) -> Iterator[tuple[str, ...]]:
+    before = smoothed.before
     last, settling = float(before.recording.times[-1]), before.ride.settling
     assert settling is not None
-    own = ("as it is", last, last + settling.time_to, before.residual, 0.0, found.excess, found.torque)
+    own = ("as it is", last, last + settling.time_to, before.residual, 0.0, smoothed.excess, smoothed.torque)
     new = (
         (one.name, one.times[-1], one.settled, one.residual, one.off_path, one.excess, one.torque)
-        for one in found.candidates
+        for one in smoothed.candidates
     )
     for name, duration, settled, residual, off_path, *of_limits in (own, *new):
         parts = (f"{100 * of_limit:.3g} %" if of_limit else "" for of_limit in of_limits)
@@ -113,14 +113,14 @@ WIDE = (2 * SIZE[0], 2.2 * SIZE[1])  # inches
 LEAST = 1e-3  # of the tolerance: what is drawn of distances
 
 
-def picture(found: Smoothed, extension: str) -> bytes:
+def picture(smoothed: Smoothed, extension: str) -> bytes:
     """The file of the picture, "png" or "svg"."""
     with style():
         figure = Figure(figsize=WIDE, layout="constrained")
         grid = figure.add_gridspec(2, 5)
-        _accelerations(figure.add_subplot(grid[0, :3]), found.before, found.robot.units("/s²"))
-        _spectrum(figure.add_subplot(grid[0, 3:]), found.before, found.robot.units("/s"))
-        _distance(figure.add_subplot(grid[1, :]), found)
+        _accelerations(figure.add_subplot(grid[0, :3]), smoothed.before, smoothed.robot.units("/s²"))
+        _spectrum(figure.add_subplot(grid[0, 3:]), smoothed.before, smoothed.robot.units("/s"))
+        _distance(figure.add_subplot(grid[1, :]), smoothed)
         return image_of(literal(figure), extension)
 
 
@@ -144,15 +144,15 @@ def _spectrum(axes: Axes, of: Diagnosis, unit: str) -> None:
     axes.set_xlabel("frequency (Hz)")
 
 
-def _distance(axes: Axes, found: Smoothed) -> None:
-    before, tolerance = found.before, found.robot.tolerance
+def _distance(axes: Axes, smoothed: Smoothed) -> None:
+    before, tolerance = smoothed.before, smoothed.robot.tolerance
     rides = [("as it is", before.recording.times[-1], before.ride)]
-    rides += [(one.name, one.times[-1], one.ride) for one in found.candidates[:1]]
+    rides += [(one.name, one.times[-1], one.ride) for one in smoothed.candidates[:1]]
     for name, last, ride in rides:
         (line,) = axes.plot(ride.times, 1e3 * np.maximum(ride.off, LEAST * tolerance), label=name)
         axes.axvline(last, color=line.get_color(), linewidth=0.8, linestyle=":")
     axes.axhline(1e3 * tolerance, color="0.6", linewidth=0.8, linestyle="--", label="tolerance")
     axes.set_yscale("log")
-    axes.set_title(f"distance of {found.robot.point} from its final place (mm)")
+    axes.set_title(f"distance of {smoothed.robot.point} from its final place (mm)")
     axes.set_xlabel("t (s)")
     axes.legend()

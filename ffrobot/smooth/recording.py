@@ -76,12 +76,12 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     if several := [joint.name for joint in joints if len(joint.units) != 1]:
         raise InputError(f"{scene.path}: expected joints of one coordinate each", quoted(several))
     try:
-        found = [column_of(record.columns, name) for name in names]
+        places = [column_of(record.columns, name) for name in names]
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
-    columns = list(dict.fromkeys(k for k in found if k is not None))
+    columns = list(dict.fromkeys(k for k in places if k is not None))
     if len(columns) < len(names):
-        missing = [name for name, k in zip(names, found, strict=True) if k is None] or names  # one column is no joint's
+        missing = [name for name, k in zip(names, places, strict=True) if k is None] or names  # one is no joint's
         raise InputError(
             f"{path}: expected a column of every joint with a motor (constant where it rests)",
             f"none of {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}",
@@ -124,8 +124,8 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     analysis = Pcid(name="plan", kind="pcid", end=outputs * step, output_step=step)
     solution = solve_scene(scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)}), watcher)
     run, joints = solution.analyses["plan"].run, tuple(joint.name for joint in scene.motor_joints)
-    found = [joint_motion(run, joint) for joint in joints]
-    values = np.column_stack([coordinate for coordinate, _ in filter(None, found)])
+    motions = [joint_motion(run, joint) for joint in joints]
+    values = np.column_stack([coordinate for coordinate, _ in filter(None, motions)])
     return without_rest(Recording(joints, run.time, values, run.time))
 
 
@@ -204,8 +204,8 @@ def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Ite
     of_motion = zip(
         ("speed", "acceleration", "jerk", "torque"), (*peaks(times, values), torque), limits.sizes, strict=True
     )
-    for word, found, of in of_motion:
-        for name, peak, limit in zip(motion.joints, found, of, strict=True):
+    for word, sizes, of in of_motion:
+        for name, peak, limit in zip(motion.joints, sizes, of, strict=True):
             if peak > limit * (1 + KEPT):
                 yield Fault("limit", f"{name}: {word} of up to {peak:.4g}, beyond its limit of {limit:.4g}")
 
@@ -232,13 +232,13 @@ def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
 
 def peaks(times: Array, values: Array) -> Array:
     """Return peaks (3, n) of speed, acceleration and jerk (rad or m, s) of a motion (T, n) from rest to rest."""
-    found, usual = [], float(np.median(np.diff(times)))
+    largest, usual = [], float(np.median(np.diff(times)))
     times = np.concatenate([[times[0] - usual], times, [times[-1] + usual]])
     values = np.vstack([values[:1], values, values[-1:]])
     for _ in range(3):
         times, values = difference_quotients(times, values)
-        found.append(np.abs(values).max(axis=0))
-    return np.array(found)
+        largest.append(np.abs(values).max(axis=0))
+    return np.array(largest)
 
 
 def _jumps(name: str, unit: str, times: Array, values: Array) -> Iterator[Fault]:

@@ -169,8 +169,8 @@ class Robot:
 
     def _coordinates(self, run: Run) -> Array:
         """(T, n) of joints behind their gears."""
-        found = (joint_motion(run, joint) for joint in self.joints)
-        return np.column_stack([coordinate for coordinate, _ in filter(None, found)])
+        motions = (joint_motion(run, joint) for joint in self.joints)
+        return np.column_stack([coordinate for coordinate, _ in filter(None, motions)])
 
     def _lowest(self, path: Piecewise) -> float:
         """Hz, of the posture in which the robot starts."""
@@ -190,6 +190,6 @@ class Robot:
         end = np.ceil(end / output_step * (1 - ROUND_OFF)) * output_step
         analysis = Pcid(name=RUN, kind="pcid", end=end, output_step=output_step, tolerance=TOLERANCE)
         scene = self._scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)})
-        found = run_analyses(unsolved(replace(self._prepared, scene=scene)), self._watcher).analyses[RUN].run
-        found.check_completed("")
-        return found
+        run = run_analyses(unsolved(replace(self._prepared, scene=scene)), self._watcher).analyses[RUN].run
+        run.check_completed("")
+        return run

@@ -130,7 +130,7 @@ def fitted(frequency: Array, response: ComplexArray) -> Axis:
     def off(x: Array, pairs: int) -> Array:
         return (axis(x, pairs).at(s) - response).view(float)
 
-    found = list[tuple[float, Axis]]()
+    fits = list[tuple[float, Axis]]()
     for pairs in PAIRS:
         start = np.concatenate([np.log(1.5) * np.arange(pairs), np.full(pairs, np.log(0.7)), np.zeros(2 * pairs - 1)])
         start[-1] = 0.01
@@ -140,10 +140,10 @@ def fitted(frequency: Array, response: ComplexArray) -> Axis:
         fit = scipy.optimize.least_squares(partial(off, pairs=pairs), start, bounds=(low, high), x_scale="jac")
         error = float(np.sqrt(2 * fit.cost / len(s)))
         words = f"measured: {2 * pairs} poles, delay {1e3 * fit.x[-1] / unit:.3g} ms, off by {100 * error:.2g} % (RMS)"
-        found.append((error, axis(fit.x, pairs, words)))
+        fits.append((error, axis(fit.x, pairs, words)))
         if error < CLOSE:
             break
-    return min(found, key=lambda one: one[0])[1]
+    return min(fits, key=lambda one: one[0])[1]
 
 
 ROUNDED = 9  # digits of times (s) of delayed set points
