@@ -16,10 +16,9 @@ from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
 from ...mbs.model.body import Body
 from ...mbs.model.build import build_model
-from ...mbs.model.constraints import MET
 from ...mbs.model.gears import elastic_joints, resistance, with_compliance
 from ...mbs.model.kinematics import ZERO
-from ...mbs.model.model import Model
+from ...mbs.model.model import MET, Model
 from ...mbs.model.nodes import rows_of_joint
 from ...mbs.model.system import MultibodySystem
 from ...mbs.posture.posture import mobility

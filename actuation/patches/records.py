@@ -12,7 +12,7 @@ from ...common.errors import quoted
 from ...common.keys import MOST_PATCHES, SMALLEST
 from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
-from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
+from ...mbs.fields.spelling import IN_SPACE, Spelled
 from ...mbs.model.amplifiers import MOST_PLAYS, Amplifiers
 from .lamina import Fibres, Lamina, fibre_lamina, plain_lamina
 from .voltage_records import Amplifier, HysteresisKeys
@@ -72,7 +72,7 @@ class PztLayout(Record):
     """Permittivity along the field at constant stress, F/m, for the capacitance; default: that of PZT-5A."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     """Number of stacked layers."""
-    face: Annotated[Face | None, Spelled(Literal["+y", "-y", "both"], as_written)] = None
+    face: Annotated[Face | None, Spelled(Literal["+y", "-y", "both"])] = None
     """Face of the link; without it patches only bend or twist the link."""
     allocation: Literal["exact", "least-squares"] = "exact"
     """Allocation of voltages: exact, or least squares, which allows fewer patches than modes."""

@@ -19,8 +19,7 @@ from ..common.errors import SolveError
 from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.operating_points import locked_motors
-from ..mbs.joints.joint import GearedJoint
-from ..mbs.joints.twist_spring import stiffer
+from ..mbs.joints.joint import GearedJoint, stiffer
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
 from ..mbs.model.build import build_model

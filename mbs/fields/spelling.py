@@ -41,10 +41,10 @@ def _reader(spelling: Any) -> TypeAdapter[Any]:
 
 @dataclass(frozen=True)
 class Spelled:
-    """Annotation of a field that planar scenes write as type `spelling`; `in_3d` converts such values to 3D."""
+    """Annotation of a field that planar scenes write as type `spelling`; `in_3d`, if any, converts values to 3D."""
 
     spelling: Any
-    in_3d: Callable[[Any], Any]
+    in_3d: Callable[[Any], Any] | None = None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_wrap_validator_function(self._read, handler(source))
@@ -52,7 +52,8 @@ class Spelled:
     def _read(self, value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if not is_planar(info):
             return handler(as_tuples(value))
-        return self.in_3d(_reader(self.spelling).validate_json(json.dumps(value), context=info.context))
+        read = _reader(self.spelling).validate_json(json.dumps(value), context=info.context)
+        return read if self.in_3d is None else self.in_3d(read)
 
 
 class NormalInPlane(OnlyIn):
@@ -87,11 +88,6 @@ class TaggedInPlane:
 
         marks = {"tags_in_plane": tags}
         return core_schema.with_info_wrap_validator_function(read, handler(source), metadata=marks)
-
-
-def as_written(value: Any) -> Any:
-    """Return a value unchanged, for fields that planar and 3D scenes write equally."""
-    return value
 
 
 def place(x_y: Sequence[float]) -> tuple[float, float, float]:

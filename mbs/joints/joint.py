@@ -28,8 +28,75 @@ from ..fields.field_types import (
     loaded_reference,
     split_point,
 )
-from ..fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Spelled, Vector, as_written
-from .twist_spring import StiffnessSteps
+from ..fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Spelled, Vector
+
+
+class StiffnessSteps(Record):
+    """Stiffness in steps of the torque, as catalogs of strain-wave gears list it: K1, K2, K3 with torques T1, T2."""
+
+    values: tuple[Positive, ...] = Field(min_length=1)
+    """Slopes of the torque over the twist, N·m/rad, one more than `torques`."""
+    torques: tuple[Positive, ...] = ()
+    """Torques at the joint from which on the next value counts, N·m, in rising order."""
+
+    @model_validator(mode="after")
+    def _fit(self) -> Self:
+        if len(self.values) != len(self.torques) + 1:
+            raise ValueError(
+                f"expected one value more than torques, found {len(self.values)} values and {len(self.torques)} torques"
+            )
+        if any(np.diff(self.torques) <= 0.0):
+            raise ValueError(f"expected torques in rising order, found {list(self.torques)}")
+        return self
+
+
+def stiffer(stiffness: float | StiffnessSteps, factor: float) -> float | StiffnessSteps:
+    """Return the key `stiffness` of a spring with `factor` times the slopes, its steps at the same torques."""
+    if not isinstance(stiffness, StiffnessSteps):
+        return factor * stiffness
+    return stiffness.model_copy(update={"values": tuple(factor * K for K in stiffness.values)})
+
+
+@struct
+class TwistSpring:
+    """Torque of a twist, odd and piecewise linear."""
+
+    slopes: tuple[float, ...]  # N·m/rad, from no twist on; one of a linear spring
+    knots: tuple[float, ...] = ()  # rad, the twists from which on the next slope counts
+
+    @classmethod
+    def of(cls, stiffness: float | StiffnessSteps) -> "TwistSpring":
+        """Make the spring from the key `stiffness` of a joint."""
+        if not isinstance(stiffness, StiffnessSteps):
+            return cls((stiffness,))
+        parts = np.diff(stiffness.torques, prepend=0.0) / stiffness.values[:-1]
+        return cls(stiffness.values, tuple(np.cumsum(parts).tolist()))
+
+    @property
+    def torques(self) -> tuple[float, ...]:
+        """Torques at the knots, N·m."""
+        steps = np.diff(self.knots, prepend=0.0) * np.array(self.slopes[:-1])
+        return tuple(np.cumsum(steps).tolist())
+
+    def moment(self, twist: Array) -> Array:
+        """Return torques (…,), N·m, of twists (…,), rad."""
+        return _piecewise(twist, self.slopes, self.knots)
+
+    def twist(self, moment: Array) -> Array:
+        """Return twists (…,), rad, under torques (…,), N·m."""
+        return _piecewise(moment, tuple(1.0 / k for k in self.slopes), self.torques)
+
+    def slope(self, twist: Array) -> Array:
+        """Return stiffness (…,), N·m/rad, at twists (…,), rad."""
+        return np.array(self.slopes)[np.searchsorted(self.knots, np.abs(twist))]
+
+
+def _piecewise(x: Array, slopes: tuple[float, ...], knots: tuple[float, ...]) -> Array:
+    size = np.abs(x)
+    total = slopes[0] * size
+    for knot, change in zip(knots, np.diff(slopes), strict=True):
+        total = total + change * np.maximum(size - knot, 0.0)
+    return np.copysign(total, x)
 
 
 class MotorLimits(NamedTuple):
@@ -213,11 +280,6 @@ class JointRecord(Record):
         return False
 
     @property
-    def asks_for_motor(self) -> bool:
-        """Whether the scene sets `motor = true`."""
-        return bool(getattr(self, "motor", False))
-
-    @property
     def motor_limits(self) -> tuple[MotorLimits, ...]:
         """Limits of the motor for each coordinate, N·m, rad/s, W or N, m/s, W."""
         return ()
@@ -244,7 +306,7 @@ class JointRecord(Record):
         return tuple(key for key in keys if getattr(self, key, None))
 
 
-Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
+Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive)]
 Range = tuple[Quantity, Quantity]
 
 
@@ -253,7 +315,7 @@ class MovingJoint(JointRecord):
 
     motor: bool | None = None
     """Presence of motors; by default in open chains only, and not in spherical and free joints."""
-    position_limit: Annotated[Range | tuple[Range, ...] | None, Spelled(Range, as_written)] = None
+    position_limit: Annotated[Range | tuple[Range, ...] | None, Spelled(Range)] = None
     """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts beyond it; a warning has
     time and size of the excess."""
     moment_limit: Limit | None = None

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..joints.joint import Friction, GearedJoint
-from ..joints.twist_spring import TwistSpring
+from ..joints.joint import Friction, GearedJoint, TwistSpring
 from ..scene.analysis import Analysis
 from .drives import Drive
 from .model import Model

@@ -17,7 +17,7 @@ from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .kinematics import CutPlace, Markers, ModelParts, Placed, rows_of
 from .model import Model
 from .nodes import Section
-from .plane import Plane, in_plane
+from .projection import Plane, in_plane
 
 
 class Integrated(NamedTuple):

@@ -21,9 +21,8 @@ from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, quoted
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
-from ..joints.joint import Friction, JointRecord
+from ..joints.joint import Friction, JointRecord, TwistSpring
 from ..joints.joints import FreeJoint, PlanarJoint
-from ..joints.twist_spring import TwistSpring
 from ..scene.mechanism import MechanismScene
 from ..scene.topology import Topology
 from .body import Body, rigid_body

@@ -179,7 +179,7 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
 
 def _check_motors(model: Model, seen: Mobility) -> Iterator[str]:
     motors = {name: len(columns) for name, columns in model.motors.items()}
-    count, named = sum(motors.values()), any(joint.asks_for_motor for joint in model.scene.joint)
+    count, named = sum(motors.values()), any(getattr(joint, "motor", None) for joint in model.scene.joint)
     if count > seen.freedom or (count < seen.freedom and named and model.scene.is_planar):
         raise InputError(
             f"{model.scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"

@@ -10,8 +10,7 @@ from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ...common.toml_files import toml_line
 from ..fields.field_types import split_point
-from ..model.constraints import MET
-from ..model.model import Model
+from ..model.model import MET, Model
 from ..model.nodes import Node
 from ..scene.mechanism import MechanismKeys
 from ..scene.space import SPACES

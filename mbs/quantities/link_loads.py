@@ -20,7 +20,7 @@ from ..model.masses import turns_as_a_body
 from ..model.motors import split_forces
 from ..model.nodes import Section
 from ..run.record import Run
-from ..scene.bodies import Payload, tensor
+from ..scene.bodies import tensor
 from .motion import acting_forces, places, system_of
 from .supply import behind_gears
 
@@ -64,7 +64,10 @@ def _link_loads(run: Run, bodies: Iterable[str], forces: MotionForces) -> dict[s
         for payload in run.model.scene.payload:
             body, point = split_point(payload.point)
             if body == name and not turns_as_a_body(run.model.scene, payload):  # others are bodies of their own
-                at_points[point] = at_points.get(point, 0.0) + _of_mass(run, payload, F)
+                of_point = acting_forces(run).of_point(payload.point)
+                force = -payload.mass * (of_point.a - gravity)
+                on_point = _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))  # it turns about z alone
+                at_points[point] = at_points.get(point, 0.0) + on_point
         a, alpha, omega = forces.of_body(number)
         # The d'Alembert forces of the frame's motion
         a, alpha, omega = np.hsplit(_in_axes_of(F, (a - gravity, alpha, omega)), 3)
@@ -90,10 +93,3 @@ def _at_points(F: Array, acting: Iterable[tuple[Section, Wrench]]) -> dict[str, 
 def _in_axes_of(F: Array, vectors: Iterable[Array]) -> Array:
     """Vectors (T, 3) side by side, from global axes to those of a triad F (T, 3, 3)."""
     return np.hstack([np.einsum("tji,tj->ti", F, x) for x in vectors])
-
-
-def _of_mass(run: Run, payload: Payload, F: Array) -> Array:
-    """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
-    of_point = acting_forces(run).of_point(payload.point)
-    force = -payload.mass * (of_point.a - np.array(run.model.scene.gravity))
-    return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))

@@ -100,8 +100,7 @@ def continuous(e: Array) -> Array:
     return e * signs[:, None]
 
 
-def motion_of_link(run: Run, link: LinkInPieces) -> BodyMotion:
-    """Return the motion of the frame of the whole link, and of the modes of its file."""
+def _motion_of_link(run: Run, link: LinkInPieces) -> BodyMotion:
     x = link.modal.stations.position[:, 0]
     sections = _sections(run, link, x)
     root, tip = sections[int(np.argmin(x))], sections[int(np.argmax(x))]
@@ -239,7 +238,7 @@ def node_of(run: Run, body: str) -> Node:
 
 @kept
 def _links(run: Run) -> dict[str, BodyMotion]:
-    return {name: motion_of_link(run, link) for name, link in run.links.items()}
+    return {name: _motion_of_link(run, link) for name, link in run.links.items()}
 
 
 def body_motion(run: Run, name: str) -> BodyMotion:

@@ -33,13 +33,6 @@ def reactions(run: Run) -> Mapping[str, Wrench]:
     return _carried(run, acting_forces(behind), behind.q)
 
 
-def reactions_of_loops(run: Run, forces: Array) -> Mapping[str, Wrench]:
-    """Return reactions of forces (T, loop rows), N or N·m, along the rows that close loops."""
-    multipliers = np.zeros_like(run.multipliers)
-    multipliers[:, run.model.loop_rows] = -forces
-    return _carried(run, multiplier_forces(system_of(run), run.q, run.time, multipliers), run.q)
-
-
 def _carried(run: Run, forces: MotionForces, q: Array) -> dict[str, Wrench]:
     """By joint what it carries but does no work along it; q (T, n) are those of the tree of `forces`."""
     wrenches, model = dict[str, Wrench](), run.model
@@ -98,7 +91,12 @@ def shared_evenly(run: Run) -> tuple[Run, Sharing | None]:
     if redundant == 0:
         return run, None
     null = B @ (np.linalg.eigh(J @ J.swapaxes(1, 2))[1][:, :, :redundant] / row_scales[:, None])  # ascending
-    changes = [_side_by_side(run, reactions_of_loops(run, column)) for column in null.transpose(2, 0, 1)]
+    changes = []
+    for column in null.transpose(2, 0, 1):
+        alone = np.zeros_like(run.multipliers)
+        alone[:, is_loop] = -column
+        forces = multiplier_forces(system_of(run), run.q, run.time, alone)
+        changes.append(_side_by_side(run, _carried(run, forces, run.q)))
     basis = np.stack(changes, axis=-1)  # (T, components, redundant)
     even = -np.einsum("tkc,tc->tk", np.linalg.pinv(basis), _side_by_side(run, reactions(run)))
     multipliers = run.multipliers.copy()

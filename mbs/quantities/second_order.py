@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, as_floats
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 
@@ -147,7 +147,10 @@ def missing_to_first_order(
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)
-    at = _worst_outputs(loads, p)
+    # Outputs whose Δp, or whose −½ pᵀK p, may be the largest
+    energy = np.sqrt((p**2 * loads.stiffness).sum(axis=1))
+    sizes = np.sqrt(loads.squares) * energy, energy
+    at = np.unique(np.concatenate([np.argsort(-of)[:OUTPUTS] for of in sizes]))
     S = np.tensordot(loads.f[at], loads.K, axes=1)
     stiffness = np.diag(loads.stiffness) + S
     if loads.support is not None:
@@ -201,14 +204,6 @@ def largest_rotations(link: ModalBody, p: Array) -> Rotations:
 def largest_displacement(link: ModalBody, p: Array) -> float:
     """Return the largest displacement of stations over p (T, n), √kg·m, of the file, relative to the length."""
     return _largest(p, link.stations.translation) / link.length
-
-
-def _worst_outputs(loads: ModalLoads, p: Array) -> Indices:
-    """Indices of outputs whose Δp, or whose −½ pᵀK p, may be the largest."""
-    energy = np.sqrt((p**2 * loads.stiffness).sum(axis=1))
-    at = [np.argsort(-values)[:OUTPUTS] for values in (np.sqrt(loads.squares) * energy, energy)]
-    outputs: Indices = np.unique(np.concatenate(at))
-    return outputs
 
 
 def _largest(p: Array, shapes: Array) -> float:

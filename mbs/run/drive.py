@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_list
+from ...common.errors import InputError
 from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
@@ -33,8 +34,17 @@ from ..posture.posture import (
 from ..posture.reach import out_of_reach
 from ..posture.start import rank_of_redundant_loops
 from ..scene.analysis import IntegratedAnalysis
-from .integrator_choice import TOO_STIFF, choose_integrator, fastest_friction
-from .integrators import EXPLICIT, Choice, beyond_round_off, integration_controls, unmet, with_steps_of
+from .integrators import (
+    EXPLICIT,
+    REPEATED,
+    TOO_STIFF,
+    Choice,
+    beyond_round_off,
+    choose_integrator,
+    fastest_friction,
+    integration_controls,
+    unmet,
+)
 from .record import Continuation, Run, Statistics
 from .samples import LOOKS, about_highest, in_order, new_samples, reached_samples, some_of, telling
 from .stops import ENDS, stops
@@ -117,15 +127,24 @@ class _Integration:
 
     def begin(self, start: State, earlier: Run | None, undeformed: Array | None, *, is_recorded: bool) -> None:
         """Choose the integrator, go on from an `earlier` run, and have the core watch limits and postures."""
-        is_sampled = self.control is not None
-        choose = partial(choose_integrator, self.system, self.analysis, start, self.times, is_sampled=is_sampled)
-        self.integrator = with_steps_of(self.analysis, float(self.times[-1]), choose)
-        continuation = None
+        analysis, times, is_sampled, continuation = self.analysis, self.times, self.control is not None, None
+        if (steps := analysis.repeat_steps) is not None:
+            if steps.ends[-1] != times[-1]:
+                raise InputError(
+                    f'{steps.path}: analysis "{analysis.name}": repeat_steps: expected steps up to {times[-1]:.9g} s,'
+                    " where the run ends",
+                    f"them up to {steps.ends[-1]:.9g} s",
+                )
+            self.integrator = Choice(steps.method, REPEATED)
+        else:
+            self.integrator = choose_integrator(self.system, analysis, start, times, is_sampled=is_sampled)
+            if analysis.keep_steps and self.integrator.name in EXPLICIT:
+                self.integrator = self.integrator._replace(candidates=())
         if earlier is not None:  # with the same candidates, and what they have become since
             known, continuation = earlier.statistics.integrator, earlier.continuation
             self.integrator = self.integrator._replace(name=known.name, reason=known.reason)
         if continuation is None:
-            samples = new_samples(self.times, self.analysis, len(start.q) + len(start.v))
+            samples = new_samples(times, analysis, len(start.q) + len(start.v))
             continuation = Continuation(_core.TreeCheckpoint(), _core.Recording() if is_recorded else None, samples)
         model, (_, scene, rows) = self.system.model, self.system.integrated
         self.continuation, self.loop_rank = continuation, None

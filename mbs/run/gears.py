@@ -18,7 +18,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, quoted
 from ...common.libraries import scipy
-from ..joints.twist_spring import TwistSpring
+from ..joints.joint import TwistSpring
 from ..model.gears import compliance, elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.model import Model

@@ -16,12 +16,7 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.model import Model
-from ..model.motors import (
-    driven_mechanism,
-    frames_in_core,
-    integrated_mechanism,
-    path_forces,
-)
+from ..model.motors import driven_mechanism, frames_in_core, integrated_mechanism, path_forces
 from ..model.nodes import ConstraintRow
 from ..model.projection import EXACT
 from ..model.system import MultibodySystem

@@ -8,7 +8,7 @@ from ...common.errors import quoted
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Expressions, PointReference, Referring, one_of, only, present
 from ..fields.functions import StateForce
-from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
+from ..fields.spelling import IN_SPACE, Spelled, is_planar, keys_here
 
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
@@ -37,7 +37,7 @@ class Load(Referring):
     """Moment about the ground's y axis on the section, N·m; expression in t."""
     mz: Annotated[Expression | None, IN_SPACE] = None
     """Moment about the ground's z axis on the section, N·m; expression in t."""
-    moment: Annotated[Expressions | None, Spelled(Expression, as_written)] = None
+    moment: Annotated[Expressions | None, Spelled(Expression)] = None
     """Torque on the second side of the joint (of a compliant gear: on its output, before the spring) along its
     coordinate, N·m (N along sliding coordinates); expression in t, or a list of them for several coordinates. In planar
     scenes also the counter-clockwise moment on a point."""

@@ -26,11 +26,12 @@ from ..fields.field_types import (
     Vector3,
     WaypointTable,
     one_of,
+    only,
     present,
 )
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ..fields.paths import SMOOTHNESS, Legs, PathLimits, Piecewise, impulses, path_of, shaped
-from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
+from ..fields.spelling import IN_SPACE, Spelled, is_planar, keys_here
 from ..fields.waypoints import Waypoints
 
 Place = Quantity | tuple[Quantity, ...]
@@ -186,7 +187,7 @@ ORIENTATIONS = ("rotation_vector", "rpy", "direction")
 POSE = 6
 OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
 """How `via` of a point is written, by the number of components."""
-OfPlane = Annotated[Place, Spelled(Quantity | tuple[Quantity, Quantity], as_written)]
+OfPlane = Annotated[Place, Spelled(Quantity | tuple[Quantity, Quantity])]
 Triple = tuple[Expression, Expression, Expression]
 
 
@@ -245,11 +246,8 @@ class Trajectory(MotionKeys):
         if self.axis is not None and (self.angle is None or not any(self.axis)):
             raise ValueError(f'expected the key "axis" only with angle, a direction, found {list(self.axis)}')
         allowed = keys_here(self, (*PLACES, *ORIENTATIONS), info) if subject == "point" else ("value",)
-        given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints", "via") if getattr(self, key) is not None]
-        if not given or not set(given) <= {*allowed, "waypoints", "via"}:
-            raise ValueError(
-                f'expected the keys {quoted((*allowed, "waypoints", "via"))} with "{subject}", found {quoted(given)}'
-            )
+        tables = ("waypoints", "via")
+        given = only(self, subject, (*allowed, *tables), (*PLACES, *ORIENTATIONS, "value", *tables))
         if self.waypoints is not None:
             self._check_columns(given, allowed)
         if self.via is not None and set(given) & {*PLACES, "value"}:

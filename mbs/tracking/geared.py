@@ -17,7 +17,7 @@ from ...common.arrays import Array, Indices, as_list
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from ..inversion.servo import Servo
-from ..joints.twist_spring import TwistSpring
+from ..joints.joint import TwistSpring
 from ..model.gears import compliance, elastic_joints
 from ..model.known_motion import rotor_torques
 from ..model.model import Model

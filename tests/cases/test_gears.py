@@ -10,7 +10,7 @@ from tables_3d import ORIGIN, revolute
 
 import ffrobot
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.joints.twist_spring import TwistSpring
+from ffrobot.mbs.joints.joint import TwistSpring
 from ffrobot.mbs.run.gears import GearSpring, gear_motion
 
 J, N, K = 3e-3, 9.0, 500.0

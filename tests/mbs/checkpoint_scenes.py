@@ -9,6 +9,7 @@ import scene_of
 from checkpoint_mechanisms import load
 from random_mechanisms import Tree
 from rotations import logarithm
+from scipy.spatial.transform import Rotation
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.build import build_model
@@ -29,11 +30,7 @@ def checkpoint_scene(name, tolerance=1e-8):
 
 def rpy(C):
     """Roll, pitch, yaw of C = R_z R_y R_x."""
-    return [
-        float(np.arctan2(C[2, 1], C[2, 2])),
-        float(-np.arcsin(np.clip(C[2, 0], -1, 1))),
-        float(np.arctan2(C[1, 0], C[0, 0])),
-    ]
+    return Rotation.from_matrix(C).as_euler("xyz").tolist()
 
 
 def joint_table(joint, turned):

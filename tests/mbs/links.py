@@ -72,10 +72,7 @@ def quintic(start, end, duration=1.0):
 
 
 def arm_links(EI=30.0, **keys):
-    return [
-        ritz_link("link1", "simply-supported", EI=4 * EI, **keys),
-        ritz_link("link2", "cantilever", EI=EI, **keys),
-    ]
+    return [ritz_link("link1", "simply-supported", EI=4 * EI, **keys), ritz_link("link2", "cantilever", EI=EI, **keys)]
 
 
 def arm(links=None, **keys):

@@ -39,11 +39,7 @@ def body_mass_matrix(body, A, p):
     at, n = inertia(body, p), body.n_modes
     coupled = -A @ skew(at.s)
     return np.block(
-        [
-            [body.mass * np.eye(3), coupled, A @ at.s_p],
-            [coupled.T, at.J, at.h],
-            [(A @ at.s_p).T, at.h.T, np.eye(n)],
-        ]
+        [[body.mass * np.eye(3), coupled, A @ at.s_p], [coupled.T, at.J, at.h], [(A @ at.s_p).T, at.h.T, np.eye(n)]]
     )
 
 

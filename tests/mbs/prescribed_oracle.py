@@ -8,14 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import tree_oracle
-from body_equations import (
-    absolute_accelerations,
-    absolute_states,
-    accelerated,
-    mechanism_of,
-    required_forces,
-    triad,
-)
+from body_equations import absolute_accelerations, absolute_states, accelerated, mechanism_of, required_forces, triad
 from row_wrenches import spin_of_modes
 from tree_oracle import row_values
 from triad_measures import Along, Dot, Way

@@ -15,10 +15,7 @@ FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.5, "friction_speed": 
 
 
 def geared_arm(links=None, first=GEARED, second=GEARED, **keys):
-    joints = [
-        revolute("O", "ground", "link1.root", **first),
-        revolute("A", "link1.tip", "link2.root", **second),
-    ]
+    joints = [revolute("O", "ground", "link1.root", **first), revolute("A", "link1.tip", "link2.root", **second)]
     return arm(links, joint=joints, **keys)
 
 

@@ -10,7 +10,7 @@ from rods import rod
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.inversion.motors_only import MotorsOnly
-from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
+from ffrobot.mbs.joints.joint import StiffnessSteps, TwistSpring
 from ffrobot.mbs.linear.joint_conditions import joint_conditions
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.gears import with_compliance

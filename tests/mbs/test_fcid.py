@@ -92,9 +92,7 @@ def test_static_shape_sags_as_in_closed_form():
     EI, mass = 5e3, 1.3
     link = ritz_link("link1", "cantilever", EI=EI, mass=mass, modes=8, extra=0)
     model = make_model(
-        [link],
-        joint=[revolute("O", "ground", "link1.root")],
-        trajectory=[{"name": "hold", "joint": "O", "value": "0"}],
+        [link], joint=[revolute("O", "ground", "link1.root")], trajectory=[{"name": "hold", "joint": "O", "value": "0"}]
     )
     outcome = run(model, fcid("static"))
     sag = outcome.q[:, 3:] @ link.points["tip"].translation[1]

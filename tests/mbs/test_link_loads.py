@@ -12,10 +12,7 @@ from oracle_runs import run
 from ffrobot.mbs.quantities.link_loads import loads_on_links
 
 MECHANISMS = (*("mixed backwards", "four-bar", "tree", "mixed, as built", "slider-crank, as built"),)
-LOADS = (
-    {"point": "link2.mid", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"},
-    {"joint": "A", "moment": "4*sin(5*t)"},
-)
+LOADS = ({"point": "link2.mid", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"}, {"joint": "A", "moment": "4*sin(5*t)"})
 
 
 def link_loads(outcome, bodies):

@@ -72,8 +72,7 @@ def test_quaternions_keep_their_norm(method):
 
 
 @pytest.mark.parametrize(
-    ("method", "tolerance"),
-    [("dopri5", 1e-8), ("dop853", 1e-10), ("radau", 1e-8), ("generalized_alpha", 1e-4)],
+    ("method", "tolerance"), [("dopri5", 1e-8), ("dop853", 1e-10), ("radau", 1e-8), ("generalized_alpha", 1e-4)]
 )
 def test_adaptive_steps_and_their_outputs(exact, method, tolerance):
     """The tolerance is relative: to a radian, and to the largest rate."""

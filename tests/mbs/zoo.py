@@ -70,10 +70,7 @@ def mixed_backwards(rng, **keys):
 
 def four_bar(rng, **keys):
     """A closed loop of revolute joints that follows an angle of its rocker; the motor sits at the crank."""
-    joints = [
-        *serial_joints(3),
-        revolute("j4", "b3.tip", "ground", at=(1.2, 0.1)),
-    ]
+    joints = [*serial_joints(3), revolute("j4", "b3.tip", "ground", at=(1.2, 0.1))]
     joints[0]["motor"] = True
     trajectory = [{"name": "rocker", "angle": "b3.side", "value": "-1.4+0.5*t+t**2"}]
     initial = {"angles": {"b1": 1.3, "b2": 0.1, "b3": -1.4}}

@@ -24,8 +24,7 @@ from ...mbs.model.model import Model
 from ...mbs.model.nodes import Node
 from ...mbs.model.system import MultibodySystem
 from ...mbs.posture.start import undeformed_posture
-from ...mbs.run.integrator_choice import integrator_of
-from ...mbs.run.integrators import METHODS
+from ...mbs.run.integrators import METHODS, integrator_of
 from ...run.mode_search import mode_levels
 from ...run.prepare import prepare_scene, with_bodies
 from ...run.prepared import Prepared
