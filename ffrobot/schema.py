@@ -160,8 +160,8 @@ def _is_noise(key: str, item: object, node: dict[str, Any]) -> bool:
 def key_descriptions(record: type[BaseModel]) -> dict[str, str]:
     """Meaning and unit of each key of `record` as files write it, those of its base classes included.
 
-    They are read from the source, when they are asked for: pydantic's `use_attribute_docstrings` would do so whenever a
-    scene is loaded. Of a key that tells which record a table is, such as `kind`, it is the first line about the record.
+    Read from the source here: pydantic's `use_attribute_docstrings` would do so whenever a scene is loaded. Of a key
+    that tells which record a table is, such as `kind`, it is the first line about the record.
     """
     texts: dict[str, str] = {}
     for cls in reversed(record.__mro__):

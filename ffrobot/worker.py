@@ -1,11 +1,10 @@
 """A process that solves scenes one after the other: `python -m ffrobot.worker`, for runs of sweeps and designs.
 
-It loads the program once, and forks for every scene: what a run does to its process (a crash, memory, the folder it is
-in, modules and caches that a scene's Python functions leave) ends with that run, and a run finds what one of
-`ffrobot solve` finds. Modal bodies that two runs have read, later ones find in memory. Requests and answers are lines
-of JSON on the standard streams, `{"arguments": ["solve", …]}` and `{"code": 0, "imported": {}}`, the exit code as
-`subprocess` has it and the run's `python_files.imported_files`. What runs print on the error stream goes where this
-process's does.
+It loads the program once, and forks for every scene: what a run does to its process (a crash, memory, folder, modules
+and caches of a scene's Python functions) ends with that run. Modal bodies that two runs have read, later ones find in
+memory. Requests and answers are lines of JSON on the standard streams, `{"arguments": ["solve", …]}` and
+`{"code": 0, "imported": {}}`, the exit code as `subprocess` has it and the run's `python_files.imported_files`. The
+error stream is that of this process.
 """
 
 from __future__ import annotations
@@ -143,7 +142,7 @@ def _fork() -> int:
 
 
 def _load(names: Sequence[str]) -> None:
-    """Modules, and with MODULE:RECORD validators of records; what one fails of, the run that needs it says."""
+    """Load modules, and with MODULE:RECORD build validators; where one fails, the run that needs it says why."""
     for name in names:
         module, _, record = name.partition(":")
         with suppress(Exception):

@@ -197,8 +197,8 @@ def _rows(joint: str, rated: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]
 def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTask]]:
     """Yield the load of each joint with one coordinate and a motor, without the scene's rotor.
 
-    Accelerations are derivatives of a cubic spline through the rates at outputs. Peaks of the torque between outputs
-    count: the load is scaled by their ratio to the largest output.
+    Accelerations are those of a cubic spline through the rates at outputs. Torques are scaled by the ratio of their
+    peak between outputs to the largest output.
     """
     time = results[f"{analysis}/time"]
     for joint in results.scene.get("joint", ()):

@@ -37,7 +37,7 @@ def folded(lines: Iterable[str]) -> Iterator[str]:
 
 
 def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> Table:
-    """Return a table without lines: the first `names` columns are left-aligned and fold, the others are numbers."""
+    """A table without lines: the first `names` columns are text and fold, the others are numbers."""
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)

@@ -28,10 +28,9 @@ Row = tuple[str, ...]
 def summary_lines(
     verdict: Verdict, notes: Sequence[str], accuracy: str, results: str, width: int, printed: int = 0
 ) -> list[str]:
-    """Return the summary in `width` columns, at most `LINES` lines less those already `printed`.
+    """The summary in `width` columns, at most `LINES` lines less those already `printed`.
 
-    What has no room is counted, and left to `--verbose`. `notes` stand below warnings; `accuracy` and `results` (the
-    name of the file) come last.
+    What has no room is counted. `notes` stand below warnings; `accuracy` and the name of the `results` come last.
     """
     of_analyses = [_analysis(one) for one in verdict.analyses]
     remarks: list[str] = []
@@ -124,9 +123,9 @@ def _labelled(label: str, texts: Iterable[str]) -> Iterator[str]:
 
 
 def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
-    """Wrap texts by label into the remaining lines of the screen: the first of each label, then a count of the rest.
+    """Wrap texts into `room` lines: the first of each label, then others, vibrations last; a count of the rest.
 
-    The first of all ends early where it has more lines than the first of another label leaves. Vibrations come last.
+    The first of all ends early where it has more lines than the first of another label leaves.
     """
     if not texts or room < 1:
         return []

@@ -101,7 +101,7 @@ class Datasets:
 
     @contextmanager
     def on_disk(self) -> Iterator[Path]:
-        """Path of the results file; a temporary file for results in memory."""
+        """Context with the path of the results file; of results in memory of a temporary one."""
         if not self._in_memory:
             yield self.path
             return
@@ -149,7 +149,7 @@ class Datasets:
         return dataset in self._file
 
     def __getitem__(self, dataset: str) -> Array:
-        """Dataset with its shape in the file. Raises `InputError` if absent."""
+        """Dataset with its shape in the file, in SI units. Raises `InputError` if absent."""
         item = self._file.get(dataset)
         self.asked.add(dataset)
         if isinstance(item, h5py.Group):
@@ -168,7 +168,7 @@ class Datasets:
         return self[f"{analysis}/control/time" if inside[:1] == ["control"] else f"{analysis}/time"]
 
     def data(self, name: str) -> Array:
-        """A dataset as (T, columns), or one of its columns, `name[k]`, as (T, 1). Raises `InputError` if absent."""
+        """A dataset in SI units as (T, columns), or one column, `name[k]`, as (T, 1). Raises `InputError` if absent."""
         match = COLUMN.fullmatch(name)
         dataset = match["dataset"] if match else name
         values = self[dataset]
@@ -181,7 +181,7 @@ class Datasets:
         return values[:, k : k + 1]
 
     def peak(self, name: str) -> tuple[float, float]:
-        """The largest size of a history and when it has that, s, between outputs if the file has that.
+        """The largest size of a history, in its unit, and when it has that, s; between outputs if the file has that.
 
         Of all columns, of one of them, `name[k]`, or of the length of a deflection or a reaction.
         """

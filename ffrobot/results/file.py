@@ -150,10 +150,9 @@ class Results(Datasets):
         return list(known[analysis])
 
     def columns(self, analysis: str) -> dict[str, Array]:
-        """All histories of an analysis, one (T,) array each.
+        """All histories of an analysis, one (T,) array in SI units each.
 
-        The name is the dataset's inside the analysis, with the column where it has several:
-        `points/link2.tip/position[0]`.
+        Named as in the analysis, with the column where there are several: `points/link2.tip/position[0]`.
         """
         by_label: dict[str, Array] = {}
         for name in self.histories(analysis):
@@ -164,7 +163,7 @@ class Results(Datasets):
         return by_label
 
     def frame(self, analysis: str) -> DataFrame:
-        """Histories of an analysis as a pandas DataFrame, indexed by time (s)."""
+        """Histories of an analysis (see `columns`) as a pandas DataFrame, indexed by time (s)."""
         with extras():
             from pandas import DataFrame
 

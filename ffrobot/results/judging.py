@@ -61,9 +61,9 @@ def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> Too
 
 
 def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
-    """Yield each point of a replay with its largest and RMS distance (m) from the path, over their common time.
+    """Yield each point of a replay with its largest and RMS distance (m) from its given path, over their common time.
 
-    Of points whose path was given, along the axes for which it was; of old files at outputs that both have.
+    Along the axes for which the path was given; of old files at outputs that both have.
     """
     if "off_path" in group:
         for one in group["off_path"].values():

@@ -78,7 +78,7 @@ def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | 
 
 
 def at_rest_in_words(group: h5py.Group) -> str:
-    """Natural frequencies with motors at rest, and the least stiffness of a point, at the first time of an analysis."""
+    """Natural frequencies with motors at rest and the least stiffness, at the first time of an analysis, as text."""
     if not any(key.startswith("joints_") for key in group):
         return ""
     from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, translational_stiffness

@@ -79,9 +79,9 @@ def _of_joint(result: AnalysisResult, joint: JointRecord, place: str) -> Iterato
 
 
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:
-    """Largest value of all columns, or of one, and its time, s; from the outputs where the file stores no peak.
+    """Largest size of all columns, or of one, in the dataset's unit, and its time, s.
 
-    That is so of a component of a vector, whose length has a peak, and of files without peaks.
+    From the outputs where the file has no peak: of a component of a vector, whose length has one, and in old files.
     """
     peaks, times = (np.atleast_1d(dataset.attrs.get(key, ())) for key in ("peak", "peak_time"))
     if len(peaks) and (column is None or len(peaks) == np.prod(dataset.shape[1:])):
@@ -95,9 +95,9 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
 
 
 def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], outputs: Indices) -> None:
-    """Write `histories` at `time` (T,), s: values at outputs, and peaks over all times.
+    """Write `histories` (T, …) at `time` (T,), s: values at outputs, and of all times the attributes of peaks.
 
-    Attributes `peak`, `peak_time`, `rms`, `mean` are of every column, of vectors of the length.
+    These are `peak`, `peak_time`, `rms`, `mean` of every column, of vectors of the length.
     """
     weights = shares(time)
     for name, values in histories.items():

@@ -1,7 +1,7 @@
 """Going on with a run that was stopped, from its results file.
 
-On Ctrl-C and where `max_steps` is used up, the results file keeps what the next step depends on. Analyses for which
-that can be done (`is_resumable`) go on from there, or are taken over where they are complete; all others are run again.
+On Ctrl-C and where `max_steps` is used up, the results file keeps what the next step depends on. Analyses that allow
+it (`is_resumable`) go on from there, or are taken over where they are complete; all others are run again.
 """
 
 from __future__ import annotations
@@ -24,10 +24,8 @@ from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
 from ..common.version import VERSION
 from ..mbs import _core
-from ..mbs.model.model import Model
 from ..mbs.run.integrators import Choice
 from ..mbs.run.record import Continuation, Run, Statistics
-from ..mbs.scene.analysis import Analysis
 from ..run.bodies import LoadedBody
 from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.prepare import prepare_scene, unsolved
@@ -42,7 +40,7 @@ STOPPED = ("interrupted", "too many steps", "not evaluated")
 
 
 def how_to_go_on(solution: Solution, command: str) -> str:
-    """Return the part of a message that states how to resume a stopped run; empty if it cannot be resumed."""
+    """The part of a message on how to resume a stopped run with `command`; empty without one."""
     if not command:
         return ""
     outcome = stopped(solution)
@@ -139,40 +137,31 @@ COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 
 
 def earlier_runs(file: Results, solution: Solution) -> dict[str, Run]:
-    """The kept runs of the analyses of a solution, by name.
-
-    A run that was stopped before its first step begins anew: what acts on it may not have been known yet.
-    """
+    """The kept runs of the analyses of a solution, by name; one stopped before its first step begins anew."""
     runs = {}
-    for one in solution.scene.analysis:
-        about = file.attributes(one.name) if file.has(f"{one.name}/{GROUP}") else None
-        if about is not None and (about["steps"] > 0 or about["status"] == "completed"):
-            runs[one.name] = _earlier_run(file, one, solution.model)
+    for analysis in solution.scene.analysis:
+        name, group = analysis.name, f"{analysis.name}/{GROUP}"
+        about = file.attributes(name) if file.has(group) else None
+        if about is None or (about["steps"] == 0 and about["status"] != "completed"):
+            continue
+        counts = {count: about[count].item() for count in COUNTS}
+        ends = file[f"{name}/step_ends"] if file.has(f"{name}/step_ends") else np.zeros(0)
+        choice = Choice(about["integrator"], about["integrator_reason"])
+        kept: dict[str, Any] = {
+            key: kind.of_bytes(file[f"{group}/{key}"].astype(np.uint8).tobytes())
+            for key, kind in KEPT.items()
+            if file.has(f"{group}/{key}")
+        }
+        states: dict[str, Any] = {row: file[f"{group}/{row}"] for row in ROWS}
+        runs[name] = Run(
+            analysis=analysis,
+            model=solution.model,
+            time=file.time(name),
+            statistics=Statistics(about["status"], choice, **counts, step_ends=ends),
+            continuation=Continuation(**kept),
+            **states,
+        )
     return runs
-
-
-def _earlier_run(file: Results, analysis: Analysis, model: Model) -> Run:
-    name, about, group = analysis.name, file.attributes(analysis.name), f"{analysis.name}/{GROUP}"
-    q, v, a, multipliers = (file[f"{group}/{row}"] for row in ROWS)
-    counts = {count: about[count].item() for count in COUNTS}
-    ends = file[f"{name}/step_ends"] if file.has(f"{name}/step_ends") else np.zeros(0)
-    choice = Choice(about["integrator"], about["integrator_reason"])
-    kept: dict[str, Any] = {
-        key: kind.of_bytes(file[f"{group}/{key}"].astype(np.uint8).tobytes())
-        for key, kind in KEPT.items()
-        if file.has(f"{group}/{key}")
-    }
-    return Run(
-        analysis=analysis,
-        model=model,
-        time=file.time(name),
-        q=q,
-        v=v,
-        a=a,
-        multipliers=multipliers,
-        statistics=Statistics(about["status"], choice, **counts, step_ends=ends),
-        continuation=Continuation(**kept),
-    )
 
 
 def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Keep | None = None) -> Solution | None:

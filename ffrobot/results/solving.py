@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import tomllib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from ..common.errors import SolveError, StoppedError
 from ..common.files import check_output
 from ..common.outputs import protected
-from ..run.inputs import files_of_tables
+from ..run.inputs import named_files
 from ..run.result import Solution
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
@@ -25,11 +26,11 @@ def solve_and_keep(
 ) -> Solution | None:
     """Run the analyses of a scene, which go on from the file `path` with `resume`, and write that file where given.
 
-    It is written before an error is raised: all of it, or what is `wanted` (see `Solution`). `again`: the command that
-    resumes the run; empty without a file. None where nothing is left to run. Raises as `solve_scene`, and
-    `StoppedError` where a signal has cut a run short.
+    Before an error is raised, too: all of it, or what is `wanted`. `again`: the command that resumes the run. None
+    where nothing is left to run. Raises as `solve_scene`, and `StoppedError` where a signal has cut a run short.
     """
-    inputs, kept = files_of_tables(scene.path, scene.text), list[Solution]()
+    inputs = [scene.path, *named_files(tomllib.loads(scene.text), scene.path.parent)]
+    kept: list[Solution] = []
     if path is not None:
         with protected(inputs):
             check_output(path, FORMAT)

@@ -55,7 +55,7 @@ class Actuation:
 
 
 def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
-    """Return patches by body. Raises `InputError` for layouts that do not fit link or analyses."""
+    """Patches by body. Raises `InputError` for layouts that do not fit link or analyses."""
     if not scene.pzt:
         return {}
     from ..actuation.patches.link_patches import check_reach, link_patches, on_kept_modes
@@ -83,7 +83,7 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
 
 
 def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
-    """Yield the drives of voltages that the scene prescribes for patches, behind their hysteresis."""
+    """Drives by the voltages that the scene prescribes for patches, behind their hysteresis."""
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
     for number, load in enumerate(scene.load, 1):
         if load.pzt is not None:
@@ -129,7 +129,7 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
 
 
 def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:
-    """Find voltages for the modal forces of a motion, as nearly as patches can, and the requirements on actuators.
+    """Find voltages (V) for the modal forces of a motion, as nearly as patches can, and judge all actuators.
 
     Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
     """

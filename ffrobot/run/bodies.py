@@ -77,7 +77,7 @@ P = TypeVar("P", Payload, Tool)
 def _records_on(
     kind: str, records: Iterable[P], body: str, points: Collection[str], scene: Path
 ) -> Iterator[tuple[str, P]]:
-    """Payloads or tools (`kind`) of a body with their points. Raises `InputError` for a point that it does not have."""
+    """Payloads or tools (`kind`) of a body with their points. Raises `InputError` for points that it lacks."""
     for record in records:
         name, point = split_point(record.point)
         if name != body:
@@ -93,9 +93,8 @@ def _records_on(
 def load_bodies(scene: Scene, stage: Callable[[str], None]) -> dict[str, LoadedBody]:
     """Load bodies by name in the order of the scene, with payloads and patches; runs stage 1 for outdated links.
 
-    They have geometric stiffening where the scene, or the key `pieces` of the body, may put it into the equations.
-
-    Raises `InputError` for files that are none, and payloads and patches that do not fit.
+    With geometric stiffening where the scene, or their key `pieces`, may put it into the equations. Raises `InputError`
+    for files that are none, and payloads and patches that do not fit.
     """
     patches = dict(by_body(scene.pzt))
     with of_file(scene.path):

@@ -1,8 +1,8 @@
 """Time scaling: the fastest motion along a path at which motors and patches keep their limits.
 
-The first inverse analysis of the scene judges, with flexible links, friction and gears; what is sought is one factor of
-the times of all legs (`stretch`). A slower motion is taken to be easier: that is so but for vibrations that one
-duration excites more than another, and the motion that is found has been solved for and keeps the limits in any case.
+The first inverse analysis of the scene judges; one factor of the times of all legs (`stretch`) is sought. A slower
+motion is taken to be easier, which is so but for vibrations; the motion that is found has been solved for and keeps the
+limits in any case.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..common.errors import InputError, quoted
 from ..mbs.joints.joint import MotorLimits
-from ..mbs.linear.vibration import PathFrequencies, frequencies_along
+from ..mbs.linear.vibration import frequencies_along
 from ..mbs.model.model import Model
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.trajectories import Shaper
@@ -34,7 +34,7 @@ KEPT = 1.0 + 1e-9  # times a limit
 
 @dataclass
 class Search:
-    """Tried motions by stretch: the largest ratio of requirement to limit, and the actuator it belongs to."""
+    """Tried motions by stretch: the largest ratio of requirement to limit, and its actuator."""
 
     scene: Scene
     analysis: TimedAnalysis
@@ -54,7 +54,7 @@ class Search:
 
 
 def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
-    """Stretch the scene's paths by the least factor (to 0.5 %) that keeps all limits; returned with the findings.
+    """The scene with its paths stretched by the least factor (to 0.5 %) that keeps all limits, and a note on it.
 
     Raises `InputError` where nothing has a limit, no analysis can judge, or the run is too short for any such motion.
     """
@@ -108,7 +108,7 @@ def stretched(scene: Scene, stretch: float) -> Scene:
 
 
 def judging(scene: Scene) -> TimedAnalysis:
-    """The first inverse analysis. Raises `InputError` where there is none, or nothing to judge by."""
+    """The first inverse analysis of a scene. Raises `InputError` where there is none, or nothing to judge by."""
     where = f"{scene.path}: trajectory {_names(scene)}: fastest"
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
     if not inverse:
@@ -164,8 +164,14 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
         paths = [path for one in scene.trajectory if (path := one.path) is not None]
         begin, end = min(path.begin for path in paths), max(path.end for path in paths)
         frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
-        notes += [f"{name}: {_in_words(shaper, frequencies)}" for name, shaper in asking.items()]
-        shapers = {name: _for_robot(shaper, frequencies) for name, shaper in asking.items()}
+        shapers = {}
+        for name, shaper in asking.items():  # for the mean frequencies and damping along the path
+            f, ratio = frequencies.frequency[:, : shaper.modes], shaper.damping_ratio
+            ranges = (f"{one.mean():.4g} Hz ({one.min():.4g} to {one.max():.4g} along the path)" for one in f.T)
+            notes.append(f"{name}: {shaper.kind} shaper for {', '.join(ranges)}")
+            mean = float(frequencies.damping_ratio[:, : shaper.modes].mean())
+            damping_ratio, frequency = mean if ratio is None else ratio, tuple(f.mean(axis=0).tolist())
+            shapers[name] = Shaper(kind=shaper.kind, frequency=frequency, damping_ratio=damping_ratio)
         changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
         scene = scene.model_copy(update={"trajectory": tuple(changed)})
     if any(trajectory.fastest for trajectory in scene.trajectory):
@@ -173,16 +179,3 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
         scene, note = fastest(scene, judge)
         notes.append(note)
     return scene, tuple(notes)
-
-
-def _for_robot(shaper: Shaper, frequencies: PathFrequencies) -> Shaper:
-    """The shaper for the mean frequencies and damping along the path."""
-    frequency = tuple(frequencies.frequency[:, : shaper.modes].mean(axis=0).tolist())
-    damping_ratio = float(frequencies.damping_ratio[:, : shaper.modes].mean())
-    given = shaper.damping_ratio
-    return Shaper(kind=shaper.kind, frequency=frequency, damping_ratio=damping_ratio if given is None else given)
-
-
-def _in_words(shaper: Shaper, frequencies: PathFrequencies) -> str:
-    ranges = (f"{f.mean():.4g} Hz ({f.min():.4g} to {f.max():.4g} along the path)" for f in frequencies.frequency.T)
-    return f"{shaper.kind} shaper for {', '.join(list(ranges)[: shaper.modes])}"

@@ -83,7 +83,7 @@ def _finer_scene(solution: Solution) -> Scene:
 
 
 def _check(solution: Solution, source: Run, finer: Solution, watcher: Watcher) -> FinerCheck:
-    """Replay `source`, a run of `solution`, on the same robot with finer links: moments of motors, voltages."""
+    """Apply torques and voltages of `source`, a run of `solution`, to the same robot with finer links."""
     given, end = source.analysis, float(source.time[-1])
     assert isinstance(given, TimedAnalysis)
     analysis = Forward(
@@ -114,10 +114,7 @@ def _check(solution: Solution, source: Run, finer: Solution, watcher: Watcher) -
 
 
 def _start(source: Run, finer: Model) -> State:
-    """Where the source starts: on its trajectories, or of motors alone with their coordinates.
-
-    Links are in equilibrium there, or undeformed where those of the source are.
-    """
+    """Where the source starts: on its trajectories, or at the coordinates of its motors; links as bent as there."""
     nodes = source.model.tree.nodes
     if any(row.is_trajectory for row in source.model.rows):
         model = resolved(finer, source.analysis.last_time)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ PROGRAM = "ffrobot"
 
 
 def named_files(data: Any, folder: Path) -> Iterator[Path]:
-    """Collect the files that tables from a file in `folder` name, and those named by link files among them."""
+    """Yield the files that tables from a file in `folder` name, and those that link files among them name."""
     for key, file in _named(data, folder):
         yield from files_with_included(file)
         if key == "link":  # whose own links, which are none, are not followed: they might lead in a circle
@@ -45,7 +44,7 @@ def python_files(tables: Mapping[str, Any], folder: Path) -> list[Path]:
 
 
 def read_tables(path: Path) -> dict[str, Any]:
-    """Read a TOML file; empty where it cannot be read, an error reported elsewhere."""
+    """Tables of a TOML file; empty where it cannot be read, which others refuse."""
     try:
         return parse_toml(read_text(path, "file"), path, "file")
     except InputError:
@@ -53,13 +52,8 @@ def read_tables(path: Path) -> dict[str, Any]:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The scene or link file at `path` and all files that it is made from, as far as they can be found."""
+    """The scene or link file at `path` and all files that it names, as far as they can be found."""
     return [path, *named_files(read_tables(path), path.parent)]
-
-
-def files_of_tables(path: Path, text: str) -> list[Path]:
-    """Return the path of a scene with the TOML `text`, and all files that it names."""
-    return [path, *named_files(tomllib.loads(text), path.parent)]
 
 
 def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:

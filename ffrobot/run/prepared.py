@@ -144,7 +144,11 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     if rigid:
         yield f"modal coordinates of {', '.join(rigid)}, rigid"
     yield "out-of-plane motion"
-    stiff = [name for name in flexible if _is_rigid_along(of[name])]
+    stiff = []  # no force at a point moves any point along the axis, where joints and weight load it
+    for name in flexible:
+        along, across, _ = zip(*(point.translation for point in of[name].points.values()), strict=True)
+        if np.abs(along).max(initial=0.0) <= RIGID * np.abs(across).max(initial=0.0):
+            stiff.append(name)
     if stiff:
         yield f"axial deformation of {', '.join(stiff)}: no axial modes in [modes] family"
     for term, symbol in _TERMS.items():
@@ -155,13 +159,6 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     algebraic = [analysis.name for analysis in scene.analysis if analysis.is_algebraic]
     if algebraic:
         yield f"integration of {', '.join(algebraic)}, algebraic"
-
-
-def _is_rigid_along(body: Body) -> bool:
-    """Whether no force at a point moves any point of the link along its axis, where joints and weight load it."""
-    along = [point.translation[0] for point in body.points.values()]
-    across = [point.translation[1] for point in body.points.values()]
-    return bool(np.abs(along).max(initial=0.0) <= RIGID * np.abs(across).max(initial=0.0))
 
 
 def _modes(name: str, body: Body, modal: ModalBody) -> Iterator[str]:

@@ -39,9 +39,9 @@ LOOSEST = 1e-6  # tolerance of the simulations: open-loop arms add up errors
 
 @struct
 class Deviations:
-    """Largest distance (m) of the tip from the computed motion, by lane, of each cause; NaN where that has no meaning.
+    """Largest distance (m) of the tip from the computed motion, by lane, of each cause.
 
-    Infinite where the simulation ended early. `bandwidth` (rad/s): of the joint controller.
+    NaN where that has no meaning, infinite where the simulation ended early. `bandwidth` (rad/s): of the controller.
     """
 
     causes: tuple[str, ...]
@@ -59,7 +59,7 @@ def robust(scene: Scene) -> Scene:
 
 
 def deviations(context: ActuatedContext, source: Run) -> Deviations:
-    """Return the robustness table of a run."""
+    """The robustness table of a run `source`, simulated again for each cause."""
     asked: Robustness = source.analysis.robustness  # type: ignore[attr-defined]
     held = f"zero-order hold of {1e3 * asked.sample_time:g} ms"
     runs, nominal = _Runs(context, source, asked), context.model

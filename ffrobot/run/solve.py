@@ -43,14 +43,11 @@ def solve_scene(
     keep: Keep | None = None,
     wanted: frozenset[str] | None = None,
 ) -> Solution:
-    """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
+    """Run every analysis of a scene or a scene file; stage 1 runs first for links that are out of date.
 
-    Shapers for the robot's frequencies and the fastest motion are found first (see `fastest`).
-    With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
-
-    An analysis that does not reach its end is kept as far as it got, and ends the run (`Run.check_completed`).
-    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised. Nothing is evaluated
-    for the results file but what is `wanted` (see `Solution`).
+    An analysis that does not reach its end, or is stopped by Ctrl-C, is kept as far as it got and ends the run
+    (`Run.check_completed`). `keep` gets what there is before an error is raised. Nothing is evaluated for the results
+    file but what is `wanted` (see `Prepared`).
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
@@ -89,7 +86,7 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
 
 
 def _with_deviations(solution: Solution, interruption: Interruption) -> Solution:
-    """The solution with what is left of completed motions where the robot is not its model, where that is asked for."""
+    """The solution with the robustness tables that its analyses ask for, of completed motions."""
     results, failure = dict(solution.analyses), solution.failure
     for name, result in solution.analyses.items():
         if getattr(result.analysis, "robustness", None) is None or result.status != "completed":
@@ -107,7 +104,7 @@ def _with_deviations(solution: Solution, interruption: Interruption) -> Solution
 
 
 def _with_enough_modes(solution: Solution, interruption: Interruption) -> Solution:
-    """The scene solved with as many modes as its tolerances need: see `mode_search`."""
+    """The scene solved with as many modes as its tolerances need."""
     search = ModeSearch(solution.scene, solution.bodies)
     while True:
         solution = _completed(with_bodies(solution, search.bodies), interruption)
@@ -151,7 +148,7 @@ def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Fea
 
 
 def _completed(solution: Solution, interruption: Interruption) -> Solution:
-    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
+    """All analyses run; all of them again with geometric stiffening where its "auto" finds that they need it."""
     completed = _run_all(solution, interruption)
     completed = completed or _run_all(unsolved(replace(solution, stiffened=True)), interruption)
     assert completed is not None

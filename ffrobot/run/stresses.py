@@ -36,9 +36,9 @@ def find_stresses(
 ) -> dict[str, BodyStress]:
     """Compute stresses (Pa) of a run by body; those of links in pieces from their pieces, which are among `bodies`.
 
-    By mode acceleration where files and loads allow it. By mode displacement of links that patches stiffen otherwise
-    than by bending in the plane, and of pieces with such patches, as static stresses of their files are those of the
-    bare link; and of those on which forces act elsewhere than at interfaces.
+    By mode acceleration where files and loads allow it, else by mode displacement: of links on which forces act
+    elsewhere than at interfaces, and of those that patches stiffen otherwise than by bending in the plane, and pieces
+    of these, as static stresses of files are those of the bare link.
     """
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None and has_stresses(body.modal)}
     stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}

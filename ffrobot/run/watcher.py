@@ -32,11 +32,9 @@ class Watcher:
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
-    `watcher.stopping` is called at once. While `at_once` is set, by analyses that have no outputs yet, the first one
-    interrupts as usual, too; `keeps` says whether analyses before them have results.
-
-    Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
-    Signals reach the main thread only: in any other the context does nothing.
+    Otherwise `KeyboardInterrupt` would come anywhere, in calls from the core too, and lose the outputs so far. While
+    `at_once` is set, by analyses without outputs yet, the first one interrupts, too; `keeps`: analyses before them have
+    results. Signals reach the main thread only: in any other the context does nothing.
     """
 
     at_once = keeps = False

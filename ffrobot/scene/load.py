@@ -68,7 +68,7 @@ def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
 
 
 def load_robot(path: Path) -> Scene:
-    """The scene in a file as `load_scene` reads it; without an analysis, too, as an import writes it."""
+    """The scene in a file as `load_scene` reads it; it may lack analyses, as an import writes it."""
     data, rest = load_toml(path, "scene file"), [{"name": "rest", "kind": "static"}]
     scene = validated_scene({"analysis": rest} | data, path, read_text(path, "scene file"))
     return scene if "analysis" in data else scene.model_copy(update={"analysis": ()})
@@ -138,7 +138,7 @@ def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
 
 
 def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
-    """Return `data` where forward analyses without `end` or `output_step` have those of their actuation."""
+    """`data` with `end` and `output_step` of their actuation in forward analyses without these."""
     try:
         sources = {analysis["name"]: analysis for analysis in data["analysis"]}
         analyses = []
@@ -154,7 +154,7 @@ def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def problems(scene: SceneKeys) -> Iterator[str]:
-    """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
+    """Lines on everything in the scene that refers to something that does not exist or does not fit."""
     yield from _all_duplicates(scene)
     yield from _reference_problems(scene)
     yield from _guess_problems(scene)
@@ -287,21 +287,15 @@ def _guess_problems(scene: SceneKeys) -> Iterator[str]:
                 )
 
 
-def _commanded(analysis: Analysis) -> Iterator[str]:
-    """Names of inputs that controllers of an analysis list."""
-    for record in getattr(analysis, "controller", ()):
-        inputs = getattr(record, "inputs", ())
-        yield from () if isinstance(inputs, str) else inputs
-
-
 def _load_problems(scene: SceneKeys) -> Iterator[str]:
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
     passive = [layout.label for layout in scene.pzt if not layout.is_driven]
-    for analysis, name in ((one, name) for one in scene.analysis for name in _commanded(one)):
-        if name.removeprefix("pzt/").rpartition("/")[0] in passive:
-            yield f'analysis "{analysis.name}": inputs: expected patches {DRIVEN}, found "{name}"'
     shunted = [layout.label for layout in scene.pzt if layout.shunt is not None]
     for analysis in scene.analysis:
+        of_controllers = (getattr(one, "inputs", ()) for one in getattr(analysis, "controller", ()))
+        for name in (name for inputs in of_controllers if not isinstance(inputs, str) for name in inputs):
+            if name.removeprefix("pzt/").rpartition("/")[0] in passive:
+                yield f'analysis "{analysis.name}": inputs: expected patches {DRIVEN}, found "{name}"'
         for sensor in getattr(analysis, "sensor", ()):
             if sensor.pzt in shunted:
                 expected = "patches without a shunt, over which their charge flows off"
@@ -328,7 +322,7 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
 
 
 def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
-    """What acts between the interfaces of a link: modal body files hold no geometric stiffness of such loads."""
+    """Of loads between the interfaces of a link modal body files have no geometric stiffness."""
     if not scene.geometric_stiffening:
         return
     for points in scene.actuation_points if scene.is_planar else ():

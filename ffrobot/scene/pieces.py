@@ -38,7 +38,7 @@ class BodyInPieces:
 
 
 def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
-    """The bodies of a scene with the key `pieces` that are cut in more than one, by name; `counts` of all of them.
+    """Divide bodies of a scene into `counts` pieces, by name; those in one piece are left out.
 
     Raises `InputError` where a link or the scene allows no pieces.
     """

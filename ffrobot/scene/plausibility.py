@@ -33,7 +33,7 @@ OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a l
 
 
 def remarks(scene: Scene) -> Iterator[str]:
-    """Yield remarks on a valid scene, one line each: units of links, bodies and tools, angles, times of paths."""
+    """Yield remarks on a valid scene, one line each: on units, angles, times of paths."""
     links: dict[str, Link] = {}
     for body in scene.body:
         if body.link is not None:
