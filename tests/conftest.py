@@ -1,5 +1,6 @@
 """The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
 
+import ctypes
 import fcntl
 import json
 import os
@@ -12,6 +13,7 @@ import tomllib
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -332,6 +334,20 @@ analysis = [{ name = "inverse", kind = "pcid", end = 0.02, output_step = 0.002 }
     )
     ffrobot.ok("solve", "scene.toml", cwd=folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def compiled(tmp_path_factory):
+    """What `numba.cfunc` returns, as far as it is looked at, of a function in C by its name."""
+
+    def make(name, source):
+        folder = tmp_path_factory.mktemp(name)
+        (folder / f"{name}.c").write_text(f"#include <math.h>\n{source}\n", encoding="utf-8")
+        subprocess.run(["gcc", "-shared", "-fPIC", "-o", "it.so", f"{name}.c", "-lm"], cwd=folder, check=True)
+        library = ctypes.CDLL(str(folder / "it.so"))
+        return SimpleNamespace(library=library, address=ctypes.cast(library[name], ctypes.c_void_p).value)
+
+    return make
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Tables of scenes in 3D as tests of all parts write them: rigid bodies, joints, a scene."""
+"""Tables of scenes as tests of all parts write them: rigid bodies, joints, a scene in 3D or in the plane."""
 
 ORIGIN = [0.0, 0.0, 0.0]
 DOWN = [0.0, 0.0, -9.81]
@@ -21,5 +21,14 @@ def revolute(name, inner, outer, axis=Z, **keys):
 
 
 def scene(bodies, joints, *analyses, gravity=DOWN, **tables):
-    found = {"name": "scene", "space": "spatial", "gravity": gravity, "body": bodies, "joint": joints}
-    return found | {"analysis": list(analyses)} | tables
+    return planar(bodies, joints, *analyses, gravity=gravity, space="spatial", **tables)
+
+
+def planar(bodies, joints, *analyses, gravity=(0.0, -9.81), **tables):
+    found = {"name": "scene", "gravity": list(gravity), "body": bodies, "joint": joints, "analysis": list(analyses)}
+    return found | tables
+
+
+def pin(name, inner, outer, **keys):
+    """A revolute joint of a planar scene."""
+    return joint(name, "revolute", inner, outer, **keys)

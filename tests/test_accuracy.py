@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from exact_rod import rigidities, tip_of
+from tables_3d import joint, scene
 
 import ffrobot as library
 
@@ -35,13 +36,10 @@ def solved(height, width, force, moment, body, keys, condition="cantilever", at=
     free, turned = ("tip", 0.0) if at == "root" else ("root", np.pi)
     link = beam_link(LENGTH, rectangle(height, width), 16, E=E, nu=NU, rho=1e-3, condition=condition, name="rod")
     load = dict(zip(("x", "y", "z", "mx", "my", "mz"), map(str, (*force, *moment)), strict=True))
-    scene = library.make_scene(
-        name="rod", space="spatial", gravity=[0.0, 0.0, 0.0],
-        body=[{"name": "rod", "link": link, **body}],
-        joint=[{"name": "clamp", "type": "weld", "between": ["ground", f"rod.{at}"], "rpy": [0.0, 0.0, turned]}],
-        load=[{"point": f"rod.{free}", **load}], analysis=[{"name": "rest", "kind": "static"}], **keys,
-    )  # fmt: skip
-    results = library.solve(scene)
+    clamp = joint("clamp", "weld", "ground", f"rod.{at}", rpy=[0.0, 0.0, turned])
+    rest, keys = {"name": "rest", "kind": "static"}, keys | {"load": [{"point": f"rod.{free}", **load}]}
+    tables = scene([{"name": "rod", "link": link, **body}], [clamp], rest, gravity=[0.0, 0.0, 0.0], **keys)
+    results = library.solve(library.make_scene(**tables))
     tip = results[f"rest/points/rod.{free}/position"][-1] - [LENGTH, 0.0, 0.0]
     return tip, results.attributes("rest/bodies/rod")
 

@@ -7,6 +7,7 @@ extrapolated; Pinocchio's algorithms for the dynamics, SciPy's Radau for the tim
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from tables_3d import revolute, scene
 
 import ffrobot
 
@@ -44,10 +45,8 @@ ARMS = {
 
 
 def link(name, damping, length, height, width, E, density):
-    return beam_link(
-        length, rectangle(height, width), 16, E=E, nu=0.3, rho=density, name=name,
-        damping={"rayleigh": [0.0, damping]}
-    )  # fmt: skip
+    damping = {"rayleigh": [0.0, damping]}
+    return beam_link(length, rectangle(height, width), 16, E=E, nu=0.3, rho=density, name=name, damping=damping)
 
 
 def solved(arm, **keys):
@@ -63,25 +62,19 @@ def solved(arm, **keys):
     s = f"(where(t < {arm['time']}, t/{arm['time']}, 1))"
     mass, center, inertia = arm["payload"]
     end = arm["time"] + 0.15
-    scene = ffrobot.make_scene(
-        name="arm",
-        space="spatial",
+    tables = scene(
+        [{"name": "a", "rigid": first}, *flexible],
+        [revolute(name, *side, axis) for name, side, axis in zip(NAMES, sides, arm["axes"], strict=True)],
+        {"name": "run", "kind": "pcid", "end": end, "output_step": end / OUTPUTS, "tolerance": 1e-7},
         gravity=arm["gravity"],
-        body=[{"name": "a", "rigid": first}, *flexible],
-        joint=[
-            {"name": name, "type": "revolute", "between": between, "axis": axis}
-            for name, between, axis in zip(NAMES, sides, arm["axes"], strict=True)
-        ],
         payload=[{"point": "c.tip", "mass": mass, "center": center, "inertia": inertia}],
         initial={"state": "static", "joints": dict(zip(NAMES, arm["start"], strict=True))},
         trajectory=[
             {"name": f"of {name}", "joint": name, "value": f"{q} + {way}*(10*{s}**3 - 15*{s}**4 + 6*{s}**5)"}
             for name, q, way in zip(NAMES, arm["start"], arm["way"], strict=True)
         ],
-        analysis=[{"name": "run", "kind": "pcid", "end": end, "output_step": end / OUTPUTS, "tolerance": 1e-7}],
-        **keys,
     )
-    return ffrobot.solve(scene)
+    return ffrobot.solve(ffrobot.make_scene(**tables | keys))
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ is, and with steel itself (sag 1.6 %) makes 2e-3 of a moment between any frame o
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from tables_3d import joint, pin, planar
 
 import ffrobot
 
@@ -30,34 +31,23 @@ def bodies(conditions, lengths):
     return [{"name": f"l{k}", "link": link(f"l{k}", *pair)} for k, pair in enumerate(pairs, 1)]
 
 
-def solved(folder, **keys):
-    return ffrobot.solve(ffrobot.make_scene(folder=folder, name="robot", gravity=[0.0, -9.81], **keys))
-
-
 def difference(found, expected, names):
     """The largest difference of datasets from the first of several results, of their peaks."""
     return max(np.abs(found[name] - expected[name]).max() / np.abs(expected[name]).max() for name in names)
 
 
-def chain(folder, conditions, payload=1.5):
-    """Links one after the other, each joint on a law of its own, a payload at the end."""
-    n = len(conditions)
-    joints = [{"name": "j1", "type": "revolute", "between": ["ground", "l1.root"]}]
-    joints += [
-        {"name": f"j{k}", "type": "revolute", "between": [f"l{k - 1}.tip", f"l{k}.root"]} for k in range(2, n + 1)
-    ]
-    return solved(
-        folder,
-        body=bodies(conditions, [0.6, 0.5, 0.4][:n]),
-        joint=joints,
-        payload=[{"point": f"l{n}.tip", "mass": payload}],
+def chain(folder, conditions):
+    """Two links, each joint on a law of its own, a payload at the end."""
+    tables = planar(
+        bodies(conditions, [0.6, 0.5]),
+        [pin("j1", "ground", "l1.root"), pin("j2", "l1.tip", "l2.root")],
+        {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005, "tolerance": 1e-6},
+        {"name": "models", "kind": "linear", "about": "inverse", "times": [0.0]},
+        payload=[{"point": "l2.tip", "mass": 1.5}],
         initial={"state": "static"},
-        trajectory=[{"name": f"t{k}", "joint": f"j{k}", "value": law(0.4 / k, 0.8 - 0.3 * k)} for k in range(1, n + 1)],
-        analysis=[
-            {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005, "tolerance": 1e-6},
-            {"name": "models", "kind": "linear", "about": "inverse", "times": [0.0]},
-        ],
+        trajectory=[{"name": f"t{k}", "joint": f"j{k}", "value": law(0.4 / k, 0.8 - 0.3 * k)} for k in (1, 2)],
     )
+    return ffrobot.solve(ffrobot.make_scene(folder=folder, **tables))
 
 
 @pytest.fixture(scope="module")
@@ -89,18 +79,11 @@ def test_frequencies_of_the_assembled_robot(chains):
 
 def test_sag_under_loads_at_interfaces_is_exact(tmp_path):
     """v = P L³/3EI + M L²/2EI, v' = P L²/2EI + M L/EI, with one fixed-interface mode."""
-    body = link("l1", "craig-bampton", 0.6, count=1)
-    results = ffrobot.solve(
-        ffrobot.make_scene(
-            folder=tmp_path,
-            name="bar",
-            gravity=[0.0, 0.0],
-            body=[{"name": "l1", "link": body}],
-            joint=[{"name": "wall", "type": "weld", "between": ["ground", "l1.root"]}],
-            load=[{"point": "l1.tip", "y": "2.0", "moment": "0.5"}],
-            analysis=[{"name": "rest", "kind": "static"}],
-        )
-    )
+    body = {"name": "l1", "link": link("l1", "craig-bampton", 0.6, count=1)}
+    load = [{"point": "l1.tip", "y": "2.0", "moment": "0.5"}]
+    wall, rest = joint("wall", "weld", "ground", "l1.root"), {"name": "rest", "kind": "static"}
+    tables = planar([body], [wall], rest, gravity=(0.0, 0.0), load=load)
+    results = ffrobot.solve(ffrobot.make_scene(folder=tmp_path, **tables))
     EI = E * B * H**3 / 12
     expected = 2.0 * 0.6**3 / (3 * EI) + 0.5 * 0.6**2 / (2 * EI)
     assert results["rest/points/l1.tip/deflection"][0, 1] == pytest.approx(expected, rel=1e-7)

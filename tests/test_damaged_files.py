@@ -127,25 +127,12 @@ analysis = [
 """
 
 
-@pytest.fixture(scope="module")
-def stopped_once(tmp_path_factory):
-    """A scene whose first analysis was stopped, and its results file."""
-    scene = tmp_path_factory.mktemp("stopped") / "scene.toml"
+def test_a_changed_file_is_not_resumed(tmp_path):
+    """The core takes the numbers of a file that ffrobot has written as they are."""
+    scene, path = tmp_path / "scene.toml", tmp_path / "r.h5"
     scene.write_text(SCENE, encoding="utf-8")
     with pytest.raises(ffrobot.SolveError, match="too many steps"):
-        ffrobot.solve(scene, scene.with_name("r.h5"))
-    return scene
-
-
-@pytest.fixture
-def stopped(stopped_once, tmp_path):
-    """It, and a copy of its results file."""
-    return stopped_once, shutil.copy(stopped_once.with_name("r.h5"), tmp_path / "r.h5")
-
-
-def test_a_changed_file_is_not_resumed(stopped):
-    """The core takes the numbers of a file that ffrobot has written as they are."""
-    scene, path = stopped
+        ffrobot.solve(scene, path)
     with h5py.File(path, "r+") as file:
         file["inverse/resume/q"][:] = 0.0
     checksum.seal(path)
@@ -184,15 +171,10 @@ def spoil(path, member, chance):
     return f"{member}, {how}"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "info",
-        "linear",
-        "report",
-        *(pytest.param(x, marks=pytest.mark.nightly) for x in ("feasibility", "plot", "view")),
-    ],
-)
+OF_NIGHT = [pytest.param(command, marks=pytest.mark.nightly) for command in ("feasibility", "plot", "view")]
+
+
+@pytest.mark.parametrize("command", ["info", "linear", "report", *OF_NIGHT])
 def test_results_that_lack_something(results, members, tmp_path, command):
     """Changed on purpose, sealed again: a message, or all is well."""
     from ffrobot.common.hdf5 import reading

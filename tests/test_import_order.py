@@ -1,6 +1,7 @@
 """Imports go down only: from the command line to what all share, and never back, not for type annotations either."""
 
 import ast
+import re
 import shutil
 from collections import defaultdict
 from dataclasses import dataclass
@@ -16,42 +17,13 @@ PACKAGES = ("common", "mesh", "fe_models", "mbs", "actuation", "ffrobot")
 
 # From bottom to top; a folder may import from folders left of it, files from files of their own folder. "." are the
 # files of the package itself.
-FLOORS = {
-    "fe_models": ("link_records", "modal_body", "beam", "solid", "."),
-    "mbs": (
-        "fields",
-        "joints",
-        "scene",
-        "model",
-        "posture",
-        "linear",
-        "run",
-        "quantities",
-        "inversion",
-        "analysis",
-        "tracking",
-        ".",
-    ),
-    "actuation": ("patches", ".", "control"),
-    "ffrobot": (
-        "scene",
-        "run",
-        "results",
-        "present",
-        "milling",
-        "batch",
-        "map",
-        "exchange",
-        "pictures",
-        "sweep",
-        "fit",
-        "design",
-        "smooth",
-        "bench",
-        "commands",
-        ".",
-    ),
-}
+ORDER = """
+fe_models: link_records modal_body beam solid .
+mbs: fields joints scene model posture linear run quantities inversion analysis tracking .
+actuation: patches . control
+ffrobot: scene run results present milling batch map exchange pictures sweep fit design smooth bench commands .
+"""
+FLOORS = {package: folders.split() for package, folders in re.findall(r"(\w+): (.+)", ORDER)}
 
 
 @dataclass(frozen=True)

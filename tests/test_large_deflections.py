@@ -9,6 +9,7 @@ import pytest
 from beam_links import beam_link, rectangle
 from rod_chain import falling_tip
 from scipy.integrate import solve_bvp
+from tables_3d import joint, pin, planar
 
 import ffrobot as library
 
@@ -23,19 +24,10 @@ def link(name, E, condition, modes=8):
 
 
 def pendulum(E, condition, **keys):
-    names = ("link1", "link2")
-    return library.make_scene(
-        name="double_pendulum",
-        space="planar",
-        gravity=[0.0, -9.81],
-        body=[{"name": name, "link": link(name, E, condition)} | keys.pop(name, {}) for name in names],
-        joint=[
-            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
-            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
-        ],
-        analysis=[{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}],
-        **keys,
-    )
+    bodies = [{"name": name, "link": link(name, E, condition)} | keys.pop(name, {}) for name in ("link1", "link2")]
+    joints = [pin("O", "ground", "link1.root"), pin("A", "link1.tip", "link2.root")]
+    fall = {"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}
+    return library.make_scene(**planar(bodies, joints, fall, **keys))
 
 
 def solved(scene, path):
@@ -88,26 +80,19 @@ def elastica(load):
     return found.y[2:, -1]
 
 
-def bent(load, condition, tmp_path):
+def bent(load, modes, folder, *, stiffened=False, **body):
     """A horizontal arm held at its root, `load` = P L²/EI upwards at its tip, no gravity."""
     E = 7e9
-    force = load * E * 0.02 * 0.01**3 / 12
-    scene = library.make_scene(
-        name="bent",
-        space="planar",
-        gravity=[0.0, 0.0],
-        body=[{"name": "arm", "link": link("arm", E, condition, modes=30)}],
-        joint=[{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
-        trajectory=[{"name": "still", "joint": "O", "value": "0"}],
-        load=[{"point": "arm.tip", "y": f"{force!r}"}],
-        analysis=[{"name": "held", "kind": "static"}],
-    )
-    return solved(scene, tmp_path / f"{condition}.h5")
+    load = [{"point": "arm.tip", "y": f"{load * E * 0.02 * 0.01**3 / 12!r}"}]
+    arm, held = {"name": "arm", "link": link("arm", E, "cantilever", modes)}, {"name": "held", "kind": "static"}
+    keys = {"gravity": (0.0, 0.0), "load": load, "geometric_stiffening": stiffened}
+    tables = planar([arm | body], [joint("O", "weld", "ground", "arm.root")], held, **keys)
+    return solved(library.make_scene(**tables), folder / "bent.h5")
 
 
 def test_a_bent_cantilever_is_too_long_by_its_foreshortening(tmp_path):
     """Loads across the link change no mode's stiffness: there deflection alone has to tell."""
-    results, told = bent(0.25, "cantilever", tmp_path)
+    results, told = bent(0.25, 30, tmp_path)
     tip = results["held/points/arm.tip/position"][0]
     assert tip[1] == pytest.approx(0.25 / 3, rel=1e-3)
     about = results.attributes("held/bodies/arm")
@@ -118,34 +103,22 @@ def test_a_bent_cantilever_is_too_long_by_its_foreshortening(tmp_path):
     assert "points may be off by 0.4" in told[0]
 
 
-@pytest.fixture(scope="module")
-def soft_pendulum(tmp_path_factory):
-    """A scene file of a pendulum whose error is a third of its length."""
-    path = tmp_path_factory.mktemp("soft") / "scene.toml"
+def test_a_run_that_is_wrong_never_says_completed_alone(ffrobot, tmp_path):
+    """A pendulum whose error is a third of its length; --strict makes its warning an error and keeps results."""
+    path, results = tmp_path / "scene.toml", tmp_path / "scene.results.h5"
     path.write_text(pendulum(3.5e9, "cantilever").text, encoding="utf-8")
-    return path
-
-
-def test_a_run_that_is_wrong_never_says_completed_alone(soft_pendulum, ffrobot):
-    done = ffrobot.ok("solve", soft_pendulum, "--verbose")
+    done = ffrobot("solve", path, "--verbose", "--strict")
+    assert done.returncode == 1
     after_table = done.stdout.split("fall      forward")[1].splitlines()[1]
     assert after_table.startswith("warning")
     assert "results may be entirely wrong" in " ".join(done.stdout.split())
     assert 'divide the link: pieces = "auto"' in " ".join(done.stdout.split())
-    results = soft_pendulum.with_suffix(".results.h5")
+    assert "entirely wrong" in done.stderr
+    assert "--strict" in done.stderr
     assert "completed, 1 warning" in ffrobot("info", results).stdout
     with h5py.File(results) as file:
         assert file["fall"].attrs["status"] == "completed"
         assert file["fall/bodies/link1"].attrs["largest_deflection"] > 0.02
-
-
-def test_strict_makes_a_warning_an_error_and_keeps_results(soft_pendulum, ffrobot, tmp_path):
-    results = tmp_path / "strict.h5"
-    done = ffrobot("solve", soft_pendulum, "--strict", "-o", results)
-    assert done.returncode == 1
-    assert "entirely wrong" in done.stderr
-    assert "--strict" in done.stderr
-    assert results.exists()
 
 
 def test_a_run_that_ends_early_tells_what_it_has(ffrobot, tmp_path):
@@ -162,25 +135,10 @@ def test_a_run_that_ends_early_tells_what_it_has(ffrobot, tmp_path):
 
 def test_the_warning_says_how_many_pieces_are_enough(tmp_path):
     """A cantilever with P L²/EI = 1 bends by 30 %: with as many pieces as its warning says, it is the elastica's."""
-    E = 7e9
-    force = E * 0.02 * 0.01**3 / 12
-
-    def bent_in(**pieces):
-        scene = library.make_scene(
-            name="bent",
-            gravity=[0.0, 0.0],
-            geometric_stiffening=True,
-            body=[{"name": "arm", "link": link("arm", E, "cantilever", modes=6), **pieces}],
-            joint=[{"name": "O", "type": "weld", "between": ["ground", "arm.root"]}],
-            load=[{"point": "arm.tip", "y": f"{force!r}"}],
-            analysis=[{"name": "held", "kind": "static"}],
-        )
-        return solved(scene, tmp_path / "bent.h5")
-
-    results, told = bent_in()
+    results, told = bent(1.0, 6, tmp_path, stiffened=True)
     assert np.linalg.norm(results["held/points/arm.tip/position"][0] - elastica(1.0)) > 0.03
     (count,) = [int(text.split("pieces = ")[1].split()[0]) for text in told]
     assert count < 12
-    results, told = bent_in(pieces=count)
+    results, told = bent(1.0, 6, tmp_path, stiffened=True, pieces=count)
     assert told == []
     assert np.linalg.norm(results["held/points/arm.tip/position"][0] - elastica(1.0)) < 1e-3

@@ -1,30 +1,25 @@
 """Paths as machines run them, solved: time scaling, shapers for the robot's frequencies, what is left of vibrations."""
 
 import pytest
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.run.fastest import least_stretch
 
-INERTIA, TURN = 0.3, 1.2
-RIGID = {"rigid": {"mass": 2.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}}
+ROTOR = {"mass": 2.0, "inertia": 0.3, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
 
 
-def arm(body, path, joint=None, end=2.0):
-    return ffrobot.make_scene(
-        name="arm",
-        gravity=[0.0, 0.0],
-        body=[{"name": "arm", **body}],
-        joint=[{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"], **(joint or {})}],
-        trajectory=[{"name": "swing", "joint": "shoulder", "via": [0.0, TURN], **path}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 1e-3}],
-    )
+def arm(path, joint, end):
+    path = {"name": "swing", "joint": "shoulder", "via": [0.0, 1.2], "fastest": True, **path}
+    body, inverse = {"name": "arm", "rigid": ROTOR}, {"name": "inverse", "kind": "pcid", "end": end}
+    shoulder = pin("shoulder", "ground", "arm.root", **joint)
+    return ffrobot.make_scene(**planar([body], [shoulder], inverse | {"output_step": 1e-3}, trajectory=[path]))
 
 
 def test_limits_of_the_path_hold_for_the_fastest_motion():
     """Motors that are strong enough leave the path as it is."""
-    path = {"speed": 1.0, "acceleration": 5.0, "fastest": True}
-    results = ffrobot.solve(arm(RIGID, path, {"moment_limit": 100.0}, end=3.0))
+    results = ffrobot.solve(arm({"speed": 1.0, "acceleration": 5.0}, {"moment_limit": 100.0}, end=3.0))
     assert results.attributes("inverse/trajectories/swing")["stretch"] == 1.0
 
 
@@ -37,9 +32,8 @@ def test_limits_of_the_path_hold_for_the_fastest_motion():
     ],
 )
 def test_what_cannot_be_made_faster_says_so(joint, end, says):
-    path = {"speed": 4.0, "acceleration": 40.0, "fastest": True}
     with pytest.raises(InputError, match=says):
-        ffrobot.solve(arm(RIGID, path, joint, end))
+        ffrobot.solve(arm({"speed": 4.0, "acceleration": 40.0}, joint, end))
 
 
 @pytest.mark.parametrize("limit", [0.013, 0.4, 1.0, 7.7])

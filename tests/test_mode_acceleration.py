@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import tables_3d
 from beam_links import beam_link, rectangle
 
 import ffrobot
@@ -25,16 +26,10 @@ def link(condition="cantilever", modes=None, places=PLACES, **keys):
 
 def solved(folder, body, joint="weld", kind=None, body_keys=None, **keys):
     """Results of the one link `body` on the ground at its root, and its upper fibre's σ_xx (T, places)."""
-    scene = ffrobot.make_scene(
-        folder=folder,
-        name="bar",
-        gravity=keys.pop("gravity", [0.0, 0.0]),
-        body=[{"name": "arm", "link" if isinstance(body, dict) else "modal": body, **(body_keys or {})}],
-        joint=[{"name": "root", "type": joint, "between": ["ground", "arm.root"]}],
-        analysis=[{"name": "run", **(kind or {"kind": "static"})}],
-        **keys,
-    )
-    results = ffrobot.solve(scene)
+    arm = {"name": "arm", "link" if isinstance(body, dict) else "modal": body, **(body_keys or {})}
+    run, root = {"name": "run", **(kind or {"kind": "static"})}, tables_3d.joint("root", joint, "ground", "arm.root")
+    tables = tables_3d.planar([arm], [root], run, **{"gravity": (0.0, 0.0)} | keys)
+    results = ffrobot.solve(ffrobot.make_scene(folder=folder, **tables))
     points = sorted(name for name in results.modal_body("arm").stress)
     return results, np.stack([results[f"run/stress/arm/points/{name}/stress"][:, 0] for name in points], axis=1)
 

@@ -29,10 +29,6 @@ def scene(state="static", path=QUINTIC, modes=None, forward=(), **analysis):
     return make_scene(folder=CASE, **keys)
 
 
-def reported_of(solution, name):
-    return reported_modes(solution.analyses[name])
-
-
 def test_all_modes_are_taken_where_fewer_do_not_do():
     solution = solve_scene(scene("undeformed", None, "auto", tolerance=1e-3, end=0.1))
     assert solution.mode_choice.tried[-1] == 20
@@ -58,7 +54,7 @@ def test_what_forces_and_voltages_do_forwards_with_fewer_modes():
     """The arm that carries out its own inverse dynamics moves as that said; voltages serve modes left out too."""
     run = {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints+pzt"}
     solution = solve_scene(scene(modes=3, forward=[run], end=0.2, tolerance=1e-7))
-    inverse, back = (reported_of(solution, name)["deflections"] for name in ("inverse", "forward"))
+    inverse, back = (reported_modes(solution.analyses[name])["deflections"] for name in ("inverse", "forward"))
     for point, deflection in inverse.items():
         np.testing.assert_allclose(back[point], deflection, rtol=0, atol=1e-8)
 

@@ -5,8 +5,11 @@ import re
 import numpy as np
 import pytest
 from beam_links import beam_link, tube
+from tables_3d import pin, planar
 
 import ffrobot
+
+AGAIN = {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "joints"}
 
 
 @pytest.mark.parametrize("replay", ["forward", "joints_only"])
@@ -29,16 +32,12 @@ def test_distances_from_the_path_do_not_depend_on_outputs():
     link = beam_link(0.6, tube(0.02, 0.016), 10, modes=modes, damping={"ratio": 0.01})
 
     def swing(step):
-        return ffrobot.solve(ffrobot.make_scene(
-            name="arm", gravity=[0.0, -9.81], body=[{"name": "arm", "link": link}],
-            joint=[{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
+        return ffrobot.solve(ffrobot.make_scene(**planar(
+            [{"name": "arm", "link": link}], [pin("O", "ground", "arm.root")],
+            {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": step}, AGAIN,
             payload=[{"point": "arm.tip", "mass": 0.5}], initial={"state": "static"},
             trajectory=[{"name": "up", "point": "arm.tip", "y": "0.5*sin(0.6*(10*t**3 - 15*t**4 + 6*t**5))"}],
-            analysis=[
-                {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": step},
-                {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "joints"},
-            ],
-        ))  # fmt: skip
+        )))  # fmt: skip
 
     with pytest.warns(ffrobot.FfrobotWarning):
         coarse, fine = map(swing, (0.25, 2e-4))
@@ -57,21 +56,12 @@ def test_moments_that_were_not_computed_are_not_replayed(motor, message):
     """Of planar scenes with other motors than the mechanism needs; the rest of the file is right."""
     points = {"root": [0.0, 0.0], "tip": [1.0, 0.0]}
     bar = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": points}
-    scene = ffrobot.make_scene(
-        name="arm",
-        gravity=[0.0, -9.81],
-        body=[{"name": name, "rigid": bar} for name in ("upper", "fore")],
-        joint=[
-            {"name": "O", "type": "revolute", "between": ["ground", "upper.root"], "motor": False},
-            {"name": "A", "type": "revolute", "between": ["upper.tip", "fore.root"], "motor": motor},
-        ],
+    tables = planar(
+        [{"name": name, "rigid": bar} for name in ("upper", "fore")],
+        [pin("O", "ground", "upper.root", motor=False), pin("A", "upper.tip", "fore.root", motor=motor)],
+        {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}, AGAIN,
         initial={"angles": {"upper": 0.0, "fore": 1.0}},
         trajectory=[{"name": "tip", "point": "fore.tip", "x": "1 + cos(1)", "y": "sin(1) + 0.1*t**2"}],
-        analysis=[
-            {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
-            {"name": "again", "kind": "forward", "end": 0.1, "output_step": 0.01}
-            | {"actuation": "inverse", "apply": "joints"},
-        ],
-    )
+    )  # fmt: skip
     with pytest.raises(ffrobot.InputError, match=message):
-        ffrobot.solve(scene)
+        ffrobot.solve(ffrobot.make_scene(**tables))

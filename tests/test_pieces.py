@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from rod_chain import extrapolated
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.fe_models.pieces import cut
@@ -18,16 +19,10 @@ def link(**keys):
 
 def pendulum(pieces, of):
     """Two links, hinged, that fall from the horizontal."""
-    return ffrobot.make_scene(
-        name="soft",
-        gravity=[0.0, -9.81],
-        body=[{"name": name, "link": of, "pieces": pieces} for name in ("link1", "link2")],
-        joint=[
-            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"], "motor": False},
-            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"], "motor": False},
-        ],
-        analysis=[{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}],
-    )
+    bodies = [{"name": name, "link": of, "pieces": pieces} for name in ("link1", "link2")]
+    joints = [pin("O", "ground", "link1.root", motor=False), pin("A", "link1.tip", "link2.root", motor=False)]
+    fall = {"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}
+    return ffrobot.make_scene(**planar(bodies, joints, fall))
 
 
 def test_soft_double_pendulum():

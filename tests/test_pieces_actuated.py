@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from tables_3d import pin, planar
 
 from ffrobot import make_scene
 from ffrobot.results.write import results_image
@@ -20,38 +21,25 @@ LOOP = {"kind": "closed-loop", "end": 0.2, "output_step": 0.01, "tolerance": 1e-
 
 
 def link(condition):
-    return beam_link(
-        1.0,
-        rectangle(0.01, 0.02),
-        16,
-        nu=0.3,
-        condition=condition,
-        name="link",
-        modes={"count": 4, "family": "in-plane-bending"},
-        damping={"rayleigh": [0.0, 2e-4]},
-    )
+    keys = {"modes": {"count": 4, "family": "in-plane-bending"}, "damping": {"rayleigh": [0.0, 2e-4]}}
+    return beam_link(1.0, rectangle(0.01, 0.02), 16, nu=0.3, condition=condition, name="link", **keys)
 
 
 def solved(pieces, analyses, **keys):
     """Two links on a straight path of the tip, from equilibrium, as a results file."""
     conditions = {"link1": "simply-supported", "link2": "cantilever"}
     divided = {} if pieces is None else {"pieces": pieces}
-    tables = {
-        "space": "planar",
-        "gravity": [0.0, -9.81],
-        "geometric_stiffening": True,
-        "body": [{"name": name, "link": link(condition), **divided} for name, condition in conditions.items()],
-        "joint": [
-            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
-            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
-        ],
-        "payload": [{"point": "link2.tip", "mass": 0.2}],
-        "initial": {"state": "static", "angles": {"link1": 0.0, "link2": 0.8}},
-        "trajectory": [{"name": "tip", "point": "link2.tip", "x": f"1.6-0.2*{S}", "y": f"0.6+0.2*{S}"}],
-        "pzt": [{"body": name, **PATCHES, "allocation": "least-squares"} for name in conditions],
-        "analysis": analyses,
-    }
-    solution = solve_scene(make_scene(name="arm", **(tables | keys)))
+    tables = planar(
+        [{"name": name, "link": link(condition), **divided} for name, condition in conditions.items()],
+        [pin("O", "ground", "link1.root"), pin("A", "link1.tip", "link2.root")],
+        *analyses,
+        geometric_stiffening=True,
+        payload=[{"point": "link2.tip", "mass": 0.2}],
+        initial={"state": "static", "angles": {"link1": 0.0, "link2": 0.8}},
+        trajectory=[{"name": "tip", "point": "link2.tip", "x": f"1.6-0.2*{S}", "y": f"0.6+0.2*{S}"}],
+        pzt=[{"body": name, **PATCHES, "allocation": "least-squares"} for name in conditions],
+    )
+    solution = solve_scene(make_scene(**tables | keys))
     return h5py.File(io.BytesIO(results_image(solution)))
 
 

@@ -1,12 +1,11 @@
-"""Functions of Python and compiled ones in place of expressions, and histories as a table of pandas."""
+"""Functions of Python and compiled ones in place of expressions."""
 
-import ctypes
 import math
-import subprocess
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.mbs.fields.expressions import parse_expression
@@ -19,37 +18,23 @@ def sine(t):
     return 0.5 * math.sin(t), 0.5 * math.cos(t), -0.5 * math.sin(t)
 
 
-@pytest.fixture(scope="module")
-def compiled_sine(tmp_path_factory):
-    """What `numba.cfunc` returns, as far as it is looked at."""
-    folder = tmp_path_factory.mktemp("compiled")
-    (folder / "sine.c").write_text(f"#include <math.h>\n{SINE}\n", encoding="utf-8")
-    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "sine.so", "sine.c", "-lm"], cwd=folder, check=True)
-    library = ctypes.CDLL(str(folder / "sine.so"))
-    return SimpleNamespace(library=library, address=ctypes.cast(library.sine, ctypes.c_void_p).value)
-
-
 def swing(value="0.5*sin(t)", load="0"):
     rod = {"mass": 1.0, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0, 0], "tip": [0.6, 0]}}
-    return ffrobot.make_scene(
-        name="swing",
-        gravity=[0.0, -9.81],
-        body=[{"name": "arm", "rigid": rod}],
-        joint=[{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-        trajectory=[{"name": "turn", "joint": "shoulder", "value": value}],
-        load=[{"point": "arm.tip", "y": load}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
-    )
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}
+    keys = {"trajectory": [{"name": "turn", "joint": "shoulder", "value": value}]}
+    keys["load"] = [{"point": "arm.tip", "y": load}]
+    shoulder = pin("shoulder", "ground", "arm.root")
+    return ffrobot.make_scene(**planar([{"name": "arm", "rigid": rod}], [shoulder], inverse, **keys))
 
 
 def moment(scene):
     return ffrobot.solve(scene)["inverse/joints/shoulder/moment"]
 
 
-def test_functions_are_as_good_as_expressions(compiled_sine):
+def test_functions_are_as_good_as_expressions(compiled):
     expected = moment(swing())
     np.testing.assert_allclose(moment(swing(sine)), expected, rtol=1e-12)
-    np.testing.assert_allclose(moment(swing(compiled_sine)), expected, rtol=1e-12)
+    np.testing.assert_allclose(moment(swing(compiled("sine", SINE))), expected, rtol=1e-12)
 
 
 def test_load_needs_the_value_alone():
@@ -127,20 +112,7 @@ def test_wrong_derivatives_are_found(function, said, end):
         check_derivatives(user_function(function), end, "path")
 
 
-def test_wrong_derivatives_of_a_compiled_function(tmp_path):
+def test_wrong_derivatives_of_a_compiled_function(compiled):
     """What it leaves as it is, is zero."""
-    (tmp_path / "part.c").write_text("void part(double t, double *out) { out[0] = t * t; }\n", encoding="utf-8")
-    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "part.so", "part.c"], cwd=tmp_path, check=True)
-    library = ctypes.CDLL(str(tmp_path / "part.so"))
-    function = SimpleNamespace(address=ctypes.cast(library.part, ctypes.c_void_p).value)
     with pytest.raises(ffrobot.InputError, match='trajectory "turn": value: expected the derivatives of the value'):
-        swing(function)
-
-
-def test_pandas_view():
-    results = ffrobot.solve(swing())
-    frame = results.frame("inverse")
-    assert frame.index.name == "time"
-    np.testing.assert_array_equal(frame.index, results.time("inverse"))
-    np.testing.assert_array_equal(frame["joints/shoulder/moment"], results["inverse/joints/shoulder/moment"])
-    assert "time" not in frame.columns
+        swing(compiled("part", "void part(double t, double *out) { out[0] = t * t; }"))

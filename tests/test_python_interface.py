@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import tomli_w
 from beam_links import beam_link, tube
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.cli import cli
@@ -148,12 +149,9 @@ def test_a_signal_between_analyses_does_not_leave_the_others_out_in_silence(fold
 
 
 def test_warnings_name_no_folder_of_a_scene_without_a_file(folder):
+    rough = {"name": "rough", "kind": "fcid", "shape": "zero", "end": 0.01, "output_step": 0.001}
     with pytest.warns(ffrobot.FfrobotWarning) as given:
-        ffrobot.solve(
-            swing(
-                folder, analysis=[{"name": "rough", "kind": "fcid", "shape": "zero", "end": 0.01, "output_step": 0.001}]
-            )
-        )
+        ffrobot.solve(swing(folder, analysis=[rough]))
     assert all(str(each.message).startswith('<scene made in Python>: analysis "rough": ') for each in given)
 
 
@@ -192,17 +190,10 @@ def test_every_public_name_is_there():
 def test_results_may_be_left_open(tmp_path):
     """HDF5 closes them after Python has ended."""
     script = "import ffrobot; results = ffrobot.solve('scene.toml'); results.append = [results]"
-    rod = "{ mass = 1.0, inertia = 0.1, center = [0.3, 0.0], points = { root = [0.0, 0.0] } }"
-    (tmp_path / "scene.toml").write_text(
-        f"""
-name = "pendulum"
-gravity = [0.0, -9.81]
-body = [{{ name = "rod", rigid = {rod} }}]
-joint = [{{ name = "pin", type = "revolute", between = ["ground", "rod.root"] }}]
-analysis = [{{ name = "fall", kind = "forward", end = 0.1, output_step = 0.1 }}]
-""",
-        encoding="utf-8",
-    )
+    rod = {"mass": 1.0, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0]}}
+    fall = {"name": "fall", "kind": "forward", "end": 0.1, "output_step": 0.1}
+    tables = planar([{"name": "rod", "rigid": rod}], [pin("pin", "ground", "rod.root")], fall)
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps(tables), encoding="utf-8")
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -223,11 +214,6 @@ def test_results_in_memory_can_be_saved_and_drawn(folder, results, tmp_path):
         results.save(tmp_path / "one.html")
 
 
-def test_a_group_is_no_dataset(results):
-    with pytest.raises(ffrobot.InputError, match=r'found the group "inverse/joints/shoulder" of .*shoulder/moment"'):
-        results["inverse/joints/shoulder"]
-
-
 def test_library_that_is_not_installed(results, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ffrobot.SolveError, match=r"this needs pandas, which is not installed: pip install pan"):
@@ -236,6 +222,14 @@ def test_library_that_is_not_installed(results, monkeypatch):
     monkeypatch.delitem(sys.modules, "ffrobot.results.labelled", raising=False)
     with pytest.raises(ffrobot.SolveError, match=r"this needs xarray, which is not installed: pip install xarray"):
         results.to_xarray("inverse")
+
+
+def test_pandas_view(results):
+    frame = results.frame("inverse")
+    assert frame.index.name == "time"
+    np.testing.assert_array_equal(frame.index, results.time("inverse"))
+    np.testing.assert_array_equal(frame["joints/shoulder/moment"], results["inverse/joints/shoulder/moment"])
+    assert "time" not in frame.columns
 
 
 def test_xarray_has_dimensions_units_and_coordinates(results):
@@ -298,28 +292,29 @@ def test_numbers_of_numpy_with_more_digits(folder):
     assert swing(folder, payload=payload).payload == swing(folder, payload=[payload[0] | {"mass": 0.5}]).payload
 
 
-@pytest.mark.parametrize(
-    ("wrong", "says"),
-    [
-        ({"method": "SLSQP"}, r'method: expected "auto", "slsqp", .* or "all", found \'SLSQP\''),
-        ({"vary": "a=1:2"}, "vary: expected a list of texts, found 'a=1:2'"),
-        ({"starts": 1.5}, "starts: expected a whole number, found 1.5"),
-        ({"processes": 0}, "processes: 0 is not in the range"),
-        ({"tolerance": float("nan")}, "tolerance: nan is not a finite number"),
-    ],
-)
-def test_arguments_of_another_kind(wrong, says):
-    with pytest.raises(ffrobot.InputError, match=f"^optimise: {says}"):
-        ffrobot.optimise("scene.toml", **{"vary": ["a=1:2"]} | wrong)
+def optimised(**wrong):
+    ffrobot.optimise("scene.toml", **{"vary": ["a=1:2"]} | wrong)
 
 
-def test_tables_are_no_scene():
-    with pytest.raises(ffrobot.InputError, match=r"expected a scene file, or a scene .*, found dict"):
-        ffrobot.solve({"name": "x"})
+MISTAKES = {
+    r'^optimise: method: expected "auto", "slsqp", .* or "all", found \'SLSQP\'': lambda: optimised(method="SLSQP"),
+    "^optimise: vary: expected a list of texts, found 'a=1:2'": lambda: optimised(vary="a=1:2"),
+    "^optimise: starts: expected a whole number, found 1.5": lambda: optimised(starts=1.5),
+    "^optimise: processes: 0 is not in the range": lambda: optimised(processes=0),
+    "^optimise: tolerance: nan is not a finite number": lambda: optimised(tolerance=float("nan")),
+    "expected a scene file, or a scene .*, found dict": lambda: ffrobot.solve({"name": "x"}),
+    "resume: expected the output of the run": lambda: ffrobot.solve("scene.toml", resume=True),
+    "plot_results: formats: expected a list of texts, found 'png'": lambda: ffrobot.plot_results("r.h5", "f", "png"),
+    "fit_measured: vary: expected a list of texts": lambda: ffrobot.fit_measured("arm.toml", "modes.csv", "material"),
+}
 
 
-def test_one_text_is_no_list(results):
-    with pytest.raises(ffrobot.InputError, match="plot_results: formats: expected a list of texts, found 'png'"):
-        ffrobot.plot_results(results, "figures", "png")
-    with pytest.raises(ffrobot.InputError, match="fit_measured: vary: expected a list of texts"):
-        ffrobot.fit_measured("arm.toml", "modes.csv", "material.youngs_modulus")
+@pytest.mark.parametrize("says", MISTAKES)
+def test_arguments_of_another_kind(says):
+    with pytest.raises(ffrobot.InputError, match=says):
+        MISTAKES[says]()
+
+
+def test_a_group_is_no_dataset(results):
+    with pytest.raises(ffrobot.InputError, match=r'found the group "inverse/joints/shoulder" of .*shoulder/moment"'):
+        results["inverse/joints/shoulder"]

@@ -200,15 +200,3 @@ def test_no_number_stands_without_a_source():
     missing = [number[0] for number in numbers if not any(a <= number.start() < b for a, b in claims)]
     assert not missing
     assert f"Version {version('ffrobot')}, " in text
-
-
-DOCUMENTS = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("cases/*/README.md"))]
-
-
-@pytest.mark.parametrize("document", DOCUMENTS)
-def test_readmes_link_to_what_is_there(document):
-    path = ROOT / document
-    links = re.findall(r"\]\((?!http)([^)#]+)\)", path.read_text(encoding="utf-8"))
-    missing = [link for link in links if not link.endswith(".png") and not (path.parent / link).exists()]
-    assert links
-    assert not missing

@@ -113,8 +113,3 @@ def test_other_kinds_and_searches_for_modes_start_again(arm):
     assert 'resume=True) runs "inverse" again from its start' in stop(scene, "inverse", 0.0)
     results = go_on(scene)
     assert results.attributes("inverse")["status"] == "completed"
-
-
-def test_needs_a_file():
-    with pytest.raises(ffrobot.InputError, match="resume: expected the output of the run"):
-        ffrobot.solve("scene.toml", resume=True)

@@ -8,6 +8,7 @@ import h5py
 import pytest
 import tomli_w
 from beam_links import link_keys, rectangle
+from tables_3d import pin, planar
 
 from ffrobot import make_scene
 from ffrobot.fe_models.link import make_link
@@ -39,19 +40,14 @@ def folder(tmp_path_factory):
 def arm(folder, link, **keys):
     """A rigid stick, and a link at its end whose tip goes from rest to rest."""
     path = {"name": "path", "point": "arm.tip", "x": "0.7-0.1*(10*t**3-15*t**4+6*t**5)", "y": "0.5"}
-    tables = {
-        "name": "arm",
-        "gravity": [0.0, -9.81],
-        "body": [{"name": "stick", "rigid": STICK}, {"name": "arm", "link": f"{link}.toml"}],
-        "joint": [
-            {"name": "O", "type": "revolute", "between": ["ground", "stick.root"]},
-            {"name": "A", "type": "revolute", "between": ["stick.tip", "arm.root"]},
-        ],
-        "initial": {"state": "static", "angles": {"stick": 0.1, "arm": 1.2}},
-        "trajectory": [path],
-        "analysis": [{"name": "run", "kind": "pcid", "end": 0.1, "output_step": 0.01, "tolerance": 1e-4}],
-    }
-    return make_scene(folder=folder, **(tables | keys))
+    tables = planar(
+        [{"name": "stick", "rigid": STICK}, {"name": "arm", "link": f"{link}.toml"}],
+        [pin("O", "ground", "stick.root"), pin("A", "stick.tip", "arm.root")],
+        {"name": "run", "kind": "pcid", "end": 0.1, "output_step": 0.01, "tolerance": 1e-4},
+        initial={"state": "static", "angles": {"stick": 0.1, "arm": 1.2}},
+        trajectory=[path],
+    )
+    return make_scene(folder=folder, **tables | keys)
 
 
 def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):

@@ -1,12 +1,9 @@
 """Forces of the user's that depend on how a point moves: springs and dampers to the ground."""
 
-import ctypes
-import subprocess
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from beam_links import beam_link, circle
+from tables_3d import joint, pin, planar, revolute, scene
 
 import ffrobot
 
@@ -25,43 +22,23 @@ def spring(t, position, velocity):
     return -K * (position - ANCHOR) - C * velocity
 
 
-@pytest.fixture(scope="module")
-def compiled_spring(tmp_path_factory):
-    """What `numba.cfunc` returns, as far as it is looked at."""
-    folder = tmp_path_factory.mktemp("compiled")
-    (folder / "spring.c").write_text(SPRING, encoding="utf-8")
-    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "spring.so", "spring.c"], cwd=folder, check=True)
-    library = ctypes.CDLL(str(folder / "spring.so"))
-    return SimpleNamespace(library=library, address=ctypes.cast(library.spring, ctypes.c_void_p).value)
+def swung(force, **analysis):
+    """A flexible link on a hinge, turned by 0.5 rad."""
+    link = beam_link(0.6, circle(0.01), 4, modes={"count": 2, "family": "in-plane-bending"})
+    load, initial = [{"point": "arm.tip", "force": force}], {"angles": {"arm": 0.5}}
+    body, hinge = {"name": "arm", "link": link}, pin("O", "ground", "arm.root")
+    run = FREE | {"end": 0.02, "output_step": 0.002} | analysis
+    return ffrobot.make_scene(**planar([body], [hinge], run, gravity=(0.0, 0.0), load=load, initial=initial))
 
 
-def scene(force, *, joint, analysis, link=None, load=(), **keys):
-    rod = {"mass": MASS, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0, 0], "tip": [0.6, 0]}}
-    return ffrobot.make_scene(
-        name="sprung",
-        gravity=keys.pop("gravity", [0.0, 0.0]),
-        body=[{"name": "arm"} | ({"link": link} if link else {"rigid": rod})],
-        joint=[joint],
-        load=[{"point": "arm.tip", "force": force}, *load],
-        analysis=[{"output_step": 0.01} | analysis],
-        **keys,
-    )
-
-
-HINGE = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}
 FREE = {"name": "free", "kind": "forward", "end": 1.0, "tolerance": 1e-9}
-LINK = beam_link(0.6, circle(0.01), 4, modes={"count": 2, "family": "in-plane-bending"})
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
-def test_compiled_is_python(compiled_spring, integrator):
+def test_compiled_is_python(compiled, integrator):
     """On a flexible link that is swung by its hinge and pulled back."""
-    angles = {"initial": {"angles": {"arm": 0.5}}}
-    analysis = {"name": "free", "kind": "forward", "end": 0.02, "output_step": 0.002, "integrator": integrator}
-    runs = [
-        ffrobot.solve(scene(force, joint=HINGE, link=LINK, analysis=analysis, **angles))
-        for force in (spring, compiled_spring)
-    ]
+    forces = spring, compiled("spring", SPRING)
+    runs = [ffrobot.solve(swung(force, integrator=integrator)) for force in forces]
     by_python, by_core = (run["free/points/arm.tip/position"] for run in runs)
     np.testing.assert_allclose(by_core, by_python, rtol=1e-12)
     assert np.ptp(by_core[:, 1]) > 1e-3  # it moves
@@ -75,11 +52,10 @@ def in_3d(force, analysis, *joints, **keys):
     """A body whose point "center" is its center of mass, free where no joint is given."""
     body = {"mass": MASS, "center": [0.3, 0.0, 0.0], "inertia": [0.01, 0.02, 0.03],
             "points": {"root": [0, 0, 0], "center": [0.3, 0.0, 0.0]}}  # fmt: skip
+    keys = {"gravity": [0.0, 0.0, 0.0], "load": [{"point": "arm.center", "force": force}]} | keys
     return ffrobot.make_scene(
-        name="sprung", space="spatial", gravity=keys.pop("gravity", [0.0, 0.0, 0.0]),
-        body=[{"name": "arm", "rigid": body}], joint=list(joints), analysis=[{"output_step": 0.01} | analysis],
-        load=keys.pop("load", [{"point": "arm.center", "force": force}]), **keys,
-    )  # fmt: skip
+        **scene([{"name": "arm", "rigid": body}], list(joints), {"output_step": 0.01} | analysis, **keys)
+    )
 
 
 def pull_back(t, position, velocity):
@@ -104,7 +80,7 @@ def test_torque_that_it_asks_of_a_motor_in_3d():
     def force(t, position, velocity):
         return *pull_back(t, position, velocity), *(moment * (1 + t))
 
-    hinge = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"], "axis": AXIS.tolist()}
+    hinge = revolute("O", "ground", "arm.root", AXIS.tolist())
     hold = {"name": "turn", "joint": "O", "value": "0"}
     results = ffrobot.solve(in_3d(force, {"name": "held", "kind": "pcid", "end": 0.1}, hinge, trajectory=[hold]))
     r = np.array([0.3, 0.0, 0.0])
@@ -114,7 +90,7 @@ def test_torque_that_it_asks_of_a_motor_in_3d():
 
 def test_static_equilibrium_and_linear_model_in_3d():
     """On an oblique slide: the way m g·e / k + AT·e − 0.3 e_x, ω² = k / m and damping c / m."""
-    slide = {"name": "O", "type": "prismatic", "between": ["ground", "arm.root"], "axis": AXIS.tolist()}
+    slide = joint("O", "prismatic", "ground", "arm.root", axis=AXIS.tolist())
     g = np.array([1.0, -2.0, -9.81])
     static = {"initial": {"state": "static"}, "gravity": g.tolist()}
     sagged = ffrobot.solve(in_3d(pull_back, FREE, slide | {"motor": False}, **static))
@@ -127,16 +103,13 @@ def test_static_equilibrium_and_linear_model_in_3d():
     np.testing.assert_allclose(np.abs(eigenvalues), np.sqrt(K / MASS), rtol=1e-6)
 
 
-def test_what_functions_return_in_3d():
+def test_wrong_returns_and_errors_come_through():
     with pytest.raises(ffrobot.InputError, match=r"expected a force \(x, y, z\), or \(x, y, z, mx, my, mz\), found"):
         ffrobot.solve(in_3d(lambda t, x, v: (1.0, 2.0), FREE))
+    with pytest.raises(ffrobot.InputError, match=r"<lambda>: expected a force \(x, y\), or \(x, y, moment\), found"):
+        ffrobot.solve(swung(lambda t, x, v: 1.0))
+    with pytest.raises(ZeroDivisionError):
+        ffrobot.solve(swung(lambda t, x, v: (1 / 0, 0.0)))
     beside = [{"point": "arm.center", "x": "1", "force": pull_back}]
     with pytest.raises(ffrobot.InputError, match='expected "force" alone with "point", found "x", "force"'):
         in_3d(None, FREE, load=beside)
-
-
-def test_wrong_returns_and_errors_come_through():
-    with pytest.raises(ffrobot.InputError, match=r"<lambda>: expected a force \(x, y\), or \(x, y, moment\), found"):
-        ffrobot.solve(scene(lambda t, x, v: 1.0, joint=HINGE, analysis=FREE))
-    with pytest.raises(ZeroDivisionError):
-        ffrobot.solve(scene(lambda t, x, v: (1 / 0, 0.0), joint=HINGE, analysis=FREE))

@@ -124,7 +124,15 @@ def test_first_page_lists_all_pages_for_readers_of_the_repository():
     assert listed == re.findall(r"^[a-z_/]+$", text, flags=re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", [*sorted(DOCS.rglob("*.md")), DOCS.parent / "README.md"], ids=lambda page: page.stem)
+WORDS = [
+    *sorted(DOCS.rglob("*.md")),
+    *sorted(CASES.glob("*/README.md")),
+    DOCS.parent / "README.md",
+    DOCS.parent / "CONTRIBUTING.md",
+]
+
+
+@pytest.mark.parametrize("page", WORDS, ids=lambda page: f"{page.parent.name}/{page.stem}")
 def test_no_link_leads_nowhere(page):
     """As the repository shows the page: links and pictures within it, and the list of pages of the site."""
     text, block = page.read_text(encoding="utf-8"), re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -165,14 +173,6 @@ def test_every_public_member_is_documented(monkeypatch):
             home = getattr(getattr(member, "fget", getattr(member, "func", member)), "__module__", "")
             if not name.startswith("_") and str(home).startswith(of_package) and not isinstance(member, type):
                 assert f"* `{name}`: " in section, f"{one.__name__}.{name} has no docstring, or the page leaves it out"
-
-
-WORDS = [
-    *sorted(DOCS.rglob("*.md")),
-    *sorted(CASES.glob("*/README.md")),
-    DOCS.parent / "README.md",
-    DOCS.parent / "CONTRIBUTING.md",
-]
 
 
 @pytest.mark.parametrize("page", WORDS, ids=lambda page: f"{page.parent.name}/{page.stem}")

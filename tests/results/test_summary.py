@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from reference_scenes import NIGHTLY
 from rich.console import Console
+from tables_3d import pin, planar
 
 from ffrobot.present.details import print_details
 from ffrobot.present.lines import folded
@@ -20,26 +21,17 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
 ROD = {"mass": 2.0, "inertia": 0.2, "center": [0.35, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.7, 0.0]}}
-PLANAR = {
-    "name": "rods",
-    "gravity": [0.0, 0.0],
-    "body": [{"name": name, "rigid": ROD} for name in "ab"],
-    "joint": [
-        {"name": "O", "type": "revolute", "between": ["ground", "a.root"]},
-        {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]},
-    ],
-    "trajectory": [{"name": "tip", "point": "b.tip", "x": "0.9 + 0.1*t", "y": "0.5"}],
-    "initial": {"joints": {"O": 0.3, "A": 0.9}},
-    "analysis": [
-        {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01, "tolerance": 1e-5},
-        {"name": "short", "kind": "pcid", "end": 0.1, "output_step": 0.01, "max_steps": 1, "integrator": "dopri5"},
-    ],
-}
-SPACIOUS = {key: [*value, 0.0] for key, value in ROD.items() if key == "center"} | {
-    "mass": 2.0,
-    "inertia": [0.01, 0.2, 0.2],
-    "points": {name: [*at, 0.0] for name, at in ROD["points"].items()},
-}
+PLANAR = planar(
+    [{"name": name, "rigid": ROD} for name in "ab"],
+    [pin("O", "ground", "a.root"), pin("A", "a.tip", "b.root")],
+    {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01, "tolerance": 1e-5},
+    {"name": "short", "kind": "pcid", "end": 0.1, "output_step": 0.01, "max_steps": 1, "integrator": "dopri5"},
+    gravity=(0.0, 0.0),
+    trajectory=[{"name": "tip", "point": "b.tip", "x": "0.9 + 0.1*t", "y": "0.5"}],
+    initial={"joints": {"O": 0.3, "A": 0.9}},
+)
+IN_3D = {"inertia": [0.01, 0.2, 0.2], "center": [0.35, 0.0, 0.0]}
+SPACIOUS = ROD | IN_3D | {"points": {name: [*at, 0.0] for name, at in ROD["points"].items()}}
 SPATIAL = PLANAR | {
     "space": "spatial",
     "gravity": [0.0, 0.0, 0.0],
@@ -52,6 +44,14 @@ def test_a_replay_ends_with_its_actuation():
     static, inverse, replay = {"name": "rest"}, {"name": "inverse", "end": 0.4}, {"name": "replay"}
     scene = {"analysis": [static, inverse, replay | {"actuation": "inverse"}]}
     assert [end_of(scene, name) for name in ("rest", "inverse", "replay")] == [0.0, 0.4, 0.4]
+
+
+def verdict_of(scene):
+    return Results.from_image(results_image(solve_scene(scene)), Path("x.h5")).verdict
+
+
+def verdict(scene):
+    return verdict_of(scene).analyses[0]
 
 
 @pytest.mark.parametrize("keys", [PLANAR, SPATIAL], ids=["planar", "3D"])
@@ -119,16 +119,10 @@ def test_texts_are_whole_or_counted(room):
 
 
 def test_lines_that_differ_in_a_name_are_one():
-    lines = [
-        'trajectory "a" ends at 1 s',
-        "a: zv shaper for 5 Hz",
-        'trajectory "b" ends at 1 s',
-        "b: zv shaper for 5 Hz",
-    ]
-    lines += ['analysis "x": trajectory "c" ends at 2 s', "gravity of 1000 m/s²: is it in mm/s²?"]
-    assert list(folded(lines)) == [
-        'trajectory "a", "b" ends at 1 s', "a, b: zv shaper for 5 Hz", lines[4], lines[5]
-    ]  # fmt: skip
+    lines = [text for name in "ab" for text in (f'trajectory "{name}" ends at 1 s', f"{name}: zv shaper for 5 Hz")]
+    others = ['analysis "x": trajectory "c" ends at 2 s', "gravity of 1000 m/s²: is it in mm/s²?"]
+    together = ['trajectory "a", "b" ends at 1 s', "a, b: zv shaper for 5 Hz"]
+    assert list(folded([*lines, *others])) == [*together, *others]
 
 
 def many(count, motors):
@@ -146,10 +140,9 @@ def many(count, motors):
 
 
 @pytest.mark.parametrize(("count", "motors"), [(1, 3), (2, 3), (1, 12), (9, 12), (30, 1)])
-def test_rows_are_left_out_and_counted(count, motors, tmp_path):
+def test_rows_are_left_out_and_counted(count, motors):
     """Peaks of motors of each analysis where there is room, else of the analysis that asks most; over limits."""
-    solution = solve_scene(many(count, motors), Watcher())
-    verdict = Results.from_image(results_image(solution), tmp_path / "x.h5").verdict
+    verdict = verdict_of(many(count, motors))
     lines = summary_lines(verdict, (), "known", "x.h5", 120)
     assert len(lines) <= LINES
     rows = [line.split() for line in lines]
@@ -167,20 +160,16 @@ def test_rows_are_left_out_and_counted(count, motors, tmp_path):
 def weak(limit, load=0.0, path="0", **analysis):
     """A horizontal rod whose motor carries weight and a load at the tip."""
     about = {"name": "rest", "kind": "static"} | analysis
-    return make_scene(
-        name="weak", gravity=[0.0, -10.0], body=[{"name": "a", "rigid": ROD}],
-        joint=[{"name": "O", "type": "revolute", "between": ["ground", "a.root"], "moment_limit": limit}],
-        trajectory=[{"name": "path", "joint": "O", "value": path}], load=[{"point": "a.tip", "y": str(-load)}],
-        analysis=[about],
-    )  # fmt: skip
+    keys = {
+        "trajectory": [{"name": "path", "joint": "O", "value": path}],
+        "load": [{"point": "a.tip", "y": str(-load)}],
+    }
+    body, joint = {"name": "a", "rigid": ROD}, pin("O", "ground", "a.root", moment_limit=limit)
+    return make_scene(**planar([body], [joint], about, gravity=(0.0, -10.0), **keys))
 
 
-def test_robots_at_rest_are_told_no_slower_path(tmp_path):
+def test_robots_at_rest_are_told_no_slower_path():
     """A weight of 20 N at 0.35 m and 10 N at 0.7 m: 14 N·m. Each remedy that the advice names makes it feasible."""
-
-    def verdict(scene):
-        return Results.from_image(results_image(solve_scene(scene, Watcher())), tmp_path / "x.h5").verdict.analyses[0]
-
     at_rest = verdict(weak(10.0, 10.0))
     assert at_rest.advice == ("less load, or another motor or gear for O",)
     assert not at_rest.feasible
@@ -193,22 +182,20 @@ def test_robots_at_rest_are_told_no_slower_path(tmp_path):
     assert verdict(weak(15.0, 10.0, path="0.1*t**2", **run)).feasible
 
 
-def test_torques_at_rest_along_the_path_decide_whether_a_slower_path_helps(tmp_path):
+def test_torques_at_rest_along_the_path_decide_whether_a_slower_path_helps():
     """The same rod, lifted from hanging to horizontal, where it takes m g L/2 + F L = 14 N·m at rest."""
 
-    def verdict(limit, load, duration):
+    def lifted(limit, load, duration):
         rise = f"-pi/2*(1 - (10*(t/{duration})**3 - 15*(t/{duration})**4 + 6*(t/{duration})**5))"
-        run = {"kind": "pcid", "end": duration, "output_step": duration / 100}
-        scene = weak(limit, load, rise, **run)
-        return Results.from_image(results_image(solve_scene(scene, Watcher())), tmp_path / "x.h5").verdict.analyses[0]
+        return verdict(weak(limit, load, rise, kind="pcid", end=duration, output_step=duration / 100))
 
-    heavy = verdict(13.9, 10.0, 0.5)
+    heavy = lifted(13.9, 10.0, 0.5)
     assert heavy.motors["O"].static_moment == pytest.approx(14.0, rel=1e-9)
     assert heavy.advice[-1].startswith("less load, or another motor or gear for O, whose torques at rest")
     assert not any("slower" in text for text in heavy.advice)
-    assert not verdict(13.9, 10.0, 20.0).feasible
-    assert verdict(13.9, 9.8, 20.0).feasible
-    fast = verdict(14.1, 10.0, 0.5)
+    assert not lifted(13.9, 10.0, 20.0).feasible
+    assert lifted(13.9, 9.8, 20.0).feasible
+    fast = lifted(14.1, 10.0, 0.5)
     assert fast.motors["O"].static_moment == pytest.approx(14.0, rel=1e-9)
     assert fast.advice[-1].startswith("a slower path")
-    assert verdict(14.1, 10.0, 20.0).feasible
+    assert lifted(14.1, 10.0, 20.0).feasible

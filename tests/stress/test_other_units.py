@@ -3,6 +3,7 @@
 import pytest
 from mechanisms import relative
 from rewritten_scenes import SYSTEMS
+from tables_3d import Y, revolute, scene
 
 import ffrobot
 
@@ -14,13 +15,11 @@ def falling_arm(units, integrator, axis):
     points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]}
     rod = {"mass": units.mass, "center": [length / 2, 0.0, 0.0], "inertia": [0.1 * inertia, inertia, inertia]}
     run = {"kind": "forward", "end": units.time, "output_step": 0.1 * units.time, "tolerance": 1e-4}
-    return ffrobot.make_scene(
-        name="arm", space="spatial", gravity=[0.0, 0.0, -9.81 * units.length / units.time**2],
-        body=[{"name": name, "rigid": rod | {"points": points}} for name in ("upper", "fore")],
-        joint=[{"name": "O", "type": "revolute", "between": ["ground", "upper.root"], "axis": [0.0, 1.0, 0.0]},
-               {"name": "A", "type": "revolute", "between": ["upper.tip", "fore.root"], "axis": axis}],
-        analysis=[{"name": "fall", "integrator": integrator} | run],
-    )  # fmt: skip
+    bodies = [{"name": name, "rigid": rod | {"points": points}} for name in ("upper", "fore")]
+    joints = [revolute("O", "ground", "upper.root", Y), revolute("A", "upper.tip", "fore.root", axis)]
+    gravity = [0.0, 0.0, -9.81 * units.length / units.time**2]
+    fall = {"name": "fall", "integrator": integrator} | run
+    return ffrobot.make_scene(**scene(bodies, joints, fall, gravity=gravity))
 
 
 @pytest.mark.parametrize("axis", [[0.0, 1.0, 0.0], [0.0, 0.8, 0.6]], ids=["in a plane", "askew"])

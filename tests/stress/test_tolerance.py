@@ -5,11 +5,12 @@ Many more robots, others each time: tests/campaigns/tolerance.py.
 
 import h5py
 import pytest
-from beam_links import beam_link
+from beam_links import beam_link, rectangle, tube
 from judging import largest_errors
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import relative
 from robots import inverse
+from tables_3d import pin, planar
 from tolerance import histories, scales, try_robot
 
 import ffrobot
@@ -28,42 +29,26 @@ def test_robots_that_were_outside(number):
 
 
 def beam(name, length, section, modes, **keys):
-    table = beam_link(
-        length,
-        section,
-        14,
-        E=2.1e11,
-        nu=None,
-        rho=7850.0,
-        condition="simply-supported",
-        modes={"count": modes, "family": "in-plane-bending", "attachment_modes": False},
-    )
-    return {"name": name, "link": table | keys}
+    modes = {"count": modes, "family": "in-plane-bending", "attachment_modes": False}
+    steel = {"E": 2.1e11, "nu": None, "rho": 7850.0, "condition": "simply-supported"}
+    return {"name": name, "link": beam_link(length, section, 14, modes=modes, **steel, **keys)}
 
 
 def test_forces_at_outputs_inside_of_steps(tmp_path):
     """Steps that were too long for the fastest vibration: forces erred by 6 tolerances between their ends."""
     s = "(10*(t/0.3)**3-15*(t/0.3)**4+6*(t/0.3)**5)"
-    tube = {"shape": "tube", "outer": 0.02325, "inner": 0.019}
-    bar = {"shape": "rectangle", "height": 0.0157, "width": 0.0314}
-    scene = ffrobot.make_scene(
-        name="tolerance",
-        gravity=[0.0, -9.81],
-        body=[beam("b1", 0.829, tube, 1), beam("b2", 0.804, bar, 6, damping={"ratio": 0.0147})],
-        joint=[
-            {"name": "O", "type": "revolute", "between": ["ground", "b1.root"]},
-            {"name": "A", "type": "revolute", "between": ["b1.tip", "b2.root"]},
-        ],
+    first = beam("b1", 0.829, tube(0.02325, 0.019), 1)
+    second = beam("b2", 0.804, rectangle(0.0157, 0.0314), 6, damping={"ratio": 0.0147})
+    run = {"kind": "pcid", "end": 0.3, "output_step": 1.5e-4, "integrator": "dop853"}
+    tables = planar(
+        [first, second],
+        [pin("O", "ground", "b1.root"), pin("A", "b1.tip", "b2.root")],
+        *(run | {"name": name, "tolerance": size} for name, size in (("exact", 1e-10), ("found", 1e-6))),
         payload=[{"point": "b2.tip", "mass": 0.373}],
         initial={"angles": {"b1": -0.85, "b2": -1.87}},
         trajectory=[{"name": "tip", "point": "b2.tip", "x": f"0.309+0.087*{s}", "y": f"-1.392+0.082*{s}"}],
-        analysis=[
-            {"name": name, "kind": "pcid", "end": 0.3, "output_step": 1.5e-4}
-            | {"tolerance": tolerance, "integrator": "dop853"}
-            for name, tolerance in (("exact", 1e-10), ("found", 1e-6))
-        ],
     )
-    with h5py.File(ffrobot.solve(scene).save(tmp_path / "robot.h5")) as file:
+    with h5py.File(ffrobot.solve(ffrobot.make_scene(**tables)).save(tmp_path / "robot.h5")) as file:
         expected = histories(file, "exact")
         errors = largest_errors(histories(file, "found"), expected, scales(file, expected, 0.3))
     assert max(errors.values())[0] <= 1e-6, errors
