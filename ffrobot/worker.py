@@ -35,7 +35,7 @@ LOADED = (  # by every run; what else a run has loaded, the next one finds
     "ffrobot.run.solve",
     "ffrobot.run.inputs",
     "ffrobot.results.write",
-    "ffrobot.results.resume",
+    "ffrobot.results.solving",
     "ffrobot.present.console",
     "ffrobot.present.start_postures",
     "ffrobot.present.summary",

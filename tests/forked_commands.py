@@ -19,7 +19,7 @@ from pathlib import Path
 
 LOADED = (
     "h5py", "scipy.linalg", "scipy.optimize", "scipy.interpolate", "matplotlib.backends.backend_agg",
-    "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.resume",
+    "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.solving",
     "ffrobot.fe_models.link", "ffrobot.present.details", "ffrobot.present.summary",
     "ffrobot.pictures.figures.plot", "ffrobot.pictures.report", "ffrobot.present.console",
     "ffrobot.present.start_postures", "ffrobot.scene.plausibility", "ffrobot.results.judging", "ffrobot.sweep.sweep",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +18,9 @@ from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.meanings import write_record
+from ..common.python_files import allowed_python, imported_files
 from ..common.version import VERSION
+from ..mbs import _core
 from ..mbs.fields.field_types import DATASET, METHOD
 from ..mbs.model.truncation import modes_kept
 from ..mbs.posture.redundancy import resolving_joints
@@ -32,13 +36,24 @@ from ..mbs.quantities.motion import (
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
 from ..mbs.run.record import Details, Run
+from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.result import AnalysisResult, Solution
+from ..scene.scene import Scene
 from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
 from .judging import write_off_path
 from .kinds import own_results
 from .peaks import peaking, write_peaks
-from .resume import write_state
+
+GROUP = "resume"  # in the group of an analysis
+STOPPED = ("interrupted", "too many steps", "not evaluated")
+ROWS = ("q", "v", "a", "multipliers")
+KEPT: dict[str, type[_core.TreeCheckpoint | _core.Recording | _core.Samples]] = {
+    "checkpoint": _core.TreeCheckpoint,
+    "recording": _core.Recording,
+    "samples": _core.Samples,
+}
+"""What a `Continuation` may have, as bytes of the core."""
 
 
 def write_results(solution: Solution, path: Path) -> None:
@@ -272,3 +287,46 @@ def _write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult)
             entry["motor_angle"] = entry["motor_coordinate"]  # the same dataset under its former name
         if (gear := gear_motions(run).get(joint.name)) is not None:
             entry.attrs["unresolved"] = gear.unresolved
+
+
+def write_state(file: h5py.File, solution: Solution) -> None:
+    """Add the state of an interrupted run to its results file, for `resume_scene`, and fingerprints of its input.
+
+    Python files that those of the scene import have names from its folder on.
+    """
+    scene, folder = solution.scene, solution.scene.path.parent
+    file.attrs["input_files"] = json.dumps(input_files(scene))
+    if python := python_files(tomllib.loads(scene.text), folder):
+        imported = imported_files(folder, *(one.parent for one in python), *allowed_python())
+        names = {os.path.relpath(one, folder.resolve()): digest for one, digest in imported.items()}
+        file.attrs["imported_files"] = json.dumps(names)
+    is_kept = stopped(solution) is not None or left_out(solution)
+    for name, run in solution.outcomes.items() if is_kept else ():
+        if solution.goes_on(run) and run.continuation is not None:
+            group = file[name].create_group(GROUP)
+            for row in ROWS:
+                group[row] = getattr(run, row)
+            for key in KEPT:
+                if (kept := getattr(run.continuation, key)) is not None:
+                    group[key] = np.frombuffer(kept.to_bytes(), dtype=np.uint8)
+
+
+def left_out(solution: Solution) -> list[str]:
+    """Analyses that were not begun when the run was stopped, or ended by an error."""
+    if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
+        return []
+    return [one.name for one in solution.scene.analysis if one.name not in solution.outcomes]
+
+
+def stopped(solution: Solution) -> Run | None:
+    """The analysis that was stopped."""
+    return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
+
+
+def input_files(scene: Scene) -> dict[str, str]:
+    """SHA-256 of a scene's input files other than links and modal bodies, by their name in messages."""
+    tables, folder = tomllib.loads(scene.text), scene.path.parent
+    waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}
+    calls = {folder / name: f"the waypoints {name}" for name in waypoints}
+    besides = {key: value for key, value in tables.items() if key != "body"}
+    return {calls.get(file, f"the file {file.name}"): digest_of_file(file) for file in named_files(besides, folder)}

@@ -338,7 +338,7 @@ class Solution(Prepared):
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
         unread: the run of the analysis of which outputs failed; its integration is kept.
         path_notes: what was found of paths before the analyses, one line each.
-        earlier: runs of analyses to go on with, from a results file: see `results.resume`.
+        earlier: runs of analyses to go on with, from a results file: see `results.solving`.
         mode_choice: where `modes = "auto"`.
     """
 

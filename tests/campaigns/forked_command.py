@@ -17,7 +17,7 @@ BAD = ("traceback", "crash", "hang", "no file named", "noise")
 PROGRESS = re.compile(r"ffrobot: .* \(\d+ s\)")  # what commands tell of long work, now and then
 LOADED_ONCE = (
     "h5py", "scipy.linalg", "scipy.optimize", "scipy.interpolate", "ffrobot.run.solve", "ffrobot.results.write",
-    "ffrobot.results.resume", "matplotlib.backends.backend_agg", "ffrobot.cli", "ffrobot.pictures.figures.plot",
+    "ffrobot.results.solving", "matplotlib.backends.backend_agg", "ffrobot.cli", "ffrobot.pictures.figures.plot",
     "ffrobot.pictures.report", "ffrobot.present.summary",
 )  # fmt: skip
 
