@@ -12,16 +12,12 @@ from copy import copy
 
 import click
 
-from .commands.bench import bench
 from .commands.design import optimise, sensitivity, sweep, uncertainty
 from .commands.exchange import export, import_
-from .commands.fit import fit
-from .commands.link import link
-from .commands.map import map_
 from .commands.pictures import plot, report, view
 from .commands.read import feasibility, info, linear, pose
-from .commands.smooth import smooth
-from .commands.solve import solve
+from .commands.robot import bench, fit, map_, smooth
+from .commands.stages import link, solve
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first
