@@ -28,10 +28,22 @@ SCENE, IN_PLANE = "Scene", "InPlane"  # names of definitions, and what they end 
 
 def schema(kind: str) -> dict[str, Any]:
     """The JSON schema of a "link", "scene" or "figures" file, or of 3D scenes alone ("spatial"), as a dictionary."""
-    described = scene_in(SPATIAL) if kind == SPATIAL else _scene() if kind == "scene" else _file(kind)
     if kind == SPATIAL:
+        described = scene_in(SPATIAL)
         described["properties"]["space"] = {"const": SPATIAL, "description": "Dimension of the motion."}
         described["required"].append("space")
+    elif kind == "scene":
+        described = _scene()
+    elif kind == "link":
+        from .fe_models.link_records.link import Link
+
+        described = TypeAdapter(Link).json_schema(schema_generator=_Described)
+        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
+        described = _for_toml(described)
+    else:
+        from .pictures.figures.shared import FigureFile
+
+        described = _for_toml(TypeAdapter(FigureFile).json_schema(schema_generator=_Described))
     title = "3D scene" if kind == SPATIAL else f"{kind} file"
     return {"$schema": DIALECT, **described, "title": f"ffrobot {title}"}
 
@@ -63,20 +75,6 @@ def _scene() -> dict[str, Any]:
     conditions = {"if": is_spatial, "then": either[0], "else": either[1]}
     # Editors that follow no "if" (Taplo) complete keys by "anyOf", which accepts everything.
     return {"type": "object", **conditions, "anyOf": [*either, True], "$defs": spatial | json.loads(text)}
-
-
-def _file(kind: str) -> dict[str, Any]:
-    """Of link files and of figure files."""
-    if kind == "link":
-        from .fe_models.link_records.link import Link
-
-        described = TypeAdapter(Link).json_schema(schema_generator=_Described)
-        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
-    else:
-        from .pictures.figures.shared import FigureFile
-
-        described = TypeAdapter(FigureFile).json_schema(schema_generator=_Described)
-    return _for_toml(described)
 
 
 class _Described(GenerateJsonSchema):

@@ -47,7 +47,11 @@ KEPT = ("ffrobot.", "scipy.")  # packages of which the next run finds what one h
 def main() -> None:
     """Answer requests until there are no more or SIGTERM arrives, which first ends the current run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: runs have it, whoever asks for them decides
-    requests, answers = _private_streams()
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for standard in (0, 1):  # of which others in this process get nothing
+        os.dup2(nowhere, standard)
+    os.close(nowhere)
     report = TemporaryFile()  # noqa: SIM115 (as long as the worker)
     _load(LOADED)
     gc.freeze()  # runs share what is loaded as long as none looks through it
@@ -98,9 +102,12 @@ def _run(arguments: Sequence[str], report: BinaryIO) -> NoReturn:
     for number in SIGNALS:
         signal.signal(number, EndOfCommand())
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    import numpy as np
+
     from .cli import main as command_line
 
-    _seed()
+    random.seed()  # numbers of its own where its scene's functions draw some: modules are seeded as they load
+    np.random.seed()  # noqa: NPY002 (the one generator that there is without asking)
     before = set(sys.modules)
     sys.argv = ["ffrobot", *arguments]
     code = 0
@@ -118,16 +125,6 @@ def _run(arguments: Sequence[str], report: BinaryIO) -> NoReturn:
     if "mpi4py.MPI" in loaded:  # it has to be finished where it was begun
         sys.exit(code)
     end_process(code)
-
-
-def _private_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Standard input and output, which others in this process get nothing of."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for standard in (0, 1):
-        os.dup2(nowhere, standard)
-    os.close(nowhere)
-    return requests, answers
 
 
 def _fork() -> int:
@@ -149,14 +146,6 @@ def _load(names: Sequence[str]) -> None:
             loaded = import_module(module)
             if record:
                 getattr(loaded, record).model_rebuild()
-
-
-def _seed() -> None:
-    """Give a run random numbers of its own where its scene's functions draw some: modules are seeded as they load."""
-    import numpy as np
-
-    random.seed()
-    np.random.seed()  # noqa: NPY002 (the one generator that there is without asking)
 
 
 if __name__ == "__main__":

@@ -98,11 +98,11 @@ AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have 
 
 def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
     """The verdict of the `analyses` of a results file of a `scene`."""
+    return Verdict(tuple(_judge(name, file[name], scene) for name in analyses))
+
+
+def _judge(name: str, group: h5py.Group, scene: Scene) -> AnalysisVerdict:
     coordinates = labelled_coordinates(scene)
-    return Verdict(tuple(_judge(name, file[name], scene, coordinates) for name in analyses))
-
-
-def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates) -> AnalysisVerdict:
     motors = _motors(group, coordinates)
     units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
