@@ -49,7 +49,7 @@ class Actuation:
     feasibility: Feasibility
 
     def at(self, rows: Indices) -> Actuation:
-        """These rows alone; the feasibility stays that of all."""
+        """Voltages and forces at outputs `rows` (T,) alone; the feasibility stays that of all."""
         voltages = {name: of_layout.at(rows) for name, of_layout in self.voltages.items()}
         return replace(self, voltages=voltages, unmet={name: values[rows] for name, values in self.unmet.items()})
 
