@@ -162,6 +162,7 @@ def earlier_runs(file: Results, solution: Solution) -> dict[str, Run]:
         about = file.attributes(name) if file.has(group) else None
         if about is None or (about["steps"] == 0 and about["status"] != "completed"):
             continue
+        states: dict[str, Any] = {row: file[f"{group}/{row}"] for row in ROWS}
         counts = {count: about[count].item() for count in COUNTS}
         ends = file[f"{name}/step_ends"] if file.has(f"{name}/step_ends") else np.zeros(0)
         choice = Choice(about["integrator"], about["integrator_reason"])
@@ -170,7 +171,6 @@ def earlier_runs(file: Results, solution: Solution) -> dict[str, Run]:
             for key, kind in KEPT.items()
             if file.has(f"{group}/{key}")
         }
-        states: dict[str, Any] = {row: file[f"{group}/{row}"] for row in ROWS}
         runs[name] = Run(
             analysis=analysis,
             model=solution.model,
