@@ -7,7 +7,7 @@ import math
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -16,6 +16,7 @@ import numpy as np
 from ..common.arrays import Array, Integers, as_list, as_rows
 from ..common.errors import InputError, blaming_file, check_known, quoted
 from ..common.libraries import extras, scipy
+from ..common.structs import struct
 from ..common.tables import LARGEST, as_csv, shown
 from ..common.toml_files import read_text
 from ..mbs.fields.waypoints import Recorded, Waypoints
@@ -29,7 +30,7 @@ Side = Literal["motor", "joint"]
 """Of a compliant gear."""
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class JointMotion:
     """One coordinate of a joint over T outputs."""
 
@@ -47,7 +48,7 @@ class JointMotion:
         return self.coordinate, self.rate
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class JointMotions:
     """Joints of an analysis with their coordinates at `time` (T,), s; `remarks` on restrictions.
 

@@ -8,13 +8,14 @@ drawn in 3D: they move in z = 0 and turn about z.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..common.arrays import Array, Indices
 from ..common.rotations import in_3d, of_quaternion
+from ..common.structs import struct
 from ..mbs.fields.field_types import GROUND
 from ..mbs.scene.topology import Edge, spanning_forest
 from ..results.file import Results
@@ -23,7 +24,7 @@ from ..results.joints import joint_type
 VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class MovingBody:
     """Motion of a body at T outputs, in global axes unless stated otherwise."""
 
@@ -149,7 +150,7 @@ def visible_exaggeration(size: float, deflection: float) -> float:
 PLACES = ("x", "y", "z")  # components of trajectories that are places
 
 
-@dataclass(frozen=True)
+@struct
 class PointTarget:
     """Prescribed position of a point: its `columns`, of x, y, z, and their values `wanted` (T, columns), m."""
 
@@ -188,7 +189,7 @@ def targets(results: Results, analysis: str) -> list[PointTarget]:
     return followed
 
 
-@dataclass(frozen=True)
+@struct
 class Marker:
     """A place that moves, with directions."""
 

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from io import BytesIO
 from itertools import chain, repeat
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from ..common.arrays import Array, Indices, NDArray
 from ..common.errors import InputError, SolveError, did_you_mean
 from ..common.files import check_ending, write_atomically
+from ..common.structs import struct
 from ..results.file import Results
 
 Frame = NDArray[np.uint8]  # (height, width, 3) red, green, blue
@@ -23,7 +23,7 @@ FRAMES_A_SECOND = 25
 SECONDS = 8.0  # of a movie, unless asked for otherwise
 
 
-@dataclass(frozen=True)
+@struct
 class MovieOptions:
     """Options of a movie."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +14,7 @@ from ..common.arrays import Array, Indices, Integers
 from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.rotations import of_rpy, smallest_turn
+from ..common.structs import struct
 from ..common.tables import shown
 from ..fe_models.modal_body import ModalBody, PictureMesh
 from ..mbs.scene.bodies import PRIMITIVES
@@ -153,7 +154,7 @@ SIDES = 8  # of bars that stand for lines
 OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
 
 
-@dataclass(frozen=True)
+@struct
 class Shape:
     """Points of a `body` that coordinates move: x + s Φ p."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +20,7 @@ from scipy.linalg import eigh
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.rotations import point_inertia
+from ...common.structs import struct
 from ...common.tables import shown
 from ...common.version import VERSION
 from ...fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
@@ -35,7 +36,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 """ω_a ω_b of the columns of O_e."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@struct
 class ShapeIntegrals:
     """Inertia shape integrals of a body with n modes; SI units, axes of the body."""
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from io import BytesIO
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
+from ...common.structs import struct
 from ...common.version import VERSION
 
 Element = ElementTree.Element
@@ -33,7 +33,7 @@ UNITS: Mapping[str, Mapping[str, int]] = {
 """Exponents of SI base units. Those of modal coordinates of unit mass are not whole, which FMI has no way to say."""
 
 
-@dataclass(frozen=True)
+@struct
 class Variable:
     """A name in the results, its unit (of `UNITS`) and a few words."""
 

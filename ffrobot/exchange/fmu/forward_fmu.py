@@ -6,7 +6,6 @@ import logging
 import platform
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from ...actuation.patches.link_patches import LinkPatches
 from ...common.arrays import Array
 from ...common.errors import InputError, check_known, quoted
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
@@ -121,7 +121,7 @@ Input = tuple[Variable, Array]
 Linear = tuple[Variable, _core.LinearOutput]
 
 
-@dataclass(frozen=True)
+@struct
 class ForwardUnit:
     """Inputs and outputs, and the `data` of the model.
 

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from ...actuation.control.linear_model import LinearModel, StateSpace
 from ...actuation.control.signals import ORDERS
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...mbs.joints.joints import JOINT_TYPES, FreeJoint
 from ...results.file import Results
 from .description import (
@@ -38,7 +39,7 @@ from .description import (
 )
 
 
-@dataclass(frozen=True)
+@struct
 class Unit:
     """Names, variables and model of an FMU."""
 

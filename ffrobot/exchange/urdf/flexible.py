@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, did_you_mean
 from ...common.rotations import unit
+from ...common.structs import struct
 from ...common.tables import shown
 from ...common.toml_files import load_toml
 from ...fe_models.link_file import read_link
@@ -29,7 +29,7 @@ ON_AXIS = 1e-6  # of the length: how far a joint may be off the axis of a beam
 SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of swing
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class ImportedLink:
     """A link of the URDF that a link file describes; its interface "root" is at the carrying joint."""
 
@@ -179,7 +179,7 @@ CONCENTRIC = 0.05  # of the radius: how far the joint may be from the axis of th
 CENTERED = 1e-6  # of the length: how far the center of the bore is from the joint without a remark
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class JointAxis:
     """A joint of the link: its `name`, `point` (3,), m, and `direction` (3,) in axes of the link file."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from ...common.errors import FfrobotError, InputError, of_file
 from ...common.files import check_folder, holds, write_atomically
+from ...common.structs import struct
 from ...common.tables import beyond_limits, shown
 from ...common.toml_files import toml_text
 from ...fe_models.link import cached_modal_body
@@ -133,7 +133,7 @@ TO_BE_APPENDED = """\
 """
 
 
-@dataclass(frozen=True)
+@struct
 class Imported:
     """Result of an import."""
 

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree
@@ -22,6 +22,7 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, check_known, quoted
 from ...common.keys import LONGEST_NAME
 from ...common.rotations import of_quaternion, of_rpy, point_inertia, rpy_of
+from ...common.structs import struct
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_bytes
 from ...mbs.model.body import Body
@@ -39,7 +40,7 @@ TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 """Types of joints that URDF has."""
 
 
-@dataclass(frozen=True)
+@struct
 class Origin:
     """Pose of a frame in another: `xyz` (m), and `rpy` (rad) about the fixed axes x, y, z in this order."""
 
@@ -52,7 +53,7 @@ class Origin:
         return Place(np.array(self.xyz), of_rpy(*self.rpy))
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class Place:
     """A frame in another: its origin d (3,) in m and its axes C (3, 3), columns, both in axes of the other."""
 
@@ -67,7 +68,7 @@ class Place:
 HERE = Place(np.zeros(3), np.eye(3))
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class Inertial:
     """Mass (kg), center (3,) in m and inertia about it (3, 3) in kg·m², in axes of the link."""
 
@@ -101,7 +102,7 @@ def inertial_of(body: Body, anchor: Array) -> Inertial:
     return Inertial(body.mass, center - anchor, (J + J.T) / 2)
 
 
-@dataclass(frozen=True)
+@struct
 class MeshFile:
     """A mesh that a link shows: its file as the URDF names it, factors along its axes, place in the link."""
 
@@ -113,7 +114,7 @@ class MeshFile:
 Shape = Literal["box", "cylinder", "capsule", "sphere"]
 
 
-@dataclass(frozen=True)
+@struct
 class Primitive:
     """A shape about its center: a box of `size` x, y, z; a cylinder along z (radius, length); a sphere (radius,). m.
 
@@ -125,7 +126,7 @@ class Primitive:
     origin: Origin
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class UrdfLink:
     """A link: its mass and inertia (None: the URDF has none), and its shapes, to be seen and for collisions."""
 
@@ -135,7 +136,7 @@ class UrdfLink:
     collision: tuple[MeshFile | Primitive, ...] = ()
 
 
-@dataclass(frozen=True)
+@struct
 class Mimic:
     """The coordinate is `multiplier` times that of the joint, plus `offset`."""
 
@@ -144,7 +145,7 @@ class Mimic:
     offset: float
 
 
-@dataclass(frozen=True)
+@struct
 class UrdfJoint:
     """Joint of a URDF; `origin`: pose of the child's frame in the parent's at coordinate zero.
 
@@ -163,7 +164,7 @@ class UrdfJoint:
     mimic: Mimic | None = None
 
 
-@dataclass(frozen=True)
+@struct
 class Robot:
     """Links and joints by name in the order of the file, the `root` that no joint carries, remarks on the file."""
 

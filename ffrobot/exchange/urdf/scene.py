@@ -11,6 +11,7 @@ import numpy as np
 from ...common.arrays import Array, as_rows
 from ...common.errors import InputError, quoted
 from ...common.rotations import rpy_of
+from ...common.structs import struct
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
 from ...mbs.scene.bodies import ROUND_OFF, check_inertia
@@ -46,7 +47,7 @@ class MergedLinks:
         return f'link "{shown(self.top)}"' + (f" with {quoted(fixed)} fixed to it" if fixed else "")
 
 
-@dataclass(frozen=True)
+@struct
 class Mechanism:
     """Bodies in the order in which joints carry them, and these joints, each from one body to the next.
 

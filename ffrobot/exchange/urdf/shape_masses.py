@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from itertools import pairwise
 from operator import add
@@ -16,6 +16,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import rpy_of, smallest_turn
+from ...common.structs import struct
 from ...common.tables import shown
 from ...fe_models.modal_body import ModalBody
 from ...mesh.skins import loaded_skin
@@ -29,7 +30,7 @@ logger = logging.getLogger(__name__)
 NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh pycollada"
 
 
-@dataclass(frozen=True)
+@struct
 class MeshMass:
     """Comparison of the mesh of a link with its <inertial>."""
 
@@ -135,7 +136,7 @@ def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
         yield Primitive("sphere", (2 * radius,), Origin())
 
 
-@dataclass(frozen=True)
+@struct
 class Filling:
     """Material that fills the shapes of links without mass."""
 

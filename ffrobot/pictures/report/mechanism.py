@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from ...common.arrays import Indices
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ..figures.shared import file_name
 from ..motion import (
@@ -128,7 +128,7 @@ MOTION = {
 FINEST = 32767  # a displacement of 1
 
 
-@dataclass(frozen=True)
+@struct
 class ModesOnPage:
     """A modal body of the page, with the labels of the bodies that it serves."""
 

@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from ...common.arrays import Array, Indices, Integers, NDArray, as_rows
 from ...common.errors import InputError, SolveError, check_known
 from ...common.files import check_folder, write_atomically
 from ...common.hdf5 import image_of, in_memory
+from ...common.structs import struct
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
@@ -34,7 +35,7 @@ from ..shapes import body_surface, surface_shape
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
 
 
-@dataclass(frozen=True)
+@struct
 class Grid:
     """Cells on P points that move over T steps."""
 
@@ -125,7 +126,7 @@ SECONDS_A_FRAME = 5.0  # … and so many more for each picture of a movie
 Place = Sequence[float]  # three
 
 
-@dataclass(frozen=True)
+@struct
 class Picture:
     """A picture to be drawn, or the frames of a movie."""
 
@@ -178,7 +179,7 @@ def draw_pictures(pictures: Sequence[Picture]) -> None:
 FRAMES = 201  # of an animation, unless asked for otherwise
 
 
-@dataclass(frozen=True)
+@struct
 class Options:
     """Options of grids and pictures."""
 
@@ -189,7 +190,7 @@ class Options:
     pictures: bool | None = None  # whether to draw pictures; None: where PyVista can
 
 
-@dataclass(frozen=True)
+@struct
 class Viewed:
     """Files written, and notes on what could not be drawn."""
 
