@@ -205,10 +205,10 @@ def _bores_at(
     for interface, joint in joints.items():
         axis, around = unit(joint.direction), []
         for face, center, direction in bores:
-            off = joint.point - center
-            across = float(np.linalg.norm(off - (off @ direction) * direction))
+            way = joint.point - center
+            across = float(np.linalg.norm(way - (way @ direction) * direction))
             if 1 - abs(float(direction @ axis)) < PARALLEL and across < CONCENTRIC * (face.radius or 0.0):
-                around.append((abs(float(off @ axis)), face, center, direction))
+                around.append((abs(float(way @ axis)), face, center, direction))
         if not around:
             continue
         off, face, center, direction = min(around, key=lambda bore: bore[0])
