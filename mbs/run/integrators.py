@@ -224,7 +224,6 @@ def _ringing_phase(omega: Array, damping_ratio: Array, excited: Array, end: floa
     return phase
 
 
-SMALL_TWIST = 1e-5  # rad
 TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few of its times long, are too many
 
 
@@ -316,7 +315,7 @@ def _excitation(system: MultibodySystem, start: State, vibrations: Vibrations) -
     A mode at rest follows its load and the links' static deflection; the velocity v, the acceleration a or the jerk j
     about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does beside following statically
     is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on. Gears carry at least what the norm of errors takes for
-    small (core/recursion/motion/motion_norm.cpp).
+    small (core/recursion/motion/motion_norm.h).
     """
     model, omega, K = system.model, vibrations.frequency, vibrations.springs
     dt = (1e-3 if system.replay is None else 0.1) / float(omega.max())  # round-off of what is replayed is no jerk
@@ -328,7 +327,7 @@ def _excitation(system: MultibodySystem, start: State, vibrations: Vibrations) -
     forces = K @ vibrations.shape * amplitude
     springs = [(node.p_v, node.body.stiffness * q[node.p_q]) for node in model.tree.nodes if node.body.n_modes]
     for gear in model.tree.gears:
-        least = SMALL_TWIST * max(gear.spring.slopes)
+        least = _core.small_twist * max(gear.spring.slopes)
         springs.append((gear.joint.v, np.append(gear.spring.moment(gear.twist(q, v)[0]), least)))
     of_each = np.array([np.linalg.norm(forces[columns], axis=0) for columns, _ in springs])
     carried = [of for _, of in springs]

@@ -272,6 +272,7 @@ void bind_scene(nb::module_ &m) {
 } // namespace
 
 void bind_tree_motion(nb::module_ &m) {
+  m.attr("small_twist") = small_twist; // rad, of gears: mbs/core/recursion/motion/motion_norm.h
   bind_checkpoint(m);
   bind_run(m);
   bind_orientation_laws(m);

@@ -23,7 +23,6 @@ constexpr double small_arm = 1e-2;   // of a body's length: moments count like t
 constexpr double slow = 0.01;        // of the natural pace: rates of joints below, times the peak of what they are of
 constexpr double early = 0.1;        // of the largest acceleration on a path: smaller ones count like this part
 constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
-constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = std::numeric_limits<double>::min(); // of groups without members
 
 double square(double x) { return x * x; }

@@ -5,6 +5,8 @@
 
 namespace ffrobot::recursion {
 
+constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
+
 // Largest sizes so far, all that a norm remembers: by group of what is alike in states, and in forces; N.
 struct NormPeaks {
   std::vector<double> state, force;
