@@ -10,30 +10,6 @@ namespace {
 
 using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)>;
 
-// Reads (q, v, a)
-template <class Space> class Plant final : public SampledPlant {
-public:
-  Plant(const Mechanism<Space> &mechanism, RecursiveMotion<Space> &reader, ZeroOrderHold &held)
-      : reader_(reader), held_(held), n_q_(mechanism.n_q), n_v_(mechanism.n_v), read_(n_q_ + 2 * n_v_) {}
-
-  void hold(const VectorXd &u) override {
-    check_size("commands", u.size(), held_.direction().cols());
-    held_.hold(u);
-  }
-
-  VectorXd read(double t, const double *y) override {
-    read_.head(n_q_ + n_v_) = Eigen::Map<const VectorXd>(y, n_q_ + n_v_);
-    reader_.evaluate(t, y, y + n_q_, read_.data() + n_q_ + n_v_);
-    return read_;
-  }
-
-private:
-  RecursiveMotion<Space> &reader_;
-  ZeroOrderHold &held_;
-  Index n_q_, n_v_;
-  VectorXd read_;
-};
-
 template <class Space>
 TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                           const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
@@ -48,11 +24,20 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   held.hold(first_command);
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data(), &held);
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data(), &held);
-  Plant<Space> plant(model.mechanism, reader, held);
-  const Sampling sampling{samples, delay, locked(controller)};
-  const SampledLoop loop(plant, sampling, times.back());
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, &loop.breaks(), nullptr,
-                    between);
+  const Index size = q.size() + v.size();
+  VectorXd read(size + v.size()); // (q, v, a)
+  const auto command = [&, call = locked(controller)](std::size_t k, double t, const double *y) {
+    read.head(size) = Eigen::Map<const VectorXd>(y, size);
+    reader.evaluate(t, y, y + q.size(), read.data() + size);
+    return call(k, t, read);
+  };
+  const auto hold = [&](const VectorXd &u) {
+    check_size("commands", u.size(), held.direction().cols());
+    held.hold(u);
+  };
+  const Sampling sampling{samples, delay, command, hold};
+  const Breaks breaks = sampled_breaks(sampling, times.back());
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, &breaks, nullptr, between);
 }
 
 template <class Space>

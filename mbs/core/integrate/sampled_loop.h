@@ -1,4 +1,4 @@
-// A sampled controller about an integration: what it acts on is read at samples, and holds commands in between.
+// A sampled controller about an integration: states are read at samples, and commands held in between.
 #pragma once
 
 #include "core/integrate/integrate.h"
@@ -8,42 +8,47 @@
 
 namespace ffrobot {
 
-// What a sampled loop asks of a motion, of whatever model.
-class SampledPlant {
-public:
-  virtual ~SampledPlant() = default;
-  virtual Eigen::VectorXd read(double t, const double *y) = 0; // at a state y = (q, v), under the command that acts
-  virtual void hold(const Eigen::VectorXd &u) = 0;             // from now on
-};
-
 struct Sampling {
-  std::vector<double> times;
-  double delay = 0; // from a sample to when its command acts
-  // u for what was read at sample k; never asked about time beyond the run
-  std::function<Eigen::VectorXd(std::size_t, double, const Eigen::VectorXd &)> controller;
+  std::vector<double> times; // s, of samples
+  double delay = 0;          // s, from a sample to when its command acts
+  // Command at sample k: time and state (q, v), under the command that acts; never asked about time beyond the run
+  std::function<Eigen::VectorXd(std::size_t, double, const double *)> controller;
+  std::function<void(const Eigen::VectorXd &)> hold; // a command, from now on
 };
 
-class SampledLoop {
-public:
-  // For a run until `end`. Plant and sampling must outlive this.
-  SampledLoop(SampledPlant &plant, const Sampling &sampling, double end);
-  SampledLoop(const SampledLoop &) = delete;
-  SampledLoop &operator=(const SampledLoop &) = delete;
-
-  const Breaks &breaks() const { return breaks_; }
-
-private:
+// Samples, and the actions of their commands, in order, of a run until `end` (s); what lies closer together than a
+// clock tells is at one time. The sampling must outlive them.
+inline Breaks sampled_breaks(const Sampling &sampling, double end) {
   struct Event {
-    double time;
     std::size_t sample;
-    bool acts; // the command of the sample, which is taken otherwise
+    bool acts; // its command, which is taken otherwise
   };
-
-  static std::vector<Event> schedule(const Sampling &sampling, double end);
-
-  std::vector<Event> events_;
-  std::vector<Eigen::VectorXd> taken_;
-  Breaks breaks_;
-};
+  std::vector<Event> events;
+  Breaks breaks;
+  const auto &times = sampling.times;
+  const double same = 1e-9 * (times.size() > 1 ? times[1] - times[0] : end);
+  std::size_t acted = 0;
+  const auto act_until = [&](double t, std::size_t taken) {
+    for (; acted < taken && times[acted] + sampling.delay <= t + same; ++acted) {
+      const double then = times[acted] + sampling.delay;
+      breaks.times.push_back(then < t - same ? then : t), events.push_back({acted, true});
+    }
+  };
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    act_until(times[k], k);
+    breaks.times.push_back(times[k]), events.push_back({k, false});
+    if (sampling.delay == 0)
+      act_until(times[k], k + 1);
+  }
+  act_until(end, times.size());
+  breaks.at = [&sampling, events, commands = std::vector<Eigen::VectorXd>(times.size())](std::size_t i, double t,
+                                                                                         const double *y) mutable {
+    if (const auto &[sample, acts] = events[i]; acts)
+      sampling.hold(commands[sample]);
+    else
+      commands[sample] = sampling.controller(sample, t, y);
+  };
+  return breaks;
+}
 
 } // namespace ffrobot
