@@ -16,7 +16,7 @@ constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton'
 
 } // namespace
 
-GeneralizedAlpha::GeneralizedAlpha(ImplicitSystem &system, double spectral_radius)
+GeneralizedAlpha::GeneralizedAlpha(OdeSystem &system, double spectral_radius)
     : system_(system), project_(system), n_(system.n_v()), alpha_m_((2 * spectral_radius - 1) / (spectral_radius + 1)),
       alpha_f_(spectral_radius / (spectral_radius + 1)), beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)),
       gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),

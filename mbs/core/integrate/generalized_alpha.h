@@ -12,7 +12,7 @@ namespace ffrobot {
 class GeneralizedAlpha final : public Method {
 public:
   // spectral_radius: what a step leaves of vibrations far above 1 / h; 1: no damping, 0: all of it
-  GeneralizedAlpha(ImplicitSystem &system, double spectral_radius);
+  GeneralizedAlpha(OdeSystem &system, double spectral_radius);
 
   bool step(double t, const double *y, double h, double tolerance) override;
   bool finish(double t) override;
@@ -39,7 +39,7 @@ private:
   bool iterate(double t, const double *y, double h, bool is_first);
   void stiff_force(const Eigen::VectorXd &x); // force_, with B^T force_ = (N - M) x
 
-  ImplicitSystem &system_;
+  OdeSystem &system_;
   ImplicitProjection project_;
   Eigen::Index n_; // n_v
   double alpha_m_, alpha_f_, beta_, gamma_, leading_;

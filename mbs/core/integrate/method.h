@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 
 #include <memory>
-#include <string>
 
 namespace ffrobot {
 
@@ -86,8 +85,7 @@ struct MethodChoice {
   double spectral_radius = 0.8; // of generalized-alpha at infinite frequency
 };
 
-// The system must outlive the method. Throws std::invalid_argument where an implicit method gets a system that is not
-// an ImplicitSystem.
+// The system must outlive the method.
 std::unique_ptr<Method> make_method(const MethodChoice &choice, OdeSystem &system);
 
 } // namespace ffrobot

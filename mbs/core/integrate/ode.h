@@ -5,7 +5,6 @@
 
 #include <Eigen/Core>
 
-#include <algorithm>
 #include <complex>
 
 namespace ffrobot {
@@ -13,8 +12,16 @@ namespace ffrobot {
 // States y = (q, v) have n_q + n_v entries. Methods step in local coordinates z (see local_coordinates.h), their rates
 // and increments, 2 n_v each: they are y, dy and so on there, as in the formulas for vector spaces. Where q consists of
 // numbers alone, both are the same.
+//
+// Implicit methods see M v_dot + C_q^T lambda = Q under constraints, and its stiff terms: those of Q are
+// -B^T (K B q + D B v) with diagonals K and D, zero on rotations, and B the identity over the rows of coupling()^T:
+// along coordinates that v does not have. K and D are slopes at the last linearise(), those of friction among them.
+// Newton's method on the equations of a step meets N = M + B^T (damping_factor D + stiffness_factor K) B, real or
+// complex, under C_q: block-arrow without coupling.
 class OdeSystem {
 public:
+  using Complex = std::complex<double>;
+
   explicit OdeSystem(const ConfigurationSpace &space) : local_(space) {}
   virtual ~OdeSystem() = default;
 
@@ -27,27 +34,18 @@ public:
   virtual void slope(double t, const double *z, double *z_dot) = 0;
 
   // The next slopes will be at these times (count): what depends on time alone can be found for all at once.
-  virtual void set_stage_times([[maybe_unused]] const double *times, [[maybe_unused]] int count) {}
+  virtual void set_stage_times(const double *times, int count) = 0;
 
   // Where a step from t on that could be of length h had best end: what acts may cost less at times that it knows.
-  virtual double end_of_step(double t, double h) { return t + h; }
+  virtual double end_of_step(double t, double h) = 0;
 
   // What rounding of every part by `relative` leaves in the last slope(), near z, where parts of it cancel, as loads
   // and what carries them: z_dot (2 n_v). Another slope() has to follow before error_size() or accepted().
-  virtual void round_off([[maybe_unused]] const double *z, [[maybe_unused]] double relative, double *z_dot) {
-    std::fill_n(z_dot, size(), 0.0);
-  }
+  virtual void round_off(const double *z, double relative, double *z_dot) = 0;
 
-  // Moves z back onto the system's invariants after a step; false where that fails (the step is then rejected).
-  virtual bool correct(double t, double *z) = 0;
-
-  // The same, and the slope there.
-  virtual bool finish(double t, double *z, double *z_dot) {
-    if (!correct(t, z))
-      return false;
-    slope(t, z, z_dot);
-    return true;
-  }
+  // Moves z back onto the system's invariants after a step, and finds the slope there; false where that fails (the step
+  // is then rejected).
+  virtual bool finish(double t, double *z, double *z_dot) = 0;
 
   // Size of the error e of z, relative to the peaks so far of the reported quantities: what the tolerance bounds.
   // The last slope() was that at (t, z); may evaluate slopes of its own.
@@ -64,33 +62,18 @@ public:
   virtual bool is_sensible(const double *z) const = 0;
 
   // Functions of time alone that slopes follow, as many as prescribed(): loads, accelerations of paths.
-  virtual Eigen::Index prescribed() const { return 0; }
-  virtual void prescribe([[maybe_unused]] double t, [[maybe_unused]] double *f) {}
+  virtual Eigen::Index prescribed() const = 0;
+  virtual void prescribe(double t, double *f) = 0;
 
   // First step size to try: a tenth of the fastest vibration's radian.
   virtual double initial_step() const = 0;
 
   virtual unsigned long evaluations() const = 0;
 
-private:
-  LocalCoordinates local_;
-};
-
-// What implicit methods need besides: M v_dot + C_q^T lambda = Q under constraints, and its stiff terms.
-//
-// The stiff terms of Q are -B^T (K B q + D B v) with diagonals K and D, zero on rotations, and B the identity over the
-// rows of coupling()^T: along coordinates that v does not have. K and D are slopes at the last linearise(), those
-// of friction among them. Newton's method on the equations of a step meets N = M + B^T (damping_factor D +
-// stiffness_factor K) B, real or complex, under C_q: block-arrow without coupling.
-class ImplicitSystem : public OdeSystem {
-public:
-  explicit ImplicitSystem(const ConfigurationSpace &space) : OdeSystem(space), uncoupled_(n_v(), 0) {}
-  using Complex = std::complex<double>;
-
-  virtual Eigen::Index constraints() const = 0;                          // rows of C, and of multipliers
-  virtual const Eigen::VectorXd &stiffness() const = 0;                  // (n_stiff), zero where nothing is stiff
-  virtual const Eigen::VectorXd &damping() const = 0;                    // (n_stiff)
-  virtual const Eigen::MatrixXd &coupling() const { return uncoupled_; } // (n_v, n_stiff - n_v)
+  virtual Eigen::Index constraints() const = 0;         // rows of C, and of multipliers
+  virtual const Eigen::VectorXd &stiffness() const = 0; // (n_stiff), zero where nothing is stiff
+  virtual const Eigen::VectorXd &damping() const = 0;   // (n_stiff)
+  virtual const Eigen::MatrixXd &coupling() const = 0;  // (n_v, n_stiff - n_v)
   Eigen::Index n_stiff() const { return n_v() + coupling().cols(); }
 
   // M, C_q and D of the next factorisations are those at (t, z).
@@ -114,7 +97,7 @@ public:
   virtual double rate_size(const double *z, const Eigen::VectorXd &rate) const = 0;
 
 private:
-  Eigen::MatrixXd uncoupled_;
+  LocalCoordinates local_;
 };
 
 } // namespace ffrobot

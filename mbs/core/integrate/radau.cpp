@@ -47,7 +47,7 @@ constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton'
 
 } // namespace
 
-Radau::Radau(ImplicitSystem &system)
+Radau::Radau(OdeSystem &system)
     : system_(system), project_(system), n_(system.n_v()), Z_(Eigen::MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_),
       change_(Z_), collocation_(Z_), slopes_(Z_), previous_slopes_(Z_), stage_(2 * n_), end_(2 * n_), start_(2 * n_),
       first_slope_(2 * n_), last_slope_(2 * n_), real_(2 * n_), force_(system.n_stiff()), unknown_(n_),

@@ -10,7 +10,7 @@ namespace ffrobot {
 
 class Radau final : public Method {
 public:
-  explicit Radau(ImplicitSystem &system);
+  explicit Radau(OdeSystem &system);
 
   bool step(double t, const double *y, double h, double tolerance) override;
   bool finish(double t) override;
@@ -34,7 +34,7 @@ public:
   double *last_slope() override { return last_slope_.data(); }
 
 private:
-  using Complex = ImplicitSystem::Complex;
+  using Complex = OdeSystem::Complex;
 
   void factorise(double t, const double *y, double h);
   bool solve_stages(double t, const double *y, double h, double tolerance); // by Newton's method, from predict()
@@ -45,7 +45,7 @@ private:
   // x: right-hand side of (mu I - J) x = r in, solution out, J the Jacobian of (q, v) -> (v, v_dot)
   template <class Scalar> void solve(Scalar mu, Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &x);
 
-  ImplicitSystem &system_;
+  OdeSystem &system_;
   ImplicitProjection project_;
   Eigen::Index n_;                           // n_v: half the size of y
   Eigen::MatrixXd Z_, W_, F_, change_;       // (2n, 3): stages less y, the same in eigenvectors, slopes, Newton's step

@@ -7,7 +7,7 @@ namespace ffrobot {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-RecordedMotion::RecordedMotion(ImplicitSystem &motion, const Recording &recording)
+RecordedMotion::RecordedMotion(OdeSystem &motion, const Recording &recording)
     : motion_(motion), recording_(recording), z_(motion_.size()), slope_(motion_.size()), end_slope_(motion_.size()) {
   constexpr int remembered = 4;
   cache_.resize(remembered);

@@ -14,7 +14,7 @@ namespace ffrobot {
 class RecordedMotion {
 public:
   // `motion`: a system as the one that was recorded, which nothing else moves. Both must outlive this.
-  RecordedMotion(ImplicitSystem &motion, const Recording &recording);
+  RecordedMotion(OdeSystem &motion, const Recording &recording);
   RecordedMotion(const RecordedMotion &) = delete;
   RecordedMotion &operator=(const RecordedMotion &) = delete;
 
@@ -48,7 +48,7 @@ private:
   const double *evaluated(double t);             // z_
   bool is_stage(int i, double t) const;          // of the step that is followed
 
-  ImplicitSystem &motion_;
+  OdeSystem &motion_;
   const Recording &recording_;
   std::size_t hint_ = 0;
   std::vector<Step> cache_; // the stages of a step visit a few recorded steps in turn

@@ -4,6 +4,9 @@
 
 #include "core/integrate/ode.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <vector>
 
 namespace ffrobot {
@@ -18,12 +21,60 @@ namespace ffrobot {
 class StepLimit {
 public:
   // A function that changes by less than `tolerance`, relative to its largest value, limits nothing.
-  StepLimit(OdeSystem &system, double start, double end, double tolerance);
+  StepLimit(OdeSystem &system, double start, double end, double tolerance)
+      : start_(start), interval_((end - start) / static_cast<double>(intervals)) {
+    if (system.prescribed() == 0)
+      return;
+    Eigen::ArrayXXd f(system.prescribed(), intervals + 1); // NaN where they have no finite value
+    for (Eigen::Index i = 0; i <= intervals; ++i)
+      system.prescribe(start + interval_ * static_cast<double>(i), f.col(i).data());
+    Eigen::ArrayXd bend = Eigen::ArrayXd::Zero(intervals + 1); // most of all functions
+    for (Eigen::Index k = 0; k < f.rows(); ++k) {
+      const double whole = range(f.row(k), tolerance);
+      if (!(whole > 0) || !std::isfinite(whole))
+        continue;
+      for (Eigen::Index i = 1; i < intervals; ++i) {
+        const double of_sample = std::abs(f(k, i - 1) - 2 * f(k, i) + f(k, i + 1)) / whole / interval_;
+        if (of_sample > bend[i]) // not NaN
+          bend[i] = of_sample;
+      }
+    }
+    if (!(bend.sum() * (end - start) > most_bend))
+      return; // steps as long as the run are none too long
+    bend_.resize(bend.size());
+    std::partial_sum(bend.begin(), bend.end(), bend_.begin());
+  }
 
-  double of(double t, double step) const; // the step, or a shorter one
+  // The step, or a shorter one
+  double of(double t, double step) const {
+    if (bend_.empty() || !(step > 0))
+      return step;
+    const auto first = static_cast<std::size_t>(std::clamp((t - start_) / interval_, 0.0, double(intervals)));
+    const double before = first ? bend_[first - 1] : 0;
+    for (std::size_t i = first; i < bend_.size(); ++i) {
+      const double way = start_ + interval_ * static_cast<double>(i) - t; // to this sample
+      if (way >= step)
+        break;
+      const double bend = bend_[i] - before;
+      if (bend * step > most_bend && bend * (way + interval_) > most_bend)
+        return std::min(step, std::max(way, most_bend / bend));
+    }
+    return step;
+  }
 
 private:
-  double bend_before(std::size_t sample) const { return sample ? bend_[sample - 1] : 0; }
+  static constexpr Eigen::Index intervals = 1000;
+  static constexpr double most_bend = 4; // of a step
+
+  // Range of the values that are numbers; 0 where it is less than `tolerance` of the largest.
+  template <class Values> static double range(const Values &f, double tolerance) {
+    double least = INFINITY, most = -INFINITY;
+    for (const double x : f)
+      if (std::isfinite(x))
+        least = std::min(least, x), most = std::max(most, x);
+    const double between = most - least;
+    return between > tolerance * std::max(std::abs(least), std::abs(most)) ? between : 0;
+  }
 
   double start_, interval_;
   std::vector<double> bend_; // 1/s, up to and with each sample; empty where nothing bends

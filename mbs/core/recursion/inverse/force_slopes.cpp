@@ -102,11 +102,7 @@ ForcesAtRest forces_at_rest(const Mechanism<Space> &m, const Scene &scene, doubl
     found.C_q = gradients(m, q.data(), w);
     VectorXd rate(rows);
     measure(m, q.data(), at.still.data(), w, found.value.data(), rate.data());
-    const std::vector<Jet> targets = targets_at(scene, t);
-    for (std::size_t r = 0; r < targets.size(); ++r) {
-      double &value = found.value[r];
-      value = m.constraints[r].apart(value, targets[r].value);
-    }
+    take_off(targets_at(scene, t), m.constraints, found.value, rate);
   }
   found.Q = -at.required(nullptr);
   if (const double *along = at.acting.generalized())

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace ffrobot::recursion {
 
@@ -14,7 +13,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double singular_ratio = 4e-6; // of Posture: below, joints cannot follow, and rounding leaves 1e-5 of forces
+constexpr double singular_ratio = 4e-6; // of postures: below, joints cannot follow, and rounding leaves 1e-5 of forces
 constexpr double near = 0.01;           // likewise: above, …
 constexpr double brief = 1. / 4000;     // … postures hardly change within this part of a run
 constexpr int instants = 100;           // of a run, at which accelerations on paths are looked at
@@ -44,7 +43,7 @@ template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
                                         const double *q, const double *v, const ZeroOrderHold *held,
                                         ExternalForces *external)
-    : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
+    : OdeSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
       workspace_(mechanism), measured_(mechanism), forces_(mechanism, scene, held, external),
       laws_(scene, mechanism.constraints.size()), norm_(mechanism), newton_(mechanism, scene),
       value_(VectorXd::Zero(mechanism.constraints.size())), rate_(value_), correction_(VectorXd::Zero(mechanism.n_v)),
@@ -56,7 +55,9 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   else if (!mechanism.constraints.empty())
     evaluate(t, q, v, correction_.data()); // projections need its factors
   newton_.keep(workspace_.active);
-  bear_loads();
+  for (const int r : workspace_.active)
+    if (const Constraint &of = mechanism.constraints[r]; forces_.acts() && of.model.kind == ConstraintKind::coordinate)
+      borne_.push_back({mechanism.nodes[of.node].v + of.freedom, r, 0});
   if (scene.has_loops && !workspace_.active.empty()) {
     evaluate(t, q, v, correction_.data()); // with the factors of the equations that are kept
     loops_.emplace(mechanism, workspace_);
@@ -69,13 +70,6 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[k])), steps_between_postures_ = 10;
-}
-
-template <class Space> void RecursiveMotion<Space>::bear_loads() {
-  if (forces_.acts())
-    for (const int r : workspace_.active)
-      if (const Constraint &of = mechanism_.constraints[r]; of.model.kind == ConstraintKind::coordinate)
-        borne_.push_back({mechanism_.nodes[of.node].v + of.freedom, r, 0});
 }
 
 template <class Space> void RecursiveMotion<Space>::plan(double begin, double end) {
@@ -204,7 +198,7 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
 // Residuals are measured with the kinematics that the slope needs, too.
 template <class Space> bool RecursiveMotion<Space>::finish(double t, double *z, double *z_dot) {
   if (forces_.acts() || !local().space().is_flat())
-    return ImplicitSystem::finish(t, z, z_dot);
+    return correct(t, z) && (slope(t, z, z_dot), true);
   const bool is_on_constraints = project(t, z, z + n_v(), workspace_) < is_on;
   if (is_on_constraints)
     slope(t, z, z_dot);

@@ -23,7 +23,7 @@ struct MotionHistory {
   PostureHistory postures;
 };
 
-template <class Space> class RecursiveMotion final : public ImplicitSystem {
+template <class Space> class RecursiveMotion final : public OdeSystem {
 public:
   // Constraint equations that depend on others at time t and (q, v) are left out from there on; they are to be
   // consistent. Mechanism, scene and what acts beside its forces (as in SceneForces) must outlive this.
@@ -37,7 +37,6 @@ public:
   void set_stage_times(const double *times, int count) override;
   void round_off(const double *z, double relative, double *z_dot) override;
   double end_of_step(double t, double h) override { return forces_.end_of_step(t, h); }
-  bool correct(double t, double *z) override;
   bool finish(double t, double *z, double *z_dot) override;
   double error_size(double t, const double *z, const double *e) override;
   double change_size(const double *z, const double *change, double rate) const override;
@@ -86,8 +85,8 @@ private:
       turn_markers(t);
   }
   void turn_markers(double t);
-  void bear_loads();                                                         // finds borne_
   void evaluate_here(double t, const double *q, const double *v, double *a); // evaluate(), inline
+  bool correct(double t, double *z); // moves z onto the constraint equations; false where that fails
   Placed<Space, double> residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
   const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged

@@ -49,11 +49,7 @@ template <class Space> void Postures<Space>::go_to(double t) {
 
 template <class Space> void Postures<Space>::measure(const double *q, const double *v) {
   recursion::measure(m_, q, v, w_, value_.data(), rate_.data());
-  for (std::size_t r = 0; r < targets_.size(); ++r) {
-    double &value = value_[r];
-    value = m_.constraints[r].apart(value, targets_[r].value);
-    rate_[r] -= targets_[r].rate;
-  }
+  take_off(targets_, m_.constraints, value_, rate_);
 }
 
 template <class Space>

@@ -135,4 +135,8 @@ template <class Workspace> void turn_markers(const Scene &scene, double t, Works
 
 std::vector<Jet> targets_at(const Scene &scene, double t); // of all constraint equations
 
+// Takes targets off the values and rates (constraints) that measure() has found.
+void take_off(const std::vector<Jet> &targets, const std::vector<Constraint> &constraints, Eigen::VectorXd &value,
+              Eigen::VectorXd &rate);
+
 } // namespace ffrobot::recursion
