@@ -16,26 +16,6 @@ FFROBOT_INLINE T by_turning(const Mechanism<Space> &m, const Attachment &at, con
   return T(0.);
 }
 
-// n . log(B A^T)
-template <class T> inline T turn_about(const T *n, const T (&A)[3][3], const T (&B)[3][3]) {
-  T R[3][3], x[3];
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      R[i][j] = dot(B[i], A[j]);
-  logarithm(R, x);
-  return dot(n, x);
-}
-
-// From a to b, and its rate
-template <class Space, class T>
-FFROBOT_INLINE void separation(const Mechanism<Space> &m, const Constraint &constraint, const Workspace<Space, T> &w,
-                               T *d, T *d_dot) {
-  Pose<T> a, b;
-  attachment_motion(m, constraint.a, w, a), attachment_motion(m, constraint.b, w, b);
-  for (int i = 0; i < 3; ++i)
-    d[i] = b.r[i] - a.r[i], d_dot[i] = b.v[i] - a.v[i];
-}
-
 // Of one equation; its second derivative is
 //     force . (r_b_ddot - r_a_ddot) + moment_b . Omega_b_dot - moment_a . Omega_a_dot + bias
 template <class T> struct ConstraintMotion {
@@ -72,8 +52,14 @@ FFROBOT_INLINE void rotation_motion(const T *n, const Pose<T> &a, const Pose<T> 
   to.rate = dot(n, omega);
   if constexpr (dim == 3)
     to.value = (b.angle - a.angle) * n[2];
-  else
-    to.value = turn_about(n, a.R, b.R);
+  else { // n . log(B A^T)
+    T R[3][3], x[3];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        R[i][j] = dot(b.R[i], a.R[j]);
+    logarithm(R, x);
+    to.value = dot(n, x);
+  }
 }
 
 // Way d = r_b - r_a along g = A n, which turns with a

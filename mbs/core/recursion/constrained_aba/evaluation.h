@@ -156,8 +156,13 @@ Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Work
     const Constraint &constraint = m.constraints[r];
     value[r] = rate[r] = T(0.);
     if (constraint.model.kind == ConstraintKind::point) {
-      if (!of || !(of->a == constraint.a && of->b == constraint.b))
-        separation(m, constraint, w, d, d_dot), of = &constraint;
+      if (!of || !(of->a == constraint.a && of->b == constraint.b)) {
+        Pose<T> a, b;
+        attachment_motion(m, constraint.a, w, a), attachment_motion(m, constraint.b, w, b);
+        for (int i = 0; i < 3; ++i)
+          d[i] = b.r[i] - a.r[i], d_dot[i] = b.v[i] - a.v[i];
+        of = &constraint;
+      }
       for (int i = 0; i < 3; ++i)
         value[r] += constraint.model.f[i] * d[i], rate[r] += constraint.model.f[i] * d_dot[i];
     } else if (constraint.model.kind != ConstraintKind::coordinate) {

@@ -167,16 +167,11 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
         applied[k] = outer[k];
     }
   }
-  const bool universal = node.joint == JointKind::universal, screw = node.joint == JointKind::screw;
   const auto change = [&](const auto &of_forces) { // of M from both sides, of H
-    both_sides<decltype(of_forces), d, T>(of_forces, M), of_forces(H);
+    if (!node.shape.free_are_axes)
+      both_sides<decltype(of_forces), d, T>(of_forces, M), of_forces(H);
   };
-  if constexpr (d == 6) {
-    if (universal)
-      change([&](auto *x) { to_cross(hinge, x); });
-    else if (screw)
-      change([&](auto *x) { x[5] += node.lead * x[2]; });
-  }
+  change([&](auto *x) { forces_to_freedoms(node, hinge, x); });
   for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
     if (std::is_same_v<T, double> && node.shape.freedoms.component[k] == Space::axis)
       eliminate_freedom<Space::axis, Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
@@ -188,12 +183,7 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
   if (node.is_single_grounded)
     for (int i = 0; i < d; ++i)
       H[i].write(w.stored.data() + (node.ground_slot() + i) * stride_of(W));
-  if constexpr (d == 6) {
-    if (universal)
-      change([&](auto *x) { from_cross(hinge, x); });
-    else if (screw)
-      change([&](auto *x) { x[5] -= node.lead * x[2]; });
-  }
+  change([&](auto *x) { forces_from_freedoms(node, hinge, x); });
 }
 
 } // namespace ffrobot::recursion
