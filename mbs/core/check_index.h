@@ -5,11 +5,12 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace ffrobot {
 
 // Throws std::invalid_argument that says what was expected and got.
-template <class Number, class Count> void check_index(const char *name, Number got, Count count) {
+template <class Number, class Count> void check_index(std::string_view name, Number got, Count count) {
   const auto number = static_cast<Eigen::Index>(got), size = static_cast<Eigen::Index>(count);
   if (number < 0 || number >= size)
     throw std::invalid_argument(std::string(name) + ": expected 0 to " + std::to_string(size) + " - 1, got " +

@@ -41,6 +41,7 @@ struct PlanarData {
   std::vector<Eigen::MatrixXd> K;
   std::vector<PlanarMarker> markers;
   Eigen::Index modes() const { return stiffness.size(); }
+  bool is_stiffened() const { return !K.empty(); }
 };
 struct SpatialData {
   double mass = 0;
@@ -63,6 +64,7 @@ struct SpatialData {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); // columns: those of the modal file, where most blocks vanish
   std::vector<SpatialMarker> markers;
   Eigen::Index modes() const { return stiffness.size(); }
+  bool is_stiffened() const { return !K_s.empty(); }
 };
 
 // The tree: body i is joined to marker `parent_marker` of a body before it, or of the ground (parent -1).

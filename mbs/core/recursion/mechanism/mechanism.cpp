@@ -1,5 +1,7 @@
 #include "core/recursion/mechanism/mechanism.h"
 
+#include "core/check_index.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -86,13 +88,13 @@ void check_K(const std::string &name, const char *key, const std::vector<Eigen::
 }
 
 void check_stiffening(const std::string &name, const PlanarData &data) {
-  const bool stiffened = planar::is_stiffened(data);
+  const bool stiffened = data.is_stiffened();
   check_K(name, "K", data.K, stiffened ? 4 : 0, data.modes());
   for (const PlanarMarker &marker : data.markers)
     check_K(name, "K of a marker", marker.K, stiffened && !marker.K.empty() ? 3 : 0, data.modes());
 }
 void check_stiffening(const std::string &name, const SpatialData &data) {
-  const bool stiffened = spatial::is_stiffened(data);
+  const bool stiffened = data.is_stiffened();
   check_K(name, "K_s", data.K_s, stiffened ? 3 : 0, data.modes());
   check_K(name, "K_x", data.K_x, stiffened ? 9 : 0, data.modes());
   for (const SpatialMarker &marker : data.markers)
@@ -103,16 +105,11 @@ template <class Data>
 void check(const BodyModel<Data> &body, std::size_t index, std::size_t ground_markers,
            const std::vector<BodyModel<Data>> &bodies, int dim) {
   const std::string name = "body " + body.name;
-  const auto count = body.data.markers.size();
   if (body.parent < -1 || body.parent >= static_cast<int>(index))
     refuse(name + ": parent: expected -1 (ground) or a body before it, got " + std::to_string(body.parent));
   const std::size_t there = body.parent < 0 ? ground_markers : bodies[body.parent].data.markers.size();
-  if (body.parent_marker < 0 || body.parent_marker >= static_cast<int>(there))
-    refuse(name + ": parent_marker: expected 0 to " + std::to_string(there) + " - 1, got " +
-           std::to_string(body.parent_marker));
-  if (body.inboard_marker < 0 || body.inboard_marker >= static_cast<int>(count))
-    refuse(name + ": inboard_marker: expected 0 to " + std::to_string(count) + " - 1, got " +
-           std::to_string(body.inboard_marker));
+  check_index(name + ": parent_marker", body.parent_marker, there);
+  check_index(name + ": inboard_marker", body.inboard_marker, body.data.markers.size());
   for (const auto &marker : body.data.markers)
     if (body.data.modes() && (marker.Phi.rows() != dim || marker.Phi.cols() != body.data.modes()))
       refuse(name + ": Phi of a marker: expected (" + std::to_string(dim) + ", " + std::to_string(body.data.modes()) +
@@ -188,9 +185,7 @@ template <class Space> void Mechanism<Space>::take_tree(Plan &plan) {
 // A port for each marker of constraint equations and wrenches where there is none yet
 template <class Space> Attachment Mechanism<Space>::attach(const MarkerAt &at, Plan &plan) const {
   if (at.body < 0) {
-    if (at.marker < 0 || at.marker >= static_cast<int>(ground.size()))
-      refuse("ground marker: expected 0 to " + std::to_string(ground.size()) + " - 1, got " +
-             std::to_string(at.marker));
+    check_index("ground marker", at.marker, ground.size());
     return {-1, at.marker, -1};
   }
   if (at.body >= static_cast<int>(plan.markers.size()))

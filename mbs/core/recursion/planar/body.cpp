@@ -86,7 +86,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     }
     ports.push_back(port), first_rows.push_back(port.row);
   }
-  if (n && is_stiffened(data)) {
+  if (n && data.is_stiffened()) {
     stiffening = std::make_shared<const Stiffening>(data, used, first_rows);
     for (Port &port : ports)
       for (const Stiffening::Row &curved : stiffening->at_ports)

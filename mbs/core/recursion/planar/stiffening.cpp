@@ -15,15 +15,6 @@ using Eigen::Vector2d;
 
 namespace {
 
-constexpr double negligible = 1e-12; // of the largest of its kind
-
-double largest_of(const std::vector<MatrixXd> &all) {
-  double largest = 0;
-  for (const MatrixXd &K : all)
-    largest = std::max(largest, K.cwiseAbs().maxCoeff());
-  return largest;
-}
-
 // What of K of its markers is nothing but rounding
 double negligible_K(const PlanarData &data) {
   double largest = largest_of({data.K[0], data.K[1]}) / data.mass; // the mean of all points
@@ -32,8 +23,6 @@ double negligible_K(const PlanarData &data) {
   return negligible * largest;
 }
 
-MatrixXd without_rounding(const MatrixXd &K, double limit) { return (K.array().abs() > limit).select(K, 0.0); }
-
 // Products with x, y, x x + y y and x y - y x of what is given about `center` instead of the origin
 template <class X> void move(const Vector2d &center, std::array<X, fields> &products) {
   products[2] -= center.x() * products[0] + center.y() * products[1];
@@ -41,8 +30,6 @@ template <class X> void move(const Vector2d &center, std::array<X, fields> &prod
 }
 
 } // namespace
-
-bool is_stiffened(const PlanarData &data) { return !data.K.empty(); }
 
 std::vector<MatrixXd> turned(const Matrix2d &R, const std::vector<MatrixXd> &y) {
   std::vector<MatrixXd> x = y;
@@ -59,7 +46,7 @@ bool is_curved(const PlanarData &data, const PlanarMarker &marker, int component
 }
 
 std::vector<MatrixXd> moved_K(const PlanarData &data, const Vector2d &position, const Matrix2d &R) {
-  if (!is_stiffened(data))
+  if (!data.is_stiffened())
     return {};
   std::array<MatrixXd, fields> K;
   std::copy_n(data.K.begin(), fields, K.begin());
@@ -91,7 +78,7 @@ Stiffening::Stiffening(const PlanarData &data, const std::vector<int> &used, con
   }
   const double limit = negligible * largest_of({with_G.begin(), with_G.end()});
   for (std::size_t f = 0; f < fields; ++f)
-    K[f] = ModeMatrix(without_rounding(with_G[f], limit));
+    K[f] = ModeMatrix(with_G[f], limit);
   F.assign(F_all.data(), F_all.data() + F_all.size());
   const MatrixXd rest = MatrixXd::Identity(n, n) - F_all.transpose() * F_all;
   m_ff_rest.assign(rest.data(), rest.data() + rest.size());
@@ -99,8 +86,8 @@ Stiffening::Stiffening(const PlanarData &data, const std::vector<int> &used, con
   for (std::size_t k = 0; k < used.size(); ++k) {
     const PlanarMarker &marker = data.markers[used[k]];
     for (std::size_t c = 0; c < marker.K.size(); ++c)
-      if (const MatrixXd K_row = without_rounding(marker.K[c], negligible_K(data)); !K_row.isZero(0))
-        at_ports.push_back({first_rows[k] + static_cast<int>(c), ModeMatrix(K_row)});
+      if (ModeMatrix K_row(marker.K[c], negligible_K(data)); K_row.kind != ModeMatrix::Kind::zero)
+        at_ports.push_back({first_rows[k] + static_cast<int>(c), std::move(K_row)});
   }
 }
 

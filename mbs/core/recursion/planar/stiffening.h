@@ -39,9 +39,6 @@ struct Stiffening {
   std::vector<Row> at_ports; // rows of ports that bending changes
 };
 
-// Whether `data` has the second-order field
-bool is_stiffened(const PlanarData &data);
-
 // Whether a marker moves (x, y of its axes) or turns to second order along component 0, 1 or 2
 bool is_curved(const PlanarData &data, const PlanarMarker &marker, int component);
 

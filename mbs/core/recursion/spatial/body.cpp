@@ -12,8 +12,6 @@ using ExtendedMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic
 
 namespace {
 
-constexpr double negligible = 1e-12; // as in mbs/model/planar_body.py
-
 constexpr int before[3] = {5, 6, 1}, after[3] = {7, 2, 3}; // m_thetaf_x = integral of u_y S_z - u_z S_y, and so on
 
 MatrixXd I_bar_of(const SpatialData &data) { return data.I_bar.size() ? data.I_bar : MatrixXd::Zero(9, data.modes()); }
@@ -133,7 +131,7 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
         to.S_bar_kl[3 * k + l] = sum;
       }
   }
-  if (is_stiffened(data))
+  if (data.is_stiffened())
     move_stiffening(data, position, R, to);
   for (SpatialMarker &marker : to.markers) {
     marker.K = turned_K(R, marker);
@@ -154,7 +152,7 @@ Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cas
   const SpatialData along_axes = moved(data, Vector3d::Zero(), data.axes);
   const MatrixXd g = n ? symmetric_I_bar(along_axes) : MatrixXd();
   width = lanes * std::max(1 + static_cast<int>(used.size()), (rows_that_are_not_zero(g) + 1) / 2);
-  if (n && is_stiffened(data))
+  if (n && data.is_stiffened())
     stiffening = std::make_shared<const Stiffening>(data, used);
   fill_rows(data, used, complete_I_bar(data));
   fill_residuals(data, used);

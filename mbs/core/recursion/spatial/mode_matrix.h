@@ -15,6 +15,8 @@
 
 namespace ffrobot::recursion {
 
+constexpr double negligible = 1e-12; // of the largest of its kind: rounding
+
 constexpr int lanes = 8; // that rows of six take in memory
 constexpr int modes_at_once = 8;
 constexpr int padded(int n) { return (n + modes_at_once - 1) / modes_at_once * modes_at_once; }
@@ -80,7 +82,7 @@ template <class T> FFROBOT_INLINE void read_modes(const T *from, int n, T *to) {
 struct ModeMatrix {
   enum class Kind { zero, diagonal, sparse, full };
   ModeMatrix() = default;
-  explicit ModeMatrix(const Eigen::MatrixXd &M);
+  explicit ModeMatrix(const Eigen::MatrixXd &M, double rounding = 0); // entries up to that count as zero
 
   Kind kind = Kind::zero;
   int n = 0;
@@ -88,6 +90,8 @@ struct ModeMatrix {
   std::vector<int> first; // sparse: of row i, first[i] … first[i + 1] - 1
   std::vector<int> column;
 };
+
+double largest_of(const std::vector<Eigen::MatrixXd> &all); // entry of these, 0 of none
 
 // Stiffness and damping of the modes of a body, which has K, D, is_damped and, for what is no diagonal, D_full
 template <class Data, class Body> void take_damping(const Data &data, Body &body) {

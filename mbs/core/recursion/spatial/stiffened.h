@@ -5,8 +5,6 @@
 
 #include "core/recursion/spatial/state.h"
 
-#include <cmath>
-
 namespace ffrobot::recursion::spatial {
 
 // s.b and s.h_change[0] are used in between.

@@ -12,8 +12,6 @@ using Eigen::MatrixXd;
 
 namespace {
 
-constexpr double negligible = 1e-12; // of the largest of its kind
-
 // N = L L^T (4, rank), columns in the order 1, x, y, z, without those that depend on others before; and which ones
 struct Orthonormal {
   Matrix4d L = Matrix4d::Zero();
@@ -49,18 +47,7 @@ template <class X> std::vector<X> by_fields(const Orthonormal &fields, const std
   return found;
 }
 
-MatrixXd without_rounding(const MatrixXd &K, double limit) { return (K.array().abs() > limit).select(K, 0.0); }
-
-double largest_of(const std::vector<MatrixXd> &all) {
-  double largest = 0;
-  for (const MatrixXd &K : all)
-    largest = std::max(largest, K.size() ? K.cwiseAbs().maxCoeff() : 0.0);
-  return largest;
-}
-
 } // namespace
-
-bool is_stiffened(const SpatialData &data) { return !data.K_s.empty(); }
 
 double negligible_K(const SpatialData &data) {
   double largest = largest_of(data.K_s) / data.mass; // the mean of all points
@@ -104,7 +91,7 @@ void Stiffening::project(const SpatialData &data) {
   MatrixXd rest = MatrixXd::Identity(n, n);
   const double limit = negligible * largest_of(all_K);
   for (std::size_t i = 0; i < all_K.size(); ++i) {
-    K.emplace_back(without_rounding(all_K[i], limit));
+    K.emplace_back(all_K[i], limit);
     const Eigen::Map<const Eigen::VectorXd> F_i(row(static_cast<int>(i), static_cast<int>(n)), n);
     if (K.back().kind != ModeMatrix::Kind::zero)
       rest -= F_i * F_i.transpose();
@@ -121,8 +108,7 @@ void Stiffening::fill_ports(const SpatialData &data, const std::vector<int> &use
   for (const int index : used) {
     const std::vector<MatrixXd> K_section = section_K(data.markers[index]);
     for (std::size_t r = 0; r < lanes; ++r)
-      at_ports.emplace_back(r < K_section.size() ? without_rounding(K_section[r], limit)
-                                                 : MatrixXd(MatrixXd::Zero(n, n)));
+      at_ports.emplace_back(r < K_section.size() ? K_section[r] : MatrixXd::Zero(n, n).eval(), limit);
   }
 }
 

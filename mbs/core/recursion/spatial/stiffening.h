@@ -42,9 +42,6 @@ private:
   void fill_ports(const SpatialData &data, const std::vector<int> &used);
 };
 
-// Whether `data` has the second-order field
-bool is_stiffened(const SpatialData &data);
-
 // What of K of its markers is nothing but rounding
 double negligible_K(const SpatialData &data);
 
