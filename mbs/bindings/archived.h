@@ -4,7 +4,6 @@
 #include "bindings/bindings.h"
 #include "core/archive.h"
 #include "core/integrate/integrate.h"
-#include "core/recursion/motion/motion.h"
 
 #include <string>
 
@@ -28,17 +27,6 @@ template <class Archive> void fields(Archive &a, Recording &x) {
 template <class Archive> void fields(Archive &a, Samples &x) {
   archived_all(a, x.longest, x.most, x.parts, x.times, x.states, x.steps, x.every);
 }
-
-namespace recursion {
-
-template <class Archive> void fields(Archive &a, PostureHistory &x) {
-  archived_all(a, x.least_ratio, x.singular_at, x.singular_posture, x.watched_at, x.determinant);
-}
-template <class Archive> void fields(Archive &a, MotionHistory &x) {
-  archived_all(a, x.peaks.state, x.peaks.force, x.peaks.inertial, x.accepted, x.postures);
-}
-
-} // namespace recursion
 
 // Bytes of objects with `fields`, and objects of such bytes, which are to be those of this program.
 template <class T> void bind_bytes(nb::class_<T> &bound) {

@@ -12,18 +12,9 @@
 #include <algorithm>
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace ffrobot::recursion {
-
-inline void check_share(const FrameShare &share, int n_q, int n_v) {
-  const auto last = static_cast<int>(share.Phi_r.cols()) - 1;
-  for (const int k : {0, last}) {
-    check_index("q of a motor on frames", share.q + k, n_q);
-    check_index("v of a motor on frames", share.v + k, n_v);
-  }
-}
 
 template <class Space> void check_scene(const Model<Space> &model, const Scene &scene) {
   check_size("targets", scene.targets.size(), model.rows());
@@ -68,7 +59,10 @@ template <class Space> void check_hold(const Model<Space> &model, const ZeroOrde
   check_size("rows of held forces", held.direction().rows(), model.mechanism.n_v);
   for (const auto &[input, share] : held.frame_motors()) {
     check_index("input of a motor on frames", input, held.direction().cols());
-    check_share(share, model.mechanism.n_q, model.mechanism.n_v);
+    for (const Index k : {Index(0), share.Phi_r.cols() - 1}) {
+      check_index("q of a motor on frames", share.q + k, model.mechanism.n_q);
+      check_index("v of a motor on frames", share.v + k, model.mechanism.n_v);
+    }
   }
 }
 
@@ -84,6 +78,12 @@ struct TreeCheckpoint {
   MotionHistory history;
   std::vector<RangeSeen> ranges; // of the scene's limits
 };
+template <class Archive> void fields(Archive &a, PostureHistory &x) {
+  archived_all(a, x.least_ratio, x.singular_at, x.singular_posture, x.watched_at, x.determinant);
+}
+template <class Archive> void fields(Archive &a, MotionHistory &x) {
+  archived_all(a, x.peaks.state, x.peaks.force, x.peaks.inertial, x.accepted, x.postures);
+}
 template <class Archive> void fields(Archive &a, TreeCheckpoint &x) {
   archived_all(a, x.integration, x.history, x.ranges);
 }

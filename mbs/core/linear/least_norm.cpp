@@ -35,4 +35,6 @@ VectorXd LeastNorm::solve_transposed(const VectorXd &c) const {
   return is_square_ ? VectorXd(lu_.transpose().solve(c)) : VectorXd(pseudo_inverse_.transpose() * c);
 }
 
+double determinant(const MatrixXd &A) { return A.determinant(); }
+
 } // namespace ffrobot

@@ -19,4 +19,7 @@ private:
   Eigen::MatrixXd pseudo_inverse_; // where A is not square
 };
 
+// Of a square matrix
+double determinant(const Eigen::MatrixXd &A);
+
 } // namespace ffrobot

@@ -1,7 +1,6 @@
 #include "core/linear/symmetric_factors.h"
 
 #include <algorithm>
-#include <complex>
 
 namespace ffrobot {
 

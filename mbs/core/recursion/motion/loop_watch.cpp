@@ -1,8 +1,7 @@
 #include "core/recursion/motion/loop_watch.h"
 
+#include "core/linear/least_norm.h"
 #include "core/recursion/motion/postures.h"
-
-#include <Eigen/LU>
 
 #include <cmath>
 
@@ -16,7 +15,7 @@ namespace {
 // Of the volume of regular constraints. At such a distance from a singular posture, relative to one radian, branches
 // are this distance apart, and constraints tell them apart by its square: by more than the 1e-12 to which projections
 // keep them.
-constexpr double singular = 1e-5;
+constexpr double next_to_singular = 1e-5;
 
 // sqrt(det C M^-1 C^T) of the active constraints, from its factors
 template <class Space> double volume(const Workspace<Space, double> &w) {
@@ -32,7 +31,7 @@ template <class Space> double volume(const Workspace<Space, double> &w) {
 template <class Space>
 LoopWatch<Space>::LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w)
     : mechanism_(mechanism), multiplier_(VectorXd::Zero(mechanism.constraints.size())), answer_(mechanism.n_v),
-      least_volume_(singular * volume(w)) {}
+      least_volume_(next_to_singular * volume(w)) {}
 
 template <class Space>
 void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
@@ -51,7 +50,7 @@ template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspac
     multiplier_[w.active[k]] = 0;
     product_.col(k).noalias() = C_0_ * -answer_;
   }
-  return cosine_ = product_.determinant() / (volume_ * now);
+  return cosine_ = determinant(product_) / (volume_ * now);
 }
 
 template class LoopWatch<Planar>;

@@ -1,9 +1,8 @@
 #include "core/recursion/motion/mobility.h"
 
+#include "core/linear/least_norm.h"
 #include "core/recursion/motion/natural_sizes.h"
 #include "core/recursion/motion/postures.h"
-
-#include <Eigen/LU>
 
 #include <algorithm>
 
@@ -46,7 +45,7 @@ MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path, bool path)
 } // namespace
 
 double Mobility::determinant() const {
-  return loops.values.size() || rates.rows() != rates.cols() ? 0 : rates.determinant();
+  return loops.values.size() || rates.rows() != rates.cols() ? 0 : ffrobot::determinant(rates);
 }
 
 Index Mobility::followed() const { return path.rank(singular); }
