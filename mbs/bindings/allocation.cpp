@@ -5,13 +5,11 @@
 
 #include "bindings/bindings.h"
 
-using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 namespace {
 
 // Voltages (T, k) for modal forces (T, n), one after the other
-RowMajorMatrix allocate(Allocation &allocation, const RowMajorMatrix &F_p) {
-  RowMajorMatrix V(F_p.rows(), allocation.Phi().cols());
+RowMajor allocate(Allocation &allocation, const RowMajor &F_p) {
+  RowMajor V(F_p.rows(), allocation.Phi().cols());
   for (Index i = 0; i < F_p.rows(); ++i)
     V.row(i) = allocation.solve(F_p.row(i).transpose()).transpose();
   return V;

@@ -15,6 +15,7 @@ using namespace ffrobot::recursion;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // One function per folder of the core, in a file of that name; module.cpp calls them. Default arguments live in Python,
 // never here: only what may be absent is None.

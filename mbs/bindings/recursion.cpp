@@ -19,8 +19,11 @@
 namespace {
 
 template <class Space>
-Forces<double> checked_forces(const Model<Space> &model, const std::optional<VectorXd> &force,
-                              const std::optional<VectorXd> &wrench) {
+std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, const VectorXd &v,
+                                        const VectorXd &target, const std::optional<VectorXd> &force,
+                                        const std::optional<VectorXd> &wrench) {
+  model.check_state(q, v);
+  check_size("target", target.size(), model.rows());
   Forces<double> forces;
   if (force) {
     check_size("force", force->size(), model.mechanism.n_v);
@@ -30,16 +33,6 @@ Forces<double> checked_forces(const Model<Space> &model, const std::optional<Vec
     check_size("wrench", wrench->size(), Space::dim * model.mechanism.wrenches.size());
     forces.wrench = wrench->data();
   }
-  return forces;
-}
-
-template <class Space>
-std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, const VectorXd &v,
-                                        const VectorXd &target, const std::optional<VectorXd> &force,
-                                        const std::optional<VectorXd> &wrench) {
-  model.check_state(q, v);
-  check_size("target", target.size(), model.rows());
-  const Forces<double> forces = checked_forces(model, force, wrench);
   VectorXd a(model.mechanism.n_v);
   accelerations(model.mechanism, q.data(), v.data(), forces, target.data(), model.w, a.data());
   return {a, Eigen::Map<const VectorXd>(model.w.lambda.data(), model.rows())};

@@ -1,12 +1,11 @@
 #include "core/time_function/time_function.h"
 
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <tuple>
 
+#include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -15,15 +14,11 @@
 
 namespace {
 
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Samples = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
-
-/// Coefficients arrive as (k, order): interval by interval, as the core keeps them.
-TimeFunction polynomial(Vector breaks, Matrix coefficients) {
-  if (coefficients.shape(0) + 1 != breaks.shape(0))
+// Coefficients (k, order), interval by interval, as the core keeps them
+TimeFunction polynomial(const VectorXd &breaks, const RowMajor &coefficients) {
+  if (coefficients.rows() + 1 != breaks.size())
     throw nb::value_error("polynomial: expected coefficients (k, order) for k + 1 breaks");
-  return PiecewisePolynomial({breaks.data(), breaks.data() + breaks.size()},
+  return PiecewisePolynomial({breaks.begin(), breaks.end()},
                              {coefficients.data(), coefficients.data() + coefficients.size()});
 }
 
@@ -38,20 +33,16 @@ TimeFunction compiled_function(std::uintptr_t address) {
   return UserFunction(reinterpret_cast<UserFunction::Compiled>(address));
 }
 
-Samples sample(const TimeFunction &function, Vector times) {
-  const std::size_t count = times.shape(0);
-  auto *data = new double[3 * count];
-  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<double *>(p); });
-  for (std::size_t i = 0; i < count; ++i) {
-    const Jet jet = function(times.data()[i]);
-    data[i] = jet.value;
-    data[count + i] = jet.rate;
-    data[2 * count + i] = jet.acceleration;
+RowMajor sample(const TimeFunction &function, const VectorXd &times) {
+  RowMajor found(3, times.size());
+  for (Index i = 0; i < times.size(); ++i) {
+    const Jet jet = function(times[i]);
+    found.col(i) << jet.value, jet.rate, jet.acceleration;
   }
-  return Samples(data, {3, count}, owner);
+  return found;
 }
 
-/// Times at which comparisons of t with a number change, in the order of the expression.
+// Times at which comparisons of t with a number change, in the order of the expression.
 std::vector<double> switches(const TimeFunction &function) {
   std::vector<double> found;
   if (function.expression() == nullptr)

@@ -41,6 +41,12 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
   }
 }
 
+// Multipliers (T, rows) of `states`
+inline void check_multipliers(const RowMajor &multipliers, Index states, Index rows) {
+  check_size("times of multipliers", multipliers.rows(), states);
+  check_size("multipliers", multipliers.cols(), rows);
+}
+
 // (T, n_v) M a - Q, with Q of gravity, elasticity, damping and all forces of the scene
 template <class Space>
 RowMajor required_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
@@ -71,8 +77,7 @@ RowMajor constraint_accelerations(Model<Space> &model, const Scene &scene, const
 template <class Space>
 MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
                            const RowMajor &v, const RowMajor &a, const RowMajor &multipliers) {
-  check_size("times of multipliers", multipliers.rows(), a.rows());
-  check_size("multipliers", multipliers.cols(), model.rows());
+  check_multipliers(multipliers, a.rows(), model.rows());
   ForcesOfStates<Space> found(model.mechanism, a.rows());
   at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &acting, auto &forces, auto &w) {
     const double *lambda = multipliers.row(i).data();
@@ -86,8 +91,7 @@ MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::v
 template <class Space>
 MotionForces multiplier_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                                const RowMajor &q, const RowMajor &multipliers) {
-  check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), model.rows());
+  check_multipliers(multipliers, q.rows(), model.rows());
   const RowMajor still = RowMajor::Zero(q.rows(), model.mechanism.n_v);
   ForcesOfStates<Space> found(model.mechanism, q.rows());
   at_known_states(model, scene, {times, q, still, still}, [&](Index i, const auto &, auto &forces, auto &w) {

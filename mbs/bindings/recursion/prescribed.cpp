@@ -154,8 +154,7 @@ template <class Space>
 RowMajor path_forces(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajor &q,
                      const RowMajor &multipliers) {
   check_size("times", times.size(), q.rows());
-  check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), driven.mechanism.constraints.size());
+  check_multipliers(multipliers, q.rows(), driven.mechanism.constraints.size());
   RowMajor found(q.rows(), driven.mechanism.n_v);
   at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
     found.row(i) = motors.path_forces(q.row(i).data(), multipliers.row(i).data(), w).transpose();
@@ -167,8 +166,7 @@ template <class Space>
 std::vector<RowMajor> path_forces_on_bodies(const DrivenMechanism<Space> &driven, const std::vector<double> &times,
                                             const RowMajor &q, const RowMajor &multipliers) {
   check_size("times", times.size(), q.rows());
-  check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), driven.mechanism.constraints.size());
+  check_multipliers(multipliers, q.rows(), driven.mechanism.constraints.size());
   std::vector<RowMajor> found;
   for (const auto &node : driven.mechanism.nodes)
     found.emplace_back(q.rows(), Space::dim + node.n());

@@ -12,12 +12,15 @@
 
 namespace ffrobot {
 
-class TimedSource {
+// Forces and voltages, number by number.
+class ForceSource {
 public:
-  virtual ~TimedSource() = default;
+  explicit ForceSource(Eigen::Index count) : values_(Eigen::VectorXd::Zero(count)) {}
+  virtual ~ForceSource() = default;
 
-  // What the source has found is that of time t afterwards. Costs nothing where it is already: stages of a step and
-  // outputs meet.
+  const Eigen::VectorXd &values() const { return values_; } // (count) of the last evaluate()
+
+  // Values are those of time t afterwards. Costs nothing where they are already: stages of a step and outputs meet.
   void evaluate(double t) {
     if (t != time_)
       time_ = find(t) ? t : nowhere;
@@ -31,23 +34,15 @@ public:
   virtual double end_of_step(double t, double h) { return t + h; }
 
 protected:
-  // False where it is of a stage of a step, not of time t at any other moment.
+  // Fills values_; false where they are those of a stage of a step, not of time t at any other moment.
   virtual bool find(double t) = 0;
   virtual void prepare(const double *, int) {}
+
+  Eigen::VectorXd values_;
 
 private:
   static constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
   double time_ = nowhere;
-};
-
-// Forces and voltages, number by number.
-class ForceSource : public TimedSource {
-public:
-  explicit ForceSource(Eigen::Index count) : values_(Eigen::VectorXd::Zero(count)) {}
-  const Eigen::VectorXd &values() const { return values_; } // (count) of the last evaluate()
-
-protected:
-  Eigen::VectorXd values_; // filled by find()
 };
 
 class ForcesOfTime final : public ForceSource {

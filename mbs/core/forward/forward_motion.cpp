@@ -52,12 +52,6 @@ using Eigen::VectorXd;
 
 const std::string head = "ffrobot held motion 5\n"; // another number wherever fields() change
 
-VectorXd joined(const VectorXd &q, const VectorXd &v) {
-  VectorXd y(q.size() + v.size());
-  y << q, v;
-  return y;
-}
-
 void check(bool holds, const char *expected) {
   if (!holds)
     throw std::invalid_argument(std::string("expected ") + expected);
@@ -75,8 +69,9 @@ ForwardModel forward_model_of(const std::string &bytes) {
 
 ForwardMotion::ForwardMotion(ForwardModel model)
     : model_(std::move(model)), mechanism_(model_.bodies, model_.ground, model_.rows, model_.wrenches, model_.gravity),
-      scene_(scene_of(model_)), y_(joined(model_.q, model_.v)), inputs_(model_.inputs.size(), 0.0),
+      scene_(scene_of(model_)), y_(model_.q.size() + model_.v.size()), inputs_(model_.inputs.size(), 0.0),
       outputs_(output_count(), 0.0) {
+  y_ << model_.q, model_.v;
   motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
   motion_->plan(0, model_.duration);
 }
@@ -156,28 +151,23 @@ const std::vector<double> &ForwardMotion::outputs() {
   motion_->evaluate(0, q, v, a.data());
   const auto frames = frame_motions(mechanism_, q, v, motion_->workspace());
   for (const PlaceOutput &output : model_.places) {
-    const Eigen::Vector3d r = place(output, frames);
-    std::copy_n(r.data(), 3, outputs_.begin() + static_cast<std::ptrdiff_t>(i));
+    const std::size_t number = output.body;
+    const auto &node = mechanism_.nodes[number];
+    const auto &body = model_.bodies[number];
+    Eigen::Vector3d x = output.position;
+    if (node.n()) {
+      const auto p = y_.segment(node.p_q(), node.n());
+      x += output.Phi * p;
+      for (std::size_t l = 0; l < output.K.size(); ++l)
+        x[l] -= 0.5 * p.dot(output.K[l] * p);
+    }
+    if (node.inboard < 0) // the frame sits at the joint, with the axes of its triad
+      x = node.origin + body.data.markers[body.inboard_marker].triad.transpose() * x;
+    x = frames[number].r + frames[number].R * x;
+    std::copy_n(x.data(), 3, outputs_.data() + i);
     i += 3;
   }
   return outputs_;
-}
-
-Eigen::Vector3d ForwardMotion::place(const PlaceOutput &at, const std::vector<FrameMotion> &frames) const {
-  const std::size_t number = at.body;
-  const auto &node = mechanism_.nodes[number];
-  const auto &body = model_.bodies[number].data;
-  const std::size_t inboard = model_.bodies[number].inboard_marker;
-  Eigen::Vector3d x = at.position;
-  if (node.n()) {
-    const auto p = y_.segment(node.p_q(), node.n());
-    x += at.Phi * p;
-    for (std::size_t l = 0; l < at.K.size(); ++l)
-      x[l] -= 0.5 * p.dot(at.K[l] * p);
-  }
-  if (node.inboard < 0) // the frame sits at the joint, with the axes of its triad
-    x = node.origin + body.markers[inboard].triad.transpose() * x;
-  return frames[number].r + frames[number].R * x;
 }
 
 } // namespace ffrobot

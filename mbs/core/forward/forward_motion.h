@@ -81,7 +81,6 @@ public:
 
 private:
   static recursion::Scene scene_of(const ForwardModel &model);
-  Eigen::Vector3d place(const PlaceOutput &at, const std::vector<recursion::FrameMotion> &frames) const;
 
   ForwardModel model_;
   recursion::Mechanism<recursion::Spatial> mechanism_;

@@ -3,7 +3,6 @@
 #include "core/time_function/jet.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace ffrobot {
 

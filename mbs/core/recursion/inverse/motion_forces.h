@@ -52,7 +52,4 @@ private:
   MotionForces found_;
 };
 
-extern template class ForcesOfStates<Planar>;
-extern template class ForcesOfStates<Spatial>;
-
 } // namespace ffrobot::recursion

@@ -103,8 +103,10 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
     double &tau = tau_[k];
     if (cuts_.empty())
       tau = motor.sign * Q_[motor.coordinate], Q_[motor.coordinate] = 0;
-    if (motor.turns_frames)
-      turn_frames(motor.coordinate, motor.sign * tau, w);
+    // Of a moment between the frames of bodies in place of their sections: what it does less on modes, F_p does more.
+    for (std::size_t i = 0; motor.turns_frames && i < driven_.mechanism.nodes.size(); ++i)
+      if (const auto &node = driven_.mechanism.nodes[i]; motor.coordinate >= node.v && motor.coordinate < node.p_v())
+        forces_.add_joint_moment_on_modes(i, motor.sign * tau, w, beside_.data());
   }
   Q_ += beside_;
 }
@@ -123,13 +125,6 @@ template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::Mat
       found.row(modes + k) = motor.sign * dQ.row(motor.coordinate);
     }
   return found;
-}
-
-// Of a moment between the frames of bodies in place of their sections: what it does less on modes, F_p does more.
-template <class Space> void Motors<Space>::turn_frames(int coordinate, double moment, const TreeWorkspace &w) {
-  for (std::size_t i = 0; i < driven_.mechanism.nodes.size(); ++i)
-    if (const auto &node = driven_.mechanism.nodes[i]; coordinate >= node.v && coordinate < node.p_v())
-      forces_.add_joint_moment_on_modes(i, moment, w, beside_.data());
 }
 
 // Takes off Q what cuts and motors do, so that nothing is left of it along joint coordinates where motors suffice.

@@ -65,7 +65,6 @@ private:
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q); // of lambda_
   void split(const double *q, const TreeWorkspace &w);                                  // Q_
   void close_loops(const double *q, const TreeWorkspace &w);
-  void turn_frames(int coordinate, double moment, const TreeWorkspace &w);
 
   const DrivenMechanism<Space> driven_;
   NewtonEuler<Space> forces_;
@@ -75,8 +74,6 @@ private:
   LeastNorm factors_;       // of joint coordinates by cuts, then motors
 };
 
-extern template struct DrivenMechanism<Planar>;
-extern template struct DrivenMechanism<Spatial>;
 extern template class Motors<Planar>;
 extern template class Motors<Spatial>;
 

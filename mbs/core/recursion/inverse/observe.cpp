@@ -71,14 +71,6 @@ Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spat
   return to;
 }
 
-// p_dot^T D p_dot
-template <class Body> double damping_power(const Body &b, const double *p_dot) {
-  const Eigen::Map<const Eigen::VectorXd> rates(p_dot, b.n);
-  if (b.D_full.size())
-    return rates.dot(b.D_full * rates);
-  return rates.cwiseAbs2().dot(Eigen::Map<const Eigen::VectorXd>(b.D.data(), b.n));
-}
-
 // Axes of the section that the joint holds
 template <class Space>
 Matrix3d outer_axes(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
@@ -143,7 +135,10 @@ template <class Space> Totals totals(const Placed<Space, double> &at) {
         0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot)) + body.modal;
     for (int k = 0; k < node.n(); ++k)
       sum.strain += 0.5 * node.body.K[k] * p[k] * p[k];
-    sum.dissipated += damping_power(node.body, p_dot);
+    const Eigen::Map<const Eigen::VectorXd> rates(p_dot, node.n());
+    const auto &D = node.body.D_full;
+    sum.dissipated += D.size() ? rates.dot(D * rates)
+                               : rates.cwiseAbs2().dot(Eigen::Map<const Eigen::VectorXd>(node.body.D.data(), node.n()));
     sum.gravitational -= g.dot(body.mass * r + R * body.s);
     sum.momentum += R * linear;
     sum.angular_momentum += R * angular + r.cross(R * linear);
@@ -234,19 +229,16 @@ RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const R
   return found;
 }
 
-template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
-                                                Workspace<Planar, double> &);
-template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,
-                                                Workspace<Spatial, double> &);
-template RowMajor motions_of_states(const Mechanism<Planar> &, const RowMajor &, const RowMajor &,
-                                    Workspace<Planar, double> &);
-template RowMajor motions_of_states(const Mechanism<Spatial> &, const RowMajor &, const RowMajor &,
-                                    Workspace<Spatial, double> &);
-template RowMajor without_work(const Mechanism<Planar> &, const RowMajor &, const RowMajor &,
-                               Workspace<Planar, double> &);
-template RowMajor without_work(const Mechanism<Spatial> &, const RowMajor &, const RowMajor &,
-                               Workspace<Spatial, double> &);
-template RowMajor totals_of_states(const Mechanism<Planar> &, const Scene &, const RowMajor &, const RowMajor &);
-template RowMajor totals_of_states(const Mechanism<Spatial> &, const Scene &, const RowMajor &, const RowMajor &);
+#define FFROBOT_INSTANTIATE(Space)                                                                                     \
+  template std::vector<FrameMotion> frame_motions(const Mechanism<Space> &, const double *, const double *,            \
+                                                  Workspace<Space, double> &);                                         \
+  template RowMajor motions_of_states(const Mechanism<Space> &, const RowMajor &, const RowMajor &,                    \
+                                      Workspace<Space, double> &);                                                     \
+  template RowMajor without_work(const Mechanism<Space> &, const RowMajor &, const RowMajor &,                         \
+                                 Workspace<Space, double> &);                                                          \
+  template RowMajor totals_of_states(const Mechanism<Space> &, const Scene &, const RowMajor &, const RowMajor &);
+FFROBOT_INSTANTIATE(Planar)
+FFROBOT_INSTANTIATE(Spatial)
+#undef FFROBOT_INSTANTIATE
 
 } // namespace ffrobot::recursion

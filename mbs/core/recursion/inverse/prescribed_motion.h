@@ -12,7 +12,6 @@
 #include "core/recursion/inverse/motors.h"
 #include "core/recursion/motion/natural_sizes.h"
 
-#include <memory>
 #include <optional>
 
 namespace ffrobot::recursion {
@@ -68,14 +67,10 @@ public:
   // `followed`.
   JointSlopes joint_slopes(const JointSlopes *followed = nullptr);
   virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left() and of motors along joints; exact
-  const Eigen::VectorXd &values() const { return value_; }            // C and its rate, which should be zero
-  const Eigen::VectorXd &rates() const { return rate_; }
-  const std::vector<Jet> &targets() const { return targets_; }
   const DrivenMechanism<Space> &driven() const { return driven_; }
   Eigen::Index modes() const { return driven_.of_modes.size(); }
 
   TreeWorkspace &workspace() { return w_; } // with kinematics, accelerations of frames, multipliers
-  const double *wrenches() const { return acting_.wrench; }
 
 protected:
   bool follow(double t, const ModalMotion &modes, std::vector<Jet> targets); // of constraint equations

@@ -7,12 +7,9 @@
 
 namespace ffrobot::recursion {
 
-// Angle and its rate of the section at a port against the body
+// Angle of the section at a port against the body
 template <class T> FFROBOT_INLINE T section_angle(const planar::Body &b, int port, const planar::State<T> &s) {
   return b.ports[port].angle + s.u[b.ports[port].row + 2];
-}
-template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port, const planar::State<T> &s) {
-  return s.u_dot[b.ports[port].row + 2];
 }
 
 template <class T>
@@ -71,7 +68,7 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T
     if (node.inboard >= 0) { // from the section to the frame
       T c, n;
       sine_and_cosine(section_angle(node.body, node.inboard, s), n, c);
-      s.omega -= section_rate(node.body, node.inboard, s);
+      s.omega -= s.u_dot[node.body.ports[node.inboard].row + 2];
       s.cosine = c, s.sine = n;
       const T ac = s.absolute_cosine, as = s.absolute_sine;
       s.absolute_cosine = ac * c + as * n, s.absolute_sine = as * c - ac * n;

@@ -137,7 +137,4 @@ private:
   void connect_pins();
 };
 
-extern template struct Mechanism<Planar>;
-extern template struct Mechanism<Spatial>;
-
 } // namespace ffrobot::recursion

@@ -4,7 +4,6 @@
 #include "core/recursion/mechanism/mechanism.h"
 #include "core/recursion/mechanism/orientation.h"
 
-#include <string>
 #include <type_traits>
 
 namespace ffrobot::recursion {
@@ -166,8 +165,5 @@ void round_off(const Mechanism<Space> &m, const T *q, const std::type_identity_t
 // Values and rates of all constraint equations (m, rad; m/s, rad/s), at a state without generalized forces.
 template <class Space, class T>
 Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate);
-
-extern template struct Workspace<Planar, double>;
-extern template struct Workspace<Spatial, double>;
 
 } // namespace ffrobot::recursion

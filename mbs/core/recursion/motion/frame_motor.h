@@ -18,16 +18,11 @@ struct FrameShare {
   // Adds the modal forces of a moment m (N m along the axis, on this body) at q to those along v.
   void add(double moment, const double *q_all, double *force) const {
     const auto n = Phi_r.cols();
-    const Eigen::Vector3d phi = Phi_r * Eigen::Map<const Eigen::VectorXd>(q_all + q, n);
-    Eigen::Map<Eigen::VectorXd>(force + v, n) -= moment * (Phi_r.transpose() * turned(phi));
-  }
-
-private:
-  Eigen::Vector3d turned(const Eigen::Vector3d &phi) const { // J_l(phi) axis
+    const Eigen::Vector3d phi = Phi_r * Eigen::Map<const Eigen::VectorXd>(q_all + q, n), across = phi.cross(axis);
     double a, b, a_rate, b_rate;
     spatial::rotation_series(phi.squaredNorm(), a, b, a_rate, b_rate);
-    const Eigen::Vector3d across = phi.cross(axis);
-    return axis + a * across + b * phi.cross(across);
+    const Eigen::Vector3d turned = axis + a * across + b * phi.cross(across); // J_l(phi) axis
+    Eigen::Map<Eigen::VectorXd>(force + v, n) -= moment * (Phi_r.transpose() * turned);
   }
 };
 

@@ -32,7 +32,4 @@ private:
   double cosine_ = 1;
 };
 
-extern template class LoopWatch<Planar>;
-extern template class LoopWatch<Spatial>;
-
 } // namespace ffrobot::recursion

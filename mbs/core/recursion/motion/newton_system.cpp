@@ -29,11 +29,7 @@ template <class Space>
 NewtonSystem<Space>::NewtonSystem(const Mechanism<Space> &mechanism, const Scene &scene)
     : mechanism_(mechanism), scene_(scene), w_(mechanism), q_(VectorXd::Zero(mechanism.n_q)),
       rest_(VectorXd::Zero(mechanism.n_v)) {
-  find_stiff_terms();
-}
-
-// Of elastic and damping forces of modes, of springs in joints and gears
-template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
+  // Elastic and damping forces of modes, springs in joints and gears
   auto coupled = scene_.cut_joints.size();
   const Index all = coupled + scene_.gears.size();
   stiffness_ = damping_ = VectorXd::Zero(rest_.size() + all);

@@ -27,7 +27,7 @@ public:
   const Eigen::VectorXd &damping() const { return damping_; }
   const Eigen::MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints and gears), rates: coupling^T v
 
-  // As ImplicitSystem has these
+  // As OdeSystem has these
   void linearise(const double *q, const double *v);
   void factorise(double damping_factor, double stiffness_factor) { factorise(damping_factor, stiffness_factor, real_); }
   void factorise(Complex damping_factor, Complex stiffness_factor) {
@@ -46,7 +46,6 @@ private:
     Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> symmetric; // 1 + S G S as L and 1/D (symmetric_factors.h)
   };
 
-  void find_stiff_terms();
   void take_slopes(const Eigen::VectorXd &rates);
   void find_coupling();
   void find_responses();
@@ -66,8 +65,5 @@ private:
   Factors<double> real_;
   Factors<Complex> complex_;
 };
-
-extern template class NewtonSystem<Planar>;
-extern template class NewtonSystem<Spatial>;
 
 } // namespace ffrobot::recursion

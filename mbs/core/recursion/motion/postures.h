@@ -67,7 +67,4 @@ private:
   Eigen::VectorXd value_, rate_, still_;
 };
 
-extern template class Postures<Planar>;
-extern template class Postures<Spatial>;
-
 } // namespace ffrobot::recursion

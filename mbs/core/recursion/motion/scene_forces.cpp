@@ -39,8 +39,14 @@ typename SceneForces<Space>::Acting SceneForces<Space>::at(double t, const doubl
   if (external_)
     external_->add(t, q, generalized_.data(), wrench_.data());
   if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
-    found.placed.emplace(place_all(mechanism_, q, v, found.forces.generalized, w));
-    add_at_sections(t, *found.placed);
+    const auto &at = found.placed.emplace(place_all(mechanism_, q, v, found.forces.generalized, w));
+    add_at_points(at, scene_.point_forces, t, length_, wrench_.data());
+    cut_rates(at, scene_.cut_joints, along_cuts_.data());
+    for (Index k = 0; k < along_cuts_.size(); ++k)
+      along_cuts_[k] = -scene_.cut_joints[k].friction.resistance(along_cuts_[k]);
+    for (const CutLoad &load : scene_.cut_loads)
+      along_cuts_[load.joint] += load.share * load.magnitude(t).value;
+    add_along_cuts(at, scene_.cut_joints, along_cuts_.data(), wrench_.data());
   }
   found.forces.wrench = wrench_.data();
   return found;
@@ -61,19 +67,6 @@ template <class Space> void SceneForces<Space>::add_along_coordinates(double t, 
   }
   if (held_)
     held_->add(q, generalized_.data());
-}
-
-template <class Space> void SceneForces<Space>::add_at_sections(double t, const Placed<Space, double> &at) {
-  add_at_points(at, scene_.point_forces, t, length_, wrench_.data());
-  const std::vector<CutJoint> &cuts = scene_.cut_joints;
-  cut_rates(at, cuts, along_cuts_.data());
-  for (std::size_t k = 0; k < cuts.size(); ++k) {
-    double &along = along_cuts_[k];
-    along = -cuts[k].friction.resistance(along);
-  }
-  for (const CutLoad &load : scene_.cut_loads)
-    along_cuts_[load.joint] += load.share * load.magnitude(t).value;
-  add_along_cuts(at, cuts, along_cuts_.data(), wrench_.data());
 }
 
 template class SceneForces<Planar>;

@@ -46,7 +46,6 @@ public:
 
 private:
   void add_along_coordinates(double t, const double *q, const double *v);
-  void add_at_sections(double t, const Placed<Space, double> &at);
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
@@ -56,8 +55,5 @@ private:
   const bool has_generalized_, has_wrenches_;
   Eigen::VectorXd generalized_, wrench_, along_cuts_; // (n_v), (wrenches, dim), (cut joints)
 };
-
-extern template class SceneForces<Planar>;
-extern template class SceneForces<Spatial>;
 
 } // namespace ffrobot::recursion

@@ -1,38 +1,25 @@
-// How far a mechanism is from a posture in which its joints cannot follow a
-// path in every direction.
+// How far a mechanism is from a posture in which its joints cannot follow a path in every direction.
 #pragma once
 
 #include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 
-// Modes let constraints stay independent there: the equations do not fail,
-// while motors' forces and rates grow.
+// Modes let constraints stay independent there: the equations do not fail, while motors' forces and rates grow.
 struct PostureWatch {
   std::vector<char> is_path; // of each constraint equation; others close loops
   double length = 1;         // m: ways count in terms of it
 };
 
-struct Posture {
-  // Smallest of largest singular value of the path's equations in the freedoms that
-  // joints and loops have with rigid links; 1 without a path
-  double ratio = 1;
-  double determinant = 0; // where its sign means something: it changes in a
-                          // singular posture
-};
-
-// At q; `w` is worked with.
-template <class Space>
-Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w);
-
-// The worst of the postures that were looked at, and the last one.
+// The worst of the postures that were looked at, and the last one: ratio and determinant of Mobility.
 struct PostureHistory {
-  double least_ratio = 1, singular_at = 0; // 1 before the first; s
+  double least_ratio = 1, singular_at = 0; // 1 before the first, or without a path; s
   Eigen::VectorXd singular_posture;        // q there
-  double watched_at = 0, determinant = 0;  // of the last
+  double watched_at = 0, determinant = 0;  // s; of the last
 };
 
-// Looks at q at time t; between postures whose determinants differ in sign there is a singular one.
+// Looks at q (n_q) at time t (s), working with `w`; between postures whose determinants differ in sign there is a
+// singular one.
 template <class Space>
 void look(const Mechanism<Space> &m, const PostureWatch &watch, double t, const double *q, Workspace<Space, double> &w,
           PostureHistory &history);

@@ -12,14 +12,6 @@
 
 namespace ffrobot::recursion {
 
-template <class Space> struct KnownBodyOf;
-template <> struct KnownBodyOf<Planar> {
-  using type = planar::KnownBody;
-};
-template <> struct KnownBodyOf<Spatial> {
-  using type = spatial::KnownBody;
-};
-
 template <class Space> class NewtonEuler {
 public:
   // An acceleration less gravity, or a force with its moment about the point where it acts: as A and f of the space
@@ -91,7 +83,7 @@ private:
   template <class Act> void on_constraints(std::size_t i, const Workspace<Space, double> &w, const Act &act) const;
 
   const Mechanism<Space> &mechanism_;
-  std::vector<typename KnownBodyOf<Space>::type> bodies_;
+  std::vector<std::conditional_t<Space::dim == 3, planar::KnownBody, spatial::KnownBody>> bodies_;
   std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; the latter with subtrees
   std::vector<double> terms_;                          // of all ports: what modes accelerate by
   std::vector<Vector> frames_;                         // of bodies: accelerations, axes of the body
@@ -101,8 +93,5 @@ private:
   std::vector<Vector> of_joint_, at_section_;          // by nodes, in axes of the joint; of the inboard port
   std::vector<Vector> of_rotor_;
 };
-
-extern template class NewtonEuler<Planar>;
-extern template class NewtonEuler<Spatial>;
 
 } // namespace ffrobot::recursion
