@@ -4,6 +4,7 @@ import re
 
 import pytest
 from beam_links import beam_link, rectangle
+from tables_3d import pin
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.results.file import Results
@@ -26,10 +27,6 @@ def rod(name, length, mass=1.0):
         "points": points}}  # fmt: skip
 
 
-def revolute(name, first, second, **keys):
-    return {"name": name, "type": "revolute", "between": [first, second]} | keys
-
-
 def tip(x, y="0.2"):
     return [{"name": "tip", "point": "b.tip", "x": x, "y": y}]
 
@@ -44,7 +41,7 @@ def arm(first=None, **keys):
     """Two rods in the vertical plane; `first`: keys of its first joint."""
     return {
         "name": "arm", "gravity": [0.0, -10.0], "body": [rod("a", 0.5), rod("b", 0.4)], "initial": BENT,
-        "joint": [revolute("s", "ground", "a.root", **(first or {})), revolute("e", "a.tip", "b.root")],
+        "joint": [pin("s", "ground", "a.root", **(first or {})), pin("e", "a.tip", "b.root")],
         "trajectory": tip("0.6 + 0.1*sin(2*t)"), "analysis": [PCID],
     } | keys  # fmt: skip
 
@@ -57,7 +54,7 @@ def falling(first=None, **analysis):
 def four_bar(**start):
     bars = [rod("a", 0.4), rod("b", 0.5), rod("c", 0.4)]
     between = {"s": ("ground", "a.root"), "e": ("a.tip", "b.root"), "f": ("b.tip", "c.tip"), "h": ("ground", "c.root")}
-    found = [revolute(name, *pair) for name, pair in between.items()]
+    found = [pin(name, *pair) for name, pair in between.items()]
     found[-1] |= {"at": [0.6, 0.0]}
     return arm(body=bars, joint=found, trajectory=[], analysis=[FORWARD | {"end": 0.02}], initial={"joints": start})
 
@@ -71,7 +68,7 @@ def loop_3d(f, h):
     ]
     z = {"axis": [0.0, 0.0, 1.0]}
     found = [
-        revolute("s", "ground", "a.root", **z), revolute("e", "a.tip", "b.root", **z),
+        pin("s", "ground", "a.root", **z), pin("e", "a.tip", "b.root", **z),
         {"name": "f", "between": ["b.tip", "c.tip"], **f}, {"name": "h", "between": ["ground", "c.root"], **h},
     ]  # fmt: skip
     found[-1] |= {"at": [0.6, 0.0, 0.0]}
@@ -87,7 +84,7 @@ def soft(path, thick=0.002, load=0.2, rotor=0.0, body=None, **keys):
     follows = {"name": "path", "joint": "s", "value": path} if isinstance(path, str) else {"name": "path", **path}
     return {
         "name": "soft", "gravity": [0.0, -10.0], "body": [{"name": "a", "link": link} | (body or {})],
-        "joint": [revolute("s", "ground", "a.root", rotor_inertia=rotor)], "trajectory": [follows],
+        "joint": [pin("s", "ground", "a.root", rotor_inertia=rotor)], "trajectory": [follows],
         "payload": [{"point": "a.tip", "mass": load}] if load else [], "analysis": [PCID],
     } | keys  # fmt: skip
 

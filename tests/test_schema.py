@@ -14,7 +14,7 @@ from checkpoint_mechanisms import load as checkpoint
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.scene.load import load_robot, load_scene, make_scene
+from ffrobot.scene.load import load_robot, make_scene
 from ffrobot.schema import schema
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -44,19 +44,12 @@ def parsed(path):
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+@pytest.mark.parametrize("path", [*SCENES, *ROBOTS], ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_scenes_of_the_cases_pass(validator, path):
-    scene = load_scene(path)
-    validator["scene"].validate(parsed(path))
-    assert validator["spatial"].is_valid(parsed(path)) is not scene.is_planar
-
-
-@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: f"{path.parent.name}/{path.stem}")
-def test_robots_of_the_cases_pass(validator, path):
-    """Scenes without analyses, as `ffrobot smooth` takes them."""
-    assert not load_robot(path).is_planar
-    rest = {"name": "rest", "kind": "static"}
-    validator["spatial"].validate({**parsed(path), "analysis": [rest]})
+    """Robots are scenes without analyses, as `ffrobot smooth` takes them."""
+    scene, tables = load_robot(path), {"analysis": [{"name": "rest", "kind": "static"}]} | parsed(path)
+    validator["scene"].validate(tables)
+    assert validator["spatial"].is_valid(tables) is not scene.is_planar
 
 
 @pytest.mark.parametrize("name", CHECKPOINTS)

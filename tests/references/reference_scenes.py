@@ -9,6 +9,7 @@ from beam_links import beam_link, rectangle
 from moved_scenes import tables_of
 from random_robots import random_scene
 from robots_3d import random_scene_in_3d
+from tables_3d import pin, scene
 
 import ffrobot
 
@@ -42,17 +43,13 @@ def bending(count=3, **of_link):
     return LINK | {"modes": modes} | of_link
 
 
-def revolute(name, first, second, **own):
-    return {"name": name, "type": "revolute", "between": [first, second]} | own
-
-
 def arm(*analyses, of_joints=(), of_bodies=(), **tables):
     """Two flexible links in the plane, whose tip follows a path."""
     found = {
         "name": "arm", "gravity": [0.0, -9.81],
         "body": [{"name": f"link{k}", "link": bending()} | dict(of_bodies) for k in (1, 2)],
-        "joint": [revolute("O", "ground", "link1.root") | dict(of_joints),
-                  revolute("A", "link1.tip", "link2.root") | dict(of_joints)],
+        "joint": [pin("O", "ground", "link1.root") | dict(of_joints),
+                  pin("A", "link1.tip", "link2.root") | dict(of_joints)],
         "initial": {"state": "static", "angles": {"link1": -0.4, "link2": 0.8}},
         "trajectory": [{"name": "tip", "point": "link2.tip", "x": "0.80889 - 8*t**2", "y": "0.16397 + 6*t**2"}],
         "analysis": list(analyses),
@@ -83,7 +80,7 @@ def slide(**tables):
             {"name": "way", "type": "prismatic", "between": ["ground", "cart.root"], "at": [0.1, 0.0],
              "axis": [2.0, 1.0]},
             {"name": "weld", "type": "weld", "between": ["cart.tip", "rod.root"]},
-            revolute("turn", "arm.root", "rod.tip"),
+            pin("turn", "arm.root", "rod.tip"),
         ],
         "initial": {"state": "undeformed", "angles": {"arm": 0.5}},
         "analysis": [INVERSE, AGAIN],
@@ -147,10 +144,7 @@ FREE = {"mass": 1.2, "center": [0.15, 0.02, -0.01], "inertia": [4e-3, 9e-3, 8e-3
 
 
 def in_3d(name, bodies, joints, *analyses, **tables):
-    return ffrobot.make_scene(
-        name=name, space="spatial", gravity=[0.3, -0.5, -9.8], body=bodies, joint=joints, analysis=list(analyses),
-        **tables,
-    )  # fmt: skip
+    return ffrobot.make_scene(**scene(bodies, joints, *analyses, name=name, gravity=[0.3, -0.5, -9.8], **tables))
 
 
 def joints_of_all_types():
@@ -162,7 +156,7 @@ def joints_of_all_types():
         "planar": {"axis": [0.1, 0.2, 1.0]}, "weld": {"rpy": [0.1, 0.4, -0.2]},
     }  # fmt: skip
     bodies = [{"name": "base", "link": LINK | {"modes": {"count": 6, "family": "all"}}}]
-    joints = [revolute("foot", "ground", "base.root", axis=[0.0, 0.6, 0.8], at=[0.1, 0.0, 0.2])]
+    joints = [pin("foot", "ground", "base.root", axis=[0.0, 0.6, 0.8], at=[0.1, 0.0, 0.2])]
     for name, own in types.items():
         bodies.append({"name": name, "rigid": FREE})
         joints.append({"name": f"to_{name}", "type": name, "between": ["base.tip", f"{name}.root"]} | own)
@@ -205,11 +199,11 @@ def seven_joints(redundancy):
     axes = [[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 1, 0]]
     bodies = [{"name": f"l{k}", "rigid": FREE} for k in range(4)]
     ends = ["ground", *(f"l{k}.tip" for k in range(3))]
-    joints = [revolute(f"q{k}", ends[k], f"l{k}.root", axis=axis) for k, axis in enumerate(axes)]
+    joints = [pin(f"q{k}", ends[k], f"l{k}.root", axis=axis) for k, axis in enumerate(axes)]
     guess = {"q0": 0.2, "q1": -0.6, "q2": 0.3, "q3": 1.1}
     path = {"name": "tip", "point": "l3.tip", "x": "0.75 + 0.5*t**2", "y": "0.35 - 0.4*t**2", "z": "0.0 + t**2"}
-    return in_3d("redundant", bodies, joints, INVERSE | {"end": 0.2, "output_step": 0.01}, trajectory=[path],
-                    initial={"joints": guess}, redundancy=redundancy)  # fmt: skip
+    keys = {"trajectory": [path], "initial": {"joints": guess}, "redundancy": redundancy}
+    return in_3d("redundant", bodies, joints, INVERSE | {"end": 0.2, "output_step": 0.01}, **keys)
 
 
 SPATIAL = {
@@ -235,9 +229,7 @@ SPATIAL = {
     "control_in_3d": partial(
         planar_case_in_3d, "two_link_closed_loop", INVERSE, LOOP, LOOP | {"name": "patches", "controller": [PD, LQR]}
     ),
-    "loop_in_3d": partial(
-        planar_case_in_3d, "slider_crank", INVERSE, RELEASED,
-    ),
+    "loop_in_3d": partial(planar_case_in_3d, "slider_crank", INVERSE, RELEASED),
     **{f"random_in_3d_{k}": lambda k=k: random_scene_in_3d(3717, k, [("a", 1e-7, "dop853")], 60_000)[1]
        for k in range(8)},
 }  # fmt: skip
